@@ -1,0 +1,39 @@
+"""symdyn: equations of motion of multibody systems, derived symbolically and run as fast as the processor allows.
+
+The public names; each is imported when it is first used, so that `import symdyn` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "symdyn.model.symbols": ("coordinates", "inputs", "parameters", "speeds"),
+    "symdyn.model.bodies": ("position", "velocity"),
+    "symdyn.model.joints": ("Cylindrical", "Fixed", "Free", "Planar", "Prismatic", "Revolute", "Spherical", "Universal"),
+    "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
+    "symdyn.model.system": ("System",),
+    "symdyn.errors": ("CompileError", "CompilerNotFound", "ModelError", "ModelWarning", "SymdynError",
+                      "UnsupportedExpression"),
+}
+_WHERE = {name: module for module, names in _HOME.items() for name in names}
+_PACKAGES = ("systems",)
+
+__all__ = [*_WHERE, *_PACKAGES, "t"]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> Any:
+    if name == "t":
+        return importlib.import_module("symdyn.model.symbols").time
+    if name in _PACKAGES:
+        return importlib.import_module(f"symdyn.{name}")
+    if name in _WHERE:
+        return getattr(importlib.import_module(_WHERE[name]), name)
+    raise AttributeError(f"symdyn has no {name!r}; it has {', '.join(sorted(__all__))}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""Backends: from a tape to source text. Each is a dialect and a folder of templates."""

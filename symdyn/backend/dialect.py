@@ -1,0 +1,86 @@
+"""A dialect: how the operations of the tape are written in a language; read from a TOML table beside its templates."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symdyn.errors import SymdynError
+from symdyn.tape.ops import OPERATIONS
+
+_C_WORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
+register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while asm bool
+class complex delete explicit export false friend imaginary mutable namespace new operator private protected public
+template this throw true try typename using virtual NULL main""".split()
+_LIBRARY = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt cbrt pow fabs fmin fmax floor
+ceil erf erfc gamma lgamma tgamma j0 j1 jn y0 y1 yn isnan isinf abs max min sign pi where sum range len print math numpy
+np t q u z x ud xd p c inputs out n status""".split()
+RESERVED = frozenset(_C_WORDS) | frozenset(_LIBRARY) | frozenset(keyword.kwlist) | frozenset(keyword.softkwlist)
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How one language writes numbers, operations and assignments.
+
+    operations   op -> format of its arguments {0}, {1}, ...; infix ones are built in where absent
+    assign       format of an assignment to a new variable, with {name} and {value}
+    load         formats of reading a leaf by kind ("q", "u", ..., "p", "c") with {k} its place
+    first        index of the first entry of an array, 0 or 1
+    comment      what a comment line begins with
+    """
+
+    name: str
+    operations: dict[str, str]
+    assign: str
+    load: dict[str, str]
+    store: str
+    check: str
+    comment: str
+    literal: str = "{value!r}"
+    first: int = 0
+    files: dict[str, str] | None = None
+
+    def number(self, value: float) -> str:
+        """A literal that reads back as exactly this double."""
+        return self.literal.format(value=float(value))
+
+
+def read_dialect(folder: Path) -> Dialect:
+    """The dialect of a template folder (dialect.toml). Raises SymdynError naming what is missing or unknown."""
+    path = folder / "dialect.toml"
+    try:
+        table: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SymdynError(f"the template folder {folder} has no dialect.toml; copy one from the c or numpy templates and "
+                          "adapt it") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SymdynError(f"{path} is not valid TOML: {error}") from error
+    missing = [key for key in ("operations", "assign", "load", "store", "check", "comment", "files") if key not in table]
+    unknown = [op for op in table.get("operations", {}) if op not in OPERATIONS]
+    if missing or unknown:
+        faults = [f"missing: {', '.join(missing)}"] * bool(missing) + [f"unknown operations: {', '.join(unknown)}"] * bool(
+            unknown)
+        raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
+    fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
+                                          "files") if key in table}
+    return Dialect(folder.name, **fields)
+
+
+def identifier(name: str, taken: set[str]) -> str:
+    """A name that is an identifier in every common language and not taken; adds it to `taken`."""
+    base = re.sub(r"\W", "_", name, flags=re.ASCII) or "v"
+    if base[0].isdigit() or base.startswith("_"):
+        base = f"v{base}"
+    candidate = base
+    number = 2
+    while candidate in RESERVED or candidate in taken:
+        candidate = f"{base}_{number}" if candidate != base else f"{base}_"
+        if candidate in taken:
+            candidate = f"{base}_{number}"
+            number += 1
+    taken.add(candidate)
+    return candidate

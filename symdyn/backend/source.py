@@ -1,0 +1,194 @@
+"""Renders a backend's templates: from equations and function names to the texts of files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+import symdyn
+from symdyn.backend.dialect import Dialect, identifier, read_dialect
+from symdyn.backend.program import Function, Program, build
+from symdyn.backend.reference import DIGITS, make_reference
+from symdyn.errors import SymdynError
+from symdyn.tape.tape import Tape
+
+_C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
+           "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c"}
+_SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
+
+
+@dataclass(frozen=True)
+class Content:
+    """What to emit: tapes by function name, their titles, and the names behind every group of arguments.
+
+    groups   names in the groups q, u, z, ud, inputs, p, in order; units: name -> unit; defaults: name -> number
+    outputs  user outputs: (name, shape) in the order of the function `outputs`
+    """
+
+    name: str
+    formulation: str
+    tapes: Mapping[str, Tape]
+    titles: Mapping[str, str]
+    groups: Mapping[str, Sequence[str]]
+    units: Mapping[str, str]
+    defaults: Mapping[str, float]
+    initial: Mapping[str, float]
+    outputs: Sequence[tuple[str, tuple[int, ...]]] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Source:
+    """Rendered files, file name -> text, with the program they hold and the record that a loader needs."""
+
+    backend: str
+    files: Mapping[str, str]
+    program: Program
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+def template_folders(extra: str | os.PathLike | None = None) -> list[Path]:
+    """Where templates are looked for: the user's folder, then the shipped ones (in the wheel or in the checkout).
+
+    Raises SymdynError if the user's folder does not exist.
+    """
+    package = Path(symdyn.__file__).parent
+    shipped = package / "templates" if (package / "templates").is_dir() else package.parent / "templates"
+    folders = [shipped]
+    if extra is not None:
+        if not Path(extra).is_dir():
+            raise SymdynError(f"the template folder {extra} does not exist; pass a folder that holds one folder a backend")
+        folders.insert(0, Path(extra))
+    return folders
+
+
+def backends(extra: str | os.PathLike | None = None) -> list[str]:
+    """Names of the backends: every template folder with a dialect."""
+    return sorted({path.parent.name for folder in template_folders(extra) for path in folder.glob("*/dialect.toml")})
+
+
+def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
+           integrator: bool = True) -> Source:
+    """Render a backend's files.
+
+    templates    folder whose files take precedence over the shipped ones
+    standalone   with reference vectors, header and example; False for a module that is only loaded
+    integrator   C only: with the compiled integrator (needs the function rhs)
+    Raises SymdynError for an unknown backend or a broken template.
+    """
+    folders = template_folders(templates)
+    known = backends(templates)
+    if backend not in known:
+        raise SymdynError(f"there is no backend {backend!r}; there are {', '.join(known)}; "
+                          "a folder with a dialect.toml and templates, passed as templates=, adds one")
+    dialect = next(read_dialect(f / backend) for f in folders if (f / backend / "dialect.toml").is_file())
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
+                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    places = {"t": ("t", 0)}
+    for group, names in content.groups.items():
+        places.update({name: (group, k) for k, name in enumerate(names)})
+    program = build(dialect, content.tapes, content.titles, places)
+    context = _context(content, program, dialect, standalone, integrator and "rhs" in content.tapes)
+    files = {}
+    wanted = dialect.files or {}
+    if not standalone:
+        wanted = dict(list(wanted.items())[:1])
+    for template, target in wanted.items():
+        try:
+            text = environment.get_template(f"{backend}/{template}").render(context)
+        except jinja2.TemplateError as error:
+            where = getattr(error, "lineno", None)
+            raise SymdynError(f"template {backend}/{template}{f', line {where}' if where else ''}: {error}") from error
+        files[target.format(name=context["name"])] = text
+    return Source(backend, files, program, dict(context["metadata_record"]))
+
+
+def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool) -> dict[str, Any]:
+    groups = content.groups
+    sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
+    n_x = sizes["q"] + sizes["u"] + sizes["z"]
+    name = identifier(content.name, set())
+    calls = {f.name: ", ".join([g for g in f.arguments] + ["out"]) for f in program.functions}
+    reference = make_reference(content.tapes, groups, content.defaults, calls) if standalone else None
+    uses = {f.name: f.arguments for f in program.functions}
+
+    def signature(f: Function) -> str:
+        return ", ".join([_C_TYPE[g] for g in f.arguments] + ["double *out"])
+
+    def state(argument: str, base: str) -> str:
+        offset = {"q": 0, "u": sizes["q"], "z": sizes["q"] + sizes["u"]}.get(argument)
+        return argument if offset is None else base if offset == 0 else f"{base} + {offset}"
+
+    def rows_call(f: Function) -> str:
+        strided = {"t": "frame->t[i * frame->t_stride]", "p": "frame->p", "c": "frame->c",
+                   "ud": f"frame->ud + i * frame->ud_stride * {sizes['ud']}",
+                   "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes['inputs']}"}
+        return ", ".join([strided.get(g) or state(g, "x") for g in f.arguments] + [f"frame->out + i * {f.size}"])
+
+    def field_argument(g: str) -> str:
+        return f"problem->{g}" if g in ("p", "c") else state(g, "x")
+
+    metadata = {
+        "name": name, "formulation": content.formulation, "version": symdyn.__version__,
+        "q": list(groups["q"]), "u": list(groups["u"]), "z": list(groups["z"]), "x": [*groups["q"], *groups["u"],
+                                                                                     *groups["z"]],
+        "ud": list(groups["ud"]), "inputs": list(groups["inputs"]), "parameters": list(groups["p"]),
+        "defaults": [content.defaults.get(n) for n in groups["p"]],
+        "initial": {n: v for n, v in content.initial.items()},
+        "units": {n: content.units.get(n, "") for g in ("q", "u", "z", "inputs", "p") for n in groups[g]},
+        "sizes": {"x": n_x, **sizes}, "shapes": {f.name: list(f.shape) for f in program.functions},
+        "outputs": [[n, list(shape)] for n, shape in content.outputs], "reasons": list(program.reasons),
+        "n_c": program.n_c, "operations": {f.name: f.count for f in program.functions},
+        "arguments": {f.name: list(f.arguments) for f in program.functions},
+    }
+    text = repr([(f.name, f.loads, f.sections, f.results) for f in (*program.functions, program.prologue)])
+    return {
+        "name": name, "formulation": content.formulation, "version": symdyn.__version__,
+        "hash": hashlib.sha256(text.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
+        "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
+        "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
+        "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
+        "n_in": sizes["inputs"], "signature": signature, "rows_call": rows_call, "shape_text": _shape_text,
+        "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
+        "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
+        "field_call": ", ".join([field_argument(g) for g in uses.get("rhs", ())] + ["xd"]),
+        "tables": _tables(content),
+    }
+
+
+def _shape_text(f: Function) -> str:
+    return {0: "one number", 1: f"{f.size} numbers"}.get(len(f.shape), " x ".join(map(str, f.shape)) + ", row by row")
+
+
+def _header(content: Content, program: Program) -> list[str]:
+    """What every argument is: order, unit, default."""
+    lines = ["SI units, radians. State x = [q; u; z]. Arguments, in order:"]
+    for group, title in _SYMBOLS.items():
+        names = content.groups[group]
+        if not names:
+            continue
+        lines.append(f"  {title} ({len(names)}):")
+        for k, n in enumerate(names):
+            unit = content.units.get(n, "")
+            default = content.defaults.get(n)
+            tail = "".join([f"  [{unit}]" if unit else "", f"  default {default!r}" if default is not None else ""])
+            lines.append(f"    {k}  {n}{tail}")
+    if program.n_c:
+        lines.append(f"  constants c ({program.n_c}): what the prologue computes from the parameters")
+    return [*lines, *[f"Skipped: {note}." for note in content.notes]]
+
+
+def _tables(content: Content) -> list[tuple[str, list[dict[str, str]]]]:
+    def rows(group: str, values: Mapping[str, float]) -> list[dict[str, str]]:
+        return [{"name": n, "unit": content.units.get(n, ""), "value": repr(float(values.get(n, 0.0)))}
+                for n in content.groups[group]]
+
+    return [("coordinates", rows("q", content.initial)), ("speeds", rows("u", content.initial)),
+            ("states", rows("z", content.initial)), ("inputs", rows("inputs", content.initial)),
+            ("parameters", rows("p", content.defaults))]

@@ -1,0 +1,59 @@
+"""Errors that symdyn raises; each message tells what was asked, what was found, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class SymdynError(Exception):
+    """Base of all errors of symdyn."""
+
+
+class ModelError(SymdynError):
+    """The description of a mechanism has faults; `faults` lists all of them."""
+
+    def __init__(self, faults: Sequence[str], name: str = "") -> None:
+        self.faults = tuple(faults)
+        head = f"the model {name!r} has {len(self.faults)} faults:\n" if len(self.faults) > 1 else ""
+        mark = "  - " if head else ""
+        super().__init__(head + "\n".join(mark + fault for fault in self.faults))
+
+
+class UnsupportedExpression(SymdynError):
+    """An expression has a part that cannot be evaluated in generated code."""
+
+
+class CompileError(SymdynError):
+    """A C compiler rejected generated code, or the library it built cannot be loaded."""
+
+
+class CompilerNotFound(SymdynError):
+    """There is no usable C compiler, or not the one that was asked for."""
+
+
+class ModelWarning(UserWarning):
+    """A description that can be computed with but that no real mechanism has."""
+
+
+class ArgumentError(SymdynError, ValueError):
+    """A call was given values that do not fit: wrong length, unknown or missing names, not finite."""
+
+
+class EvaluationError(SymdynError, ArithmeticError):
+    """The equations cannot be evaluated at a state; the message tells which value and where."""
+
+
+class SimulationWarning(UserWarning):
+    """A simulation stopped early; the solution up to there is kept, and its message tells when, where and why."""
+
+
+class SimulationInterrupted(KeyboardInterrupt):
+    """A simulation was interrupted; `solution` holds what was computed up to there."""
+
+    def __init__(self, solution: object, message: str) -> None:
+        super().__init__(message)
+        self.solution = solution
+
+
+class MissingExtra(SymdynError, ImportError):
+    """Something optional is not installed; the message tells how to get it."""

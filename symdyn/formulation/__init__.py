@@ -1,0 +1,1 @@
+"""Formulations: from the checked model to equations of motion on the tape."""

@@ -1,0 +1,80 @@
+"""The scalars a derivation runs on: nodes of a tape, one leaf for each symbol of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.model.record import Model, joint_speeds
+from symdyn.model.symbols import Coordinate, time
+from symdyn.tape import node as kinds
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.sympy_bridge import record_expression
+
+
+class TapeAlgebra:
+    """Records on a tape; knows which leaf each symbol of the model is.
+
+    leaves   symbol -> node, for coordinates, speeds, states, inputs, parameters, t and the derivatives of speeds
+    """
+
+    def __init__(self, recorder: Recorder, leaves: dict[sp.Basic, Any]) -> None:
+        self.recorder = recorder
+        self.leaves = leaves
+        self._memory: dict[sp.Basic, Any] = {}
+        self.sin, self.cos, self.sqrt = recorder.sin, recorder.cos, recorder.sqrt
+        self.section = recorder.section
+        self.positive = recorder.positive
+
+    def expression(self, e: Any) -> Any:
+        """A SymPy expression on the tape."""
+        return record_expression(self.recorder, e, self.leaves, self._memory)
+
+    def constants(self, values: Iterable[Any]) -> np.ndarray:
+        """A vector of expressions on the tape."""
+        entries = [self.expression(e) for e in values]
+        result = np.empty(len(entries), dtype=object)
+        result[:] = entries
+        return result
+
+    def matrix(self, values: sp.MatrixBase) -> np.ndarray:
+        """A matrix of expressions on the tape."""
+        return self.constants(values).reshape(values.shape)
+
+    def name(self, name: str, value: Any) -> Any:
+        """Name the entries of a quantity by number."""
+        return self.recorder.name(name, value)
+
+    def vector(self, name: str, value: Any) -> Any:
+        """Name the components of a vector or matrix in space x, y, z."""
+        return self.recorder.name(name, value, axes=True)
+
+
+def leaves_of(model: Model, recorder: Recorder) -> dict[sp.Basic, Any]:
+    """A leaf for every symbol of the model; derivatives of coordinates stand for what the joints make of the speeds."""
+    leaves: dict[sp.Basic, Any] = {time: recorder.leaf("t", kinds.TIME)}
+    for symbols, kind in ((model.coordinates, kinds.COORDINATE), (model.speeds, kinds.SPEED),
+                          ([z.symbol for z in model.states], kinds.STATE), (model.inputs, kinds.INPUT),
+                          (model.parameters, kinds.PARAMETER)):
+        for symbol in symbols:
+            leaves[symbol] = recorder.leaf(symbol.name, kind)
+    return leaves
+
+
+def add_rates(model: Model, algebra: Any) -> list[Any]:
+    """q_dot = N(q) u, entry by entry; also makes each coordinate's `.dot` known to the algebra."""
+    rates: dict[sp.Basic, Any] = {}
+    for joint in model.joints:
+        if all(isinstance(q, Coordinate) for q in joint.coordinates):
+            s = [algebra.leaves[q] for q in joint.coordinates]
+            u = [algebra.leaves[v] for v in joint_speeds(joint)]
+            rates.update(zip(joint.coordinates, joint.rates(algebra, s, u), strict=True))
+        else:
+            rates.update({q: algebra.leaves[v] for q, v in zip(joint.coordinates, joint_speeds(joint), strict=True)
+                          if isinstance(q, Coordinate)})
+    for q, rate in rates.items():
+        algebra.leaves[q.dot] = rate
+    return [rates[q] for q in model.coordinates]

@@ -1,0 +1,98 @@
+"""The mass matrix by composite bodies, and its factorization on the tape.
+
+Source: Walker and Orin (1982), method 3; Featherstone, Rigid Body Dynamics Algorithms, section 6.2 (composite bodies)
+and 6.5 (L^T D L, which keeps the zeros that branches of the tree leave in the mass matrix).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.tree import GROUND, Tree
+from symdyn.spatial.vectors import Inertia, cross, dot, zeros
+
+
+def mass_matrix(tree: Tree) -> np.ndarray:
+    """Mass matrix in the joints' speeds, (n_w, n_w): each entry one link's composite inertia moved to another joint."""
+    algebra = tree.algebra
+    composite: list[Inertia] = [link.inertia for link in tree.links]
+    M = zeros(len(tree.w), len(tree.w))
+    for i in reversed(range(len(tree.links))):
+        link = tree.links[i]
+        with algebra.section(f"mass matrix: composite body from link {link.name} outwards"):
+            for column, place in enumerate(link.speeds):
+                f, n = momentum(composite[i], link.S[:3, column], link.S[3:, column])
+                for other in range(column + 1):
+                    M[place, link.speeds[other]] = dot(link.S[:3, other], n) + dot(link.S[3:, other], f)
+                    M[link.speeds[other], place] = M[place, link.speeds[other]]
+                _carry(tree, M, i, place, f, n)
+            if link.parent != GROUND:
+                total = composite[link.parent] + composite[i].moved(link.R, link.r)
+                number = link.parent + 1
+                algebra.name(f"mc{number}", total.m)
+                algebra.vector(f"hc{number}", total.h)
+                algebra.vector(f"Ic{number}", total.I)
+                composite[link.parent] = total
+    return M
+
+
+def momentum(inertia: Inertia, omega: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Linear momentum and angular momentum about the origin for a twist (or force and moment for its derivative)."""
+    return inertia.m * v + cross(omega, inertia.h), inertia.I @ omega + cross(inertia.h, v)
+
+
+def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.ndarray) -> None:
+    """Carry the wrench of one column to the joints inwards of link i."""
+    link = tree.links[i]
+    while link.parent != GROUND:
+        force = link.R @ f
+        n = link.R @ n + cross(link.r, force)
+        f = force
+        link = tree.links[link.parent]
+        for column, row in enumerate(link.speeds):
+            M[place, row] = M[row, place] = dot(link.S[:3, column], n) + dot(link.S[3:, column], f)
+
+
+@dataclass(frozen=True)
+class Factors:
+    """M = L^T D L with L unit lower triangular, D diagonal; entries that are zero by structure are the number 0."""
+
+    L: np.ndarray
+    inverse_D: list[Any]
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """x with M x = right, (n,)."""
+        n = len(self.inverse_D)
+        x = np.array(right, dtype=object)
+        for k in reversed(range(n)):
+            for i in range(k):
+                x[i] = x[i] - self.L[k, i] * x[k]
+        for k in range(n):
+            x[k] = x[k] * self.inverse_D[k]
+            for i in range(k):
+                x[k] = x[k] - self.L[k, i] * x[i]
+        return x
+
+
+def factorize(algebra: Any, M: np.ndarray, speeds: tuple) -> Factors:
+    """L^T D L of a symmetric positive definite matrix, from the last row to the first.
+
+    A pivot that is not positive when the code runs is reported with its speed.
+    """
+    n = len(M)
+    A = np.array(M, dtype=object)
+    L = zeros(n, n)
+    inverse: list[Any] = [0] * n
+    for k in reversed(range(n)):
+        algebra.name(f"D{k + 1}", A[k, k])
+        algebra.positive(A[k, k], f"the mass matrix is not positive definite at {speeds[k]}")
+        inverse[k] = algebra.name(f"iD{k + 1}", 1 / A[k, k])
+        for i in range(k):
+            L[k, i] = algebra.name(f"L{k + 1}_{i + 1}", A[k, i] * inverse[k])
+        for i in range(k):
+            for j in range(i + 1):
+                A[i, j] = A[i, j] - L[k, i] * A[k, j]
+    return Factors(L, inverse)

@@ -1,0 +1,293 @@
+"""The embedding formulation of a system of bodies: M_tilde u_dot + k_tilde = F_tilde.
+
+With J the velocity transformation, [v_G; omega] = J u, the lecture has M_tilde = J^T M J, k_tilde = J^T (M J_dot u + Q J u)
+and F_tilde = J^T F (chapters 3.2 and 6.2). The same numbers come cheaper without forming J: M_tilde by composite bodies,
+k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J itself is formed where it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.errors import ModelError
+from symdyn.formulation import composite
+from symdyn.formulation.algebra import TapeAlgebra, leaves_of
+from symdyn.formulation.equations import Equations, Symbols
+from symdyn.formulation.kinematics import Kinematics
+from symdyn.formulation.loads import Loads
+from symdyn.formulation.motion import Motion
+from symdyn.formulation.newton_euler import inverse_dynamics, inward
+from symdyn.formulation.tree import GROUND, Tree, build
+from symdyn.model.bodies import Point
+from symdyn.model.joints import Fixed
+from symdyn.model.record import Model
+from symdyn.model.symbols import time
+from symdyn.spatial.vectors import zeros
+from symdyn.tape.differentiate import forward
+from symdyn.tape.node import Node
+from symdyn.tape.recorder import Recorder
+
+
+class EmbeddedEquations(Equations):
+    """M_tilde u_dot + k_tilde = F_tilde; every property is explicit SymPy, simplified as far as its time limit allows."""
+
+    @property
+    def J(self) -> sp.Matrix:
+        """(6 n_b, n_u), planar (3 n_b, n_u): [v_G; omega] of every body = J u (+ given motion), n-frame."""
+        return self.explicit("J")
+
+    @property
+    def Jdot(self) -> sp.Matrix:
+        """Derivative of J by time, same shape."""
+        return self.explicit("Jdot")
+
+    @property
+    def Jd_qd(self) -> sp.Matrix:
+        """(6 n_b, 1), planar (3 n_b, 1): accelerations that remain when u_dot = 0, J_dot u (+ given motion)."""
+        return self.explicit("Jd_qd")
+
+    @property
+    def M_tilde(self) -> sp.Matrix:
+        """(n_u, n_u) J^T M J, symmetric."""
+        return self.explicit("M_tilde")
+
+    @property
+    def k_tilde(self) -> sp.Matrix:
+        """(n_u, 1) J^T (M J_dot u + Q J u)."""
+        return self.explicit("k_tilde")
+
+    @property
+    def F_tilde(self) -> sp.Matrix:
+        """(n_u, 1) J^T F with all loads and gravity."""
+        return self.explicit("F_tilde")
+
+    @property
+    def equations(self) -> tuple[sp.Eq, ...]:
+        """One equation a speed: (M_tilde u_dot + k_tilde)_i = F_tilde_i."""
+        left = self.M_tilde * self.accelerations + self.k_tilde
+        return tuple(sp.Eq(a, b, evaluate=False) for a, b in zip(left, self.F_tilde, strict=True))
+
+    @property
+    def F_c(self) -> sp.Matrix:
+        """Constraint reaction M r_ddot - F in the coordinates of the position map (level 1 only)."""
+        return self.explicit("F_c")
+
+    def _repr_latex_(self) -> str:
+        from symdyn.report.printing import equation_latex
+
+        return equation_latex(self)
+
+
+def embed(model: Model) -> EmbeddedEquations:
+    """The embedded equations of a checked model.
+
+    Raises ModelError for constraints (they need the augmented formulation) and for joints that move no inertia.
+    """
+    if model.constraints or model.loops:
+        count = len(model.constraints) + len(model.loops)
+        raise ModelError([f"the model has {count} constraints or closed loops; the embedded form takes trees only: "
+                          "use system.augmented(), or remove them"], model.name)
+    recorder = Recorder()
+    algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
+    tree = build(model, algebra)
+    derivation = EmbeddedTree(tree)
+    derivation.demand_inertia()
+    symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
+                      model.parameters, model.defaults, model.initial, model.units, model.duration)
+    return EmbeddedEquations(model.name, "embedding", model.planar, symbols, recorder, algebra.leaves,
+                             derivation.quantities(), tuple(_notes(tree)))
+
+
+class EmbeddedTree(Motion):
+    """Records the quantities of the embedded form of a tree."""
+
+    def __init__(self, tree: Tree) -> None:
+        model = tree.model
+        super().__init__(tree.algebra, model.coordinates, model.speeds, tree.rates,
+                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters)
+        self.tree = tree
+        self.model = model
+        self.loads = Loads(tree)
+        self.kinematics = Kinematics(tree)
+
+    def quantities(self) -> dict[str, Any]:
+        own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
+               "positions": self.positions, "frames": self.frames, "energy": self.energy, "power": self.power,
+               **{f"output_{o.name}": lambda o=o: self.output(o.value) for o in self.model.outputs}}
+        return {**super().quantities(), **own}
+
+    # -- the equations
+
+    def M_tilde(self) -> np.ndarray:
+        M = composite.mass_matrix(self.tree)
+        if self.tree.plain:
+            return self.algebra.name("M_tilde", M)
+        with self.algebra.section("mass matrix in the generalized speeds"):
+            return self.algebra.name("M_tilde", _congruence(M, self.tree.D))
+
+    def bias(self) -> np.ndarray:
+        """k_tilde - F_tilde in one pass: the weight as acceleration of the base."""
+        applied = self.loads.applied()
+        tau = inverse_dynamics(self.tree, self.tree.b, -self._gravity(), applied.wrenches)
+        return self.algebra.name("k_minus_F", self._project(tau - applied.joint))
+
+    def inverse_dynamics(self) -> np.ndarray:
+        """M_tilde u_dot + k_tilde - F_tilde by one pass, without the mass matrix."""
+        applied = self.loads.applied()
+        w_dot = self.tree.D @ self.speed_rates + self.tree.b if len(self.tree.w) else self.tree.b
+        tau = inverse_dynamics(self.tree, w_dot, -self._gravity(), applied.wrenches)
+        return self.algebra.name("tau", self._project(tau - applied.joint))
+
+    def k_tilde(self) -> np.ndarray:
+        return self.algebra.name("k_tilde", self._project(inverse_dynamics(self.tree, self.tree.b, zeros(3))))
+
+    def F_tilde(self) -> np.ndarray:
+        return self.algebra.name("F_tilde", self._project(self._joint_forces(gravity=True)))
+
+    def _gravity(self) -> np.ndarray:
+        return self.algebra.constants(self.model.gravity)
+
+    def _joint_forces(self, gravity: bool, conservative: bool = True, other: bool = True) -> np.ndarray:
+        """What the loads give along each joint speed, (n_w,)."""
+        applied = self.loads.applied(conservative, other)
+        if gravity:
+            g = self._gravity()
+            turned: list[np.ndarray] = []
+            for k, link in enumerate(self.tree.links):
+                with self.algebra.section(f"link {link.name}: weight"):
+                    turned.append(link.R.T @ (g if link.parent == GROUND else turned[link.parent]))
+                    f = link.inertia.m * turned[k]
+                    h = link.inertia.h
+                    n = np.array([h[1] * turned[k][2] - h[2] * turned[k][1], h[2] * turned[k][0] - h[0] * turned[k][2],
+                                  h[0] * turned[k][1] - h[1] * turned[k][0]], dtype=object)
+                    force, moment = applied.wrenches[k]
+                    applied.wrenches[k] = (force + f, moment + n)
+        return inward(self.tree, applied.wrenches) + applied.joint
+
+    def _project(self, tau: np.ndarray) -> np.ndarray:
+        """D^T tau: from the joints' speeds to the generalized ones."""
+        return tau if self.tree.plain else self.tree.D.T @ tau if len(tau) else zeros(len(self.speeds))
+
+    # -- what else follows
+
+    def J(self) -> np.ndarray:
+        rows = []
+        for pose, body in zip(self.tree.poses, self.model.bodies, strict=True):
+            with self.algebra.section(f"body {body.name}: velocity transformation J"):
+                J = self.kinematics.jacobian(pose, self.algebra.constants(body.com))
+                J = J @ self.tree.D if J.shape[1] else zeros(6, len(self.speeds))
+                rows.append(J[[0, 1, 5]] if self.model.planar else J)
+        return np.vstack(rows) if rows else zeros(0, len(self.speeds))
+
+    def Jdot(self) -> np.ndarray:
+        J = self.J()
+        return np.array(forward(self.algebra.recorder, J.ravel().tolist(), self.by_time()), dtype=object).reshape(J.shape)
+
+    def Jd_qd(self) -> np.ndarray:
+        rows = [r[[0, 1, 5]] if self.model.planar else r for r in self.kinematics.bias()]
+        return np.concatenate(rows) if rows else zeros(0)
+
+    def positions(self) -> np.ndarray:
+        """Centres of mass of the bodies, n-frame, (n_b, 3)."""
+        return np.array([self.kinematics.position(pose, self.algebra.constants(body.com))
+                         for pose, body in zip(self.tree.poses, self.model.bodies, strict=True)],
+                        dtype=object).reshape(-1, 3)
+
+    def frames(self) -> np.ndarray:
+        """Origin and rotation (row by row) of every body's frame, n-frame, (n_b, 12)."""
+        rows = []
+        for pose in self.tree.poses:
+            rows.append([*self.kinematics.position(pose, zeros(3)), *self.kinematics.rotation(pose).ravel()])
+        return np.array(rows, dtype=object).reshape(-1, 12)
+
+    def energy(self) -> np.ndarray:
+        """Kinetic energy; potential energy of gravity and springs, J."""
+        with self.algebra.section("energy"):
+            potential = self.kinematics.gravity_potential() + self.loads.potential()
+            return np.array([self.kinematics.kinetic_energy(), potential], dtype=object)
+
+    def power(self) -> Any:
+        """Power of all loads but gravity and springs, and of the drives that force prescribed motions, W."""
+        with self.algebra.section("power"):
+            total: Any = 0
+            if any(not _zero(v) for v in self._joint_forces(False, conservative=False)):
+                total = _sum(self._joint_forces(False, conservative=False), self.tree.w)
+            if any(not _zero(v) for v in self.tree.w_t):
+                applied = self.loads.applied()
+                w_dot = self.tree.D @ self.accelerations() + self.tree.b
+                tau = inverse_dynamics(self.tree, w_dot, -self._gravity(), applied.wrenches) - applied.joint
+                total = total + _sum(tau, self.tree.w_t)
+            return total
+
+    def output(self, value: Any) -> Any:
+        """A named output of the user."""
+        if isinstance(value, Point):
+            pose = self.loads.pose(value.body)
+            at = self.algebra.constants(value.at)
+            result = (self.kinematics.position(pose, at) if value.quantity == "position"
+                      else self.kinematics.velocity(pose, at))
+            return result[:2] if self.model.planar else result
+        if isinstance(value, tuple):
+            return self.algebra.constants(value)
+        return self.algebra.expression(value)
+
+    def demand_inertia(self) -> None:
+        """Raise ModelError for speeds that move nothing: the mass matrix has a zero on its diagonal."""
+        faults = []
+        M = self.recall("M_tilde")
+        for k, u in enumerate(self.speeds):
+            if _zero(M[k, k]):
+                joint = next(j for j in self.model.joints if u in [*(j.speeds or ()), *[
+                    q.dot for q in j.coordinates if isinstance(q, sp.Symbol) and hasattr(q, "dot")]] or u.name.endswith(
+                        f"_{j.name}"))
+                faults.append(f"joint {joint.name!r}: what it moves has no mass or inertia along {u}; give body "
+                              f"{getattr(joint.child, 'name', joint.child)!r} or one further out a mass or an inertia, "
+                              "or fix the joint")
+        if faults:
+            raise ModelError(faults, self.model.name)
+
+
+def _congruence(M: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """D^T M D, symmetric entries once."""
+    half = M @ D if M.shape[0] else zeros(0, D.shape[1])
+    n = D.shape[1]
+    result = zeros(n, n)
+    for i in range(n):
+        for j in range(i + 1):
+            total: Any = 0
+            for k in range(D.shape[0]):
+                total = total + D[k, i] * half[k, j]
+            result[i, j] = result[j, i] = total
+    return result
+
+
+def _sum(a: np.ndarray, b: np.ndarray) -> Any:
+    total: Any = 0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+def _zero(value: Any) -> bool:
+    return not isinstance(value, Node) and value == 0
+
+
+def _notes(tree: Tree) -> list[str]:
+    fixed = [j.name for j in tree.model.joints if isinstance(j, Fixed)]
+    notes = []
+    if fixed:
+        notes.append(f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation")
+    if time not in {s for j in tree.model.joints for q in j.coordinates for s in q.free_symbols} and not any(
+            _mentions_time(load) for load in tree.model.loads):
+        notes.append("nothing depends on time: the generated functions take no t")
+    return notes
+
+
+def _mentions_time(load: Any) -> bool:
+    values = [*getattr(load, "force", []), *getattr(load, "torque", []), *getattr(load, "values", [])]
+    return any(time in v.free_symbols for v in values)
+
+

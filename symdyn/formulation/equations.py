@@ -1,0 +1,108 @@
+"""What every formulation gives: quantities by name, recorded when asked for, printed by expanding their tape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.errors import SymdynError
+from symdyn.tape.node import Node
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.sympy_bridge import expand
+from symdyn.tape.tape import Tape
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """The symbols of the equations, in the order of the generated code's arguments, with numbers and units."""
+
+    coordinates: tuple[sp.Symbol, ...]
+    speeds: tuple[sp.Symbol, ...]
+    states: tuple[sp.Symbol, ...]
+    inputs: tuple[sp.Symbol, ...]
+    parameters: tuple[sp.Symbol, ...]
+    defaults: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    initial: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    units: Mapping[sp.Symbol, str] = field(default_factory=dict)
+    duration: float = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Equations of motion whose quantities are recorded on one tape when they are asked for.
+
+    name         of the mechanism; formulation: how it was derived
+    leaves       symbol -> leaf of the tape
+    quantities   name -> function that records it; planar: 3 rows a body instead of 6
+    notes        what was skipped, and why
+    """
+
+    name: str
+    formulation: str
+    planar: bool
+    symbols: Symbols
+    recorder: Recorder
+    leaves: Mapping[sp.Basic, Any]
+    quantities: Mapping[str, Callable[[], Any]]
+    notes: tuple[str, ...] = ()
+    simplify_seconds: float = 10.0
+    _recorded: dict[str, np.ndarray] = field(default_factory=dict)
+    _printed: dict[str, Any] = field(default_factory=dict)
+
+    def quantity(self, name: str) -> np.ndarray:
+        """A quantity as an array of nodes and numbers; recorded on first use."""
+        if name not in self._recorded:
+            if name not in self.quantities:
+                raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {name!r}; it has "
+                                  f"{', '.join(self.quantities)}")
+            self._recorded[name] = np.asarray(self.quantities[name](), dtype=object)
+        return self._recorded[name]
+
+    def tape(self, *names: str) -> Tape:
+        """A tape with the named quantities as outputs."""
+        return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
+
+    def explicit(self, name: str, simplify: bool = True) -> Any:
+        """The quantity as explicit SymPy, simplified as far as the time limit `simplify_seconds` allows."""
+        if name not in self._printed or not simplify:
+            symbols = {leaf: symbol for symbol, leaf in self.leaves.items()
+                       if isinstance(leaf, Node) and leaf.op == "leaf"}
+            value = expand(self.tape(name).outputs[name], symbols)
+            if not simplify:
+                return value
+            from symdyn.report.simplify import simplified
+
+            self._printed[name] = simplified(value, self.simplify_seconds)
+        return self._printed[name]
+
+    @property
+    def accelerations(self) -> sp.Matrix:
+        """Symbols of the derivatives of the speeds, (n_u, 1)."""
+        return sp.Matrix(len(self.symbols.speeds), 1, [u.dot for u in self.symbols.speeds])
+
+    def lambdify(self, name: str) -> Callable[..., np.ndarray]:
+        """One quantity as a NumPy function f(q, u, params, t=0, inputs=()), of one state or of arrays of states."""
+        return self.compile(backend="numpy").function(name)
+
+    def compile(self, backend: str | None = None, **options: Any) -> Any:
+        """A numeric module; backend "c" or "numpy", default: C if a compiler is found, else NumPy.
+
+        See symdyn.pipeline.compile_equations for the options.
+        """
+        from symdyn.pipeline import compile_equations
+
+        return compile_equations(self, backend, **options)
+
+    def verify(self, states: int = 5, digits: int = 30) -> Any:
+        """Prove the equations sound by identities at random states; see symdyn.verify."""
+        from symdyn.verify import verify
+
+        return verify(self, states, digits)
+
+    def __repr__(self) -> str:
+        s = self.symbols
+        return f"<{self.formulation} equations of {self.name}: {len(s.coordinates)} coordinates, {len(s.speeds)} speeds>"

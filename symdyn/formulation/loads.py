@@ -1,0 +1,176 @@
+"""Loads on the tape: wrenches on links, forces along joint speeds, springs and their potential."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.tree import GROUND, Pose, Tree
+from symdyn.model.bodies import Body
+from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.symbols import time
+from symdyn.spatial.vectors import cross, dot, zeros
+from symdyn.tape.differentiate import forward
+
+
+@dataclass
+class Applied:
+    """What acts on a tree: a wrench (f, n about the origin, link axes) for each link, a force for each joint speed.
+
+    anything   False if there is no load at all
+    """
+
+    wrenches: list[tuple[np.ndarray, np.ndarray]]
+    joint: np.ndarray
+    anything: bool = False
+
+    def add(self, pose: Pose, f: np.ndarray, n: np.ndarray) -> None:
+        """Add a wrench about the link's origin, link axes."""
+        self.anything = True
+        if pose.link != GROUND:
+            force, moment = self.wrenches[pose.link]
+            self.wrenches[pose.link] = (force + f, moment + n)
+
+
+class Loads:
+    """Records the loads of a model on its tree."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree = tree
+        self.algebra = tree.algebra
+        self.model = tree.model
+
+    def applied(self, conservative: bool = True, other: bool = True) -> Applied:
+        """All loads but gravity; springs are the conservative ones, everything else is not."""
+        result = Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)))
+        for load in self.model.loads:
+            with self.algebra.section(f"load {load.label}"):
+                if isinstance(load, SpringDamper):
+                    self._spring(result, load, conservative, other)
+                elif other and isinstance(load, Force):
+                    self._force(result, load)
+                elif other and isinstance(load, Torque):
+                    self._torque(result, load)
+                elif other and isinstance(load, JointForce):
+                    self._joint(result, load)
+        return result
+
+    def potential(self) -> Any:
+        """Potential energy of the springs, J."""
+        total: Any = 0
+        for load in self.model.loads:
+            if isinstance(load, SpringDamper):
+                with self.algebra.section(f"load {load.label}"):
+                    stretch = self._line(load)[1] - self.algebra.expression(load.length)
+                    total = total + self.algebra.expression(load.stiffness) * (stretch * stretch) / 2
+        return total
+
+    # -- each kind
+
+    def _force(self, result: Applied, load: Force) -> None:
+        pose = self.pose(load.body)
+        f = self.express(self.algebra.constants(load.force), load.frame, pose.link)
+        at = pose.point(self.algebra.constants(load.point))
+        result.add(pose, f, cross(at, f))
+        if load.reaction is not None:
+            other = self.pose(load.reaction)
+            common, (a, b) = self._common([(pose.link, at), (other.link, zeros(3))])
+            g = -self._turn(f, pose.link, other.link)
+            result.add(other, g, cross(self._turn(a - b, common, other.link), g))
+
+    def _torque(self, result: Applied, load: Torque) -> None:
+        pose = self.pose(load.body)
+        n = self.express(self.algebra.constants(load.torque), load.frame, pose.link)
+        result.add(pose, zeros(3), n)
+        if load.reaction is not None:
+            other = self.pose(load.reaction)
+            result.add(other, zeros(3), -self._turn(n, pose.link, other.link))
+
+    def _joint(self, result: Applied, load: JointForce) -> None:
+        joint = load.joint
+        for link in self.tree.links:
+            if link.joint is joint or link.joint.name == joint:
+                result.anything = True
+                for place, value in zip(link.speeds, load.values, strict=True):
+                    result.joint[place] = result.joint[place] + self.algebra.expression(value)
+
+    def _spring(self, result: Applied, load: SpringDamper, elastic: bool, damped: bool) -> None:
+        a = self.algebra
+        stiffness = a.expression(load.stiffness) if elastic else 0
+        damping = a.expression(load.damping) if damped else 0
+        d, length, common = self._line(load)
+        along: Any = 0
+        if not _zero(stiffness):
+            rest = a.expression(load.length)
+            along = stiffness if _zero(rest) else stiffness * (1 - rest / length)
+        if not _zero(damping):
+            along = along + damping * self._rate(length) / length
+        if _zero(along):
+            return
+        pull = d * along
+        for body, point, force in ((load.body_a, load.point_a, pull), (load.body_b, load.point_b, -pull)):
+            pose = self.pose(body)
+            f = self._turn(force, common, pose.link)
+            result.add(pose, f, cross(pose.point(a.constants(point)), f))
+
+    def _line(self, load: SpringDamper) -> tuple[np.ndarray, Any, int]:
+        """Vector from point a to point b in the axes of the nearest common link, its length, and that link."""
+        ends = [(pose.link, pose.point(self.algebra.constants(point))) for pose, point in
+                ((self.pose(load.body_a), load.point_a), (self.pose(load.body_b), load.point_b))]
+        common, (a, b) = self._common(ends)
+        d = b - a
+        return d, self.algebra.name(f"length_{load.label}", self.algebra.sqrt(dot(d, d))), common
+
+    def _rate(self, value: Any) -> Any:
+        a, model = self.algebra, self.model
+        seeds = dict(zip([a.leaves[q] for q in model.coordinates], self.tree.rates, strict=True))
+        return forward(a.recorder, [value], {**seeds, a.leaves[time]: 1})[0]
+
+    # -- frames
+
+    def pose(self, body: Any) -> Pose:
+        """Where a body's frame sits; the ground's frame for the ground."""
+        names = {b.name: k for k, b in enumerate(self.model.bodies)}
+        place = names.get(body.name if isinstance(body, Body) else body)
+        return self.tree.ground if place is None else self.tree.poses[place]
+
+    def express(self, components: np.ndarray, frame: Any, link: int) -> np.ndarray:
+        """Components given in a body's axes (None: the n-frame) in the axes of a link."""
+        if frame is None:
+            return self._turn(components, GROUND, link)
+        pose = self.pose(frame)
+        return self._turn(pose.R @ components, pose.link, link)
+
+    def _turn(self, components: np.ndarray, start: int, end: int) -> np.ndarray:
+        """Components in the axes of one link, in those of another: inwards to the common link, then outwards."""
+        up, down = self.tree.path(start), self.tree.path(end)
+        for k in up:
+            if k in down:
+                break
+            components = self.tree.links[k].R @ components
+        for k in reversed(down):
+            if k not in up:
+                components = self.tree.links[k].R.T @ components
+        return components
+
+    def _common(self, points: Sequence[tuple[int, np.ndarray]]) -> tuple[int, list[np.ndarray]]:
+        """The nearest common link of points given as (link, link components), and the points in its frame."""
+        paths = [self.tree.path(link) for link, _ in points]
+        common = next((k for k in paths[0] if all(k in path for path in paths)), GROUND)
+        moved = []
+        for path, (_, at) in zip(paths, points, strict=True):
+            for k in path:
+                if k == common:
+                    break
+                at = self.tree.links[k].r + self.tree.links[k].R @ at
+            moved.append(at)
+        return common, moved
+
+
+
+
+def _zero(value: Any) -> bool:
+    return isinstance(value, int) and value == 0

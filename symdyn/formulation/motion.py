@@ -1,0 +1,123 @@
+"""From M_tilde and k_tilde - F_tilde to accelerations, the right-hand side x_dot = f(t, x) and its exact Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.formulation.algebra import TapeAlgebra
+from symdyn.formulation.composite import Factors, factorize
+from symdyn.model.symbols import time
+from symdyn.tape import node as kinds
+from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.passes import substitute
+
+
+class Motion:
+    """What every formulation that ends in a mass matrix shares.
+
+    A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`.
+    """
+
+    def __init__(self, algebra: TapeAlgebra, coordinates: Sequence[sp.Symbol], speeds: Sequence[sp.Symbol],
+                 rates: Sequence[Any], states: Sequence[tuple[sp.Symbol, sp.Expr]], inputs: Sequence[sp.Symbol],
+                 parameters: Sequence[sp.Symbol]) -> None:
+        self.algebra = algebra
+        self.coordinates, self.speeds, self.inputs, self.parameters = coordinates, speeds, inputs, parameters
+        self.states = states
+        self.rates = list(rates)
+        self.speed_rates = _array([algebra.recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds])
+        self._memory: dict[str, Any] = {}
+
+    def quantities(self) -> dict[str, Callable[[], Any]]:
+        """name -> function that records it."""
+        recorded = {"M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
+                    "accelerations": self.accelerations, "rates": lambda: _array(self.rates), "rhs": self.rhs,
+                    "jacobian_x": lambda: self.jacobian(self.x()),
+                    "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
+                    "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
+        return {name: (lambda name=name: self.recall(name)) if name in ("M_tilde", "bias", "accelerations") else record
+                for name, record in recorded.items()}
+
+    def M_tilde(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def bias(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def inverse_dynamics(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def recall(self, name: str) -> Any:
+        """A quantity that others build on, recorded once."""
+        if name not in self._memory:
+            self._memory[name] = getattr(self, name)()
+        return self._memory[name]
+
+    def factors(self) -> Factors:
+        """The mass matrix, factorized."""
+        M = self.recall("M_tilde")
+        with self.algebra.section("factors of the mass matrix, L^T D L"):
+            return factorize(self.algebra, M, tuple(self.speeds))
+
+    def accelerations(self) -> np.ndarray:
+        """u_dot, (n_u,)."""
+        factors, bias = self.recall("factors"), self.recall("bias")
+        with self.algebra.section("accelerations: M_tilde u_dot = F_tilde - k_tilde"):
+            return self.algebra.name("ud", factors.solve(-bias))
+
+    def state_rates(self) -> list[Any]:
+        """z_dot of the extra states."""
+        with self.algebra.section("rates of the extra states"):
+            return [self.algebra.expression(rate) for _, rate in self.states]
+
+    def rhs(self) -> np.ndarray:
+        """x_dot for x = [q; u; z]."""
+        return _array([*self.rates, *self.recall("accelerations"), *self.state_rates()])
+
+    def x(self) -> list[Any]:
+        """The leaves of the state."""
+        return self._leaves([*self.coordinates, *self.speeds, *[z for z, _ in self.states]])
+
+    def by_time(self) -> dict[Any, Any]:
+        """Seeds of the derivative by time at constant speeds: q -> q_dot, t -> 1."""
+        leaves = self.algebra.leaves
+        return {**{leaves[q]: rate for q, rate in zip(self.coordinates, self.rates, strict=True)}, leaves[time]: 1}
+
+    def jacobian(self, by: Sequence[Any]) -> np.ndarray:
+        """d x_dot / d by, exact.
+
+        Accelerations are differentiated implicitly: with r = M_tilde u_dot + k_tilde - F_tilde = 0,
+        d u_dot = - M_tilde^-1 (dr at constant u_dot), so that the factorization is not differentiated.
+        """
+        recorder = self.algebra.recorder
+        ud, factors = self.recall("accelerations"), self.recall("factors")
+        with self.algebra.section("Jacobian"):
+            residual = self.inverse_dynamics()
+            partial = jacobian(recorder, residual.tolist(), by)
+            at = {leaf: value for leaf, value in zip(self.speed_rates, ud, strict=True)}
+            partial = _array(substitute(tuple(partial.ravel()), at, recorder)).reshape(partial.shape)
+            columns = [factors.solve(-partial[:, j]) for j in range(len(by))]
+            middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
+            top = _rows(recorder, self.rates, by)
+            bottom = _rows(recorder, self.state_rates(), by)
+            return np.vstack([top, middle, bottom])
+
+    def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
+        return [self.algebra.leaves[s] for s in symbols]
+
+
+def _rows(recorder: Any, entries: Sequence[Any], by: Sequence[Any]) -> np.ndarray:
+    rows = np.zeros((len(entries), len(by)), dtype=object)
+    for j, leaf in enumerate(by):
+        rows[:, j] = forward(recorder, entries, {leaf: 1})
+    return rows
+
+
+def _array(values: Sequence[Any]) -> np.ndarray:
+    result = np.empty(len(values), dtype=object)
+    result[:] = list(values)
+    return result

@@ -1,0 +1,1 @@
+"""The description of a mechanism: symbols, bodies, joints, loads; no equations yet."""

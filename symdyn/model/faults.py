@@ -1,0 +1,63 @@
+"""Collects the faults of a description, so that one message tells all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from symdyn.errors import ModelError
+from symdyn.model.symbols import as_expression
+
+
+class Faults(list[str]):
+    """A list of faults with the checks that fill it; a faulty value is replaced by zero so that checking goes on."""
+
+    def expression(self, value: Any, what: str) -> sp.Expr:
+        """A scalar expression."""
+        try:
+            return as_expression(value, what)
+        except ModelError as error:
+            self.extend(error.faults)
+        except (sp.SympifyError, TypeError, ValueError):
+            self.append(f"{what} is {value!r}; pass a number or an expression of SymPy symbols")
+        return sp.S.Zero
+
+    def vector(self, value: Any, what: str, planar: bool = False) -> sp.ImmutableMatrix:
+        """A vector of 3 components; in a planar system 2 components, which get a zero third."""
+        entries = self._entries(value, what)
+        sizes = (2, 3) if planar else (3,)
+        if len(entries) not in sizes:
+            self.append(f"{what} has {len(entries)} components; pass {' or '.join(map(str, sizes))}")
+            entries = [0, 0, 0]
+        row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
+        return sp.ImmutableMatrix(3, 1, row + [sp.S.Zero] * (3 - len(row)))
+
+    def matrix(self, value: Any, what: str) -> sp.ImmutableMatrix:
+        """A 3 x 3 matrix; a list of 3 stands for its diagonal."""
+        entries = self._entries(value, what)
+        if len(entries) == 3 and all(not _is_row(e) for e in entries):
+            entries = [[entries[0], 0, 0], [0, entries[1], 0], [0, 0, entries[2]]]
+        elif len(entries) == 9 and hasattr(value, "shape") and tuple(value.shape) == (3, 3):
+            entries = [entries[0:3], entries[3:6], entries[6:9]]
+        if len(entries) != 3 or any(not _is_row(row) or len(row) != 3 for row in entries):
+            self.append(f"{what} is not a 3 x 3 matrix; pass three rows of three, or the three diagonal entries")
+            return sp.ImmutableMatrix(sp.zeros(3, 3))
+        return sp.ImmutableMatrix(3, 3, lambda i, j: self.expression(entries[i][j], f"{what}[{i + 1}, {j + 1}]"))
+
+    def _entries(self, value: Any, what: str) -> list:
+        if isinstance(value, sp.MatrixBase):
+            return list(value)
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if not isinstance(value, Sequence) or isinstance(value, str):
+            self.append(f"{what} is {value!r}; pass a list of numbers or expressions")
+            return [0, 0, 0]
+        if value and all(_is_row(row) for row in value) and all(len(row) == 1 for row in value):
+            return [row[0] for row in value]
+        return list(value)
+
+
+def _is_row(value: Any) -> bool:
+    return isinstance(value, (list, tuple))

@@ -1,0 +1,171 @@
+"""What every joint has: two bodies, a frame on each, coordinates; and what it must tell: its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.model.faults import Faults
+from symdyn.model.symbols import Coordinate, as_coordinate
+
+IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """Motion of the joint's child frame relative to its parent frame, for any scalar.
+
+    R   (3, 3)  child components to parent components
+    d   (3,)    origin of the child frame, parent axes, m
+    S   (6, k)  motion subspace, angular part first, child axes: [omega; velocity of the origin] = S s_dot
+    c   (6,)    what is left of the acceleration when s_ddot = 0: [d omega/dt; d^2 d/dt^2], child axes, omega
+                differentiated as seen from the child frame, d as seen from the parent frame
+    """
+
+    R: np.ndarray
+    d: np.ndarray
+    S: np.ndarray
+    c: np.ndarray
+
+
+class Joint:
+    """A joint between a frame on the parent body and a frame on the child body.
+
+    parent, child       bodies of the system (or their names); the ground is `system.ground`
+    parent_point        (3,) where the joint sits on the parent, parent axes, m; default: the origin
+    child_point         (3,) the same on the child
+    parent_rotation     (3, 3) joint components to parent components; default: identity
+    child_rotation      (3, 3) joint components to child components
+    coordinates         one per degree of freedom; a coordinate may be an expression of others and of t
+    speeds              names for the generalized speeds; default: the derivatives of the coordinates
+    """
+
+    kind = ""
+    coordinate_units: tuple[str, ...] = ()
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any], speeds: Sequence[Any] | None,
+                 parent_point: Any, child_point: Any, parent_rotation: Any, child_rotation: Any) -> None:
+        self.name = name
+        self.parent = parent
+        self.child = child
+        self.faults = faults = Faults()
+        where = f"joint {name!r}"
+        self.parent_point = faults.vector(parent_point, f"{where}: parent_point", planar=True)
+        self.child_point = faults.vector(child_point, f"{where}: child_point", planar=True)
+        self.parent_rotation = self._rotation(parent_rotation, "parent_rotation")
+        self.child_rotation = self._rotation(child_rotation, "child_rotation")
+        self.coordinates = self._coordinates(coordinates)
+        self.speeds = self._speeds(speeds)
+
+    # -- what a joint type tells
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        """R, d, S and c at coordinates s with speeds sd, on the scalars of the algebra (tape or floats)."""
+        raise NotImplementedError
+
+    @property
+    def n_speeds(self) -> int:
+        """Number of degrees of freedom."""
+        return len(self.coordinate_units)
+
+    def rates(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> list[Any]:
+        """Derivatives of the coordinates from the speeds, q_dot = N(q) u."""
+        return list(sd)
+
+    # -- shared checks
+
+    def _coordinates(self, given: Sequence[Any]) -> tuple[sp.Expr, ...]:
+        wanted = len(self.coordinate_units)
+        if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+            self.faults.append(f"joint {self.name!r}: coordinates is {given!r}; pass a list of {wanted}")
+            given = []
+        given = list(given)
+        if len(given) != wanted:
+            self.faults.append(f"joint {self.name!r} ({self.kind}) takes {wanted} coordinates "
+                               f"({', '.join(self.coordinate_units)}), found {len(given)}")
+            given = [sp.S.Zero] * wanted
+        taken = [as_coordinate(e) for e in given]
+        return tuple(e if isinstance(e, Coordinate)
+                     else self.faults.expression(e, f"joint {self.name!r}: coordinate {k + 1}")
+                     for k, e in enumerate(taken))
+
+    def _speeds(self, given: Sequence[Any] | None) -> tuple[sp.Symbol, ...] | None:
+        if given is None:
+            return None
+        given = [as_coordinate(e) for e in given]
+        if len(given) != self.n_speeds or not all(isinstance(e, sp.Symbol) for e in given):
+            self.faults.append(f"joint {self.name!r} ({self.kind}) takes {self.n_speeds} symbols as speeds, found {given}")
+            return None
+        return tuple(given)
+
+    def _rotation(self, value: Any, what: str) -> sp.ImmutableMatrix:
+        matrix = self.faults.matrix(IDENTITY if value is None else value, f"joint {self.name!r}: {what}")
+        residual = rotation_residual(matrix)
+        if residual > 1e-9:
+            self.faults.append(f"joint {self.name!r}: {what} is not a rotation: R R^T differs from the identity "
+                               f"by {residual:.2g} or its determinant is not +1; pass a rotation matrix")
+        return matrix
+
+    def _axis(self, value: Any, what: str = "axis") -> sp.ImmutableMatrix:
+        axis = self.faults.vector(value, f"joint {self.name!r}: {what}", planar=True)
+        length = numeric(sp.sqrt(axis.dot(axis)))
+        if abs(length - 1) > 1e-9:
+            found = f"has length {length:.6g}"
+            cure = "pass a direction that is not zero" if length < 1e-12 else "divide it by its length"
+            self.faults.append(f"joint {self.name!r}: {what} {list(axis)} {found}, not 1; {cure}")
+            return sp.ImmutableMatrix([0, 0, 1])
+        return _exactly_unit(axis)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r})"
+
+
+def _exactly_unit(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
+    """An axis given in floats is a unit vector to their precision only; make it one to any precision.
+
+    (0.6, 0, 0.8) becomes (3/5, 0, 4/5); what is no short fraction is divided by its length at 60 digits.
+    """
+    if not axis.has(sp.Float):
+        return axis
+    short = [sp.Rational(e).limit_denominator(1000) if e.is_number else e for e in axis]
+    if sum(e * e for e in short) == 1:
+        return sp.ImmutableMatrix(short)
+    if not all(e.is_number for e in axis):
+        return axis
+    exact = [sp.Rational(e) for e in axis]
+    length = sp.sqrt(sum(e * e for e in exact))
+    return sp.ImmutableMatrix([sp.Rational(sp.N(e / length, 60)) for e in exact])
+
+
+def numeric(expression: sp.Expr) -> float:
+    """The value of an expression with its symbols, if any, at fixed arbitrary numbers."""
+    symbols = sorted(expression.free_symbols, key=str)
+    value = expression.xreplace({s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)})
+    return float(sp.re(sp.N(value)))
+
+
+def rotation_residual(matrix: sp.ImmutableMatrix) -> float:
+    """How far a matrix is from a proper rotation: largest entry of R R^T - 1, or of det R - 1."""
+    if matrix == sp.eye(3):
+        return 0.0
+    symbols = sorted(matrix.free_symbols, key=str)
+    values = {s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)}
+    R = np.array([[float(sp.N(e.xreplace(values))) for e in matrix.row(i)] for i in range(3)])
+    return float(max(np.abs(R @ R.T - np.eye(3)).max(), abs(np.linalg.det(R) - 1)))
+
+
+def turn(algebra: Any, axis: Sequence[Any], angle: Any) -> np.ndarray:
+    """Rotation about a unit axis e by an angle: e e^T + cos (1 - e e^T) + sin [e x] (Rodrigues)."""
+    s, c = algebra.sin(angle), algebra.cos(angle)
+    x, y, z = axis
+    R = np.empty((3, 3), dtype=object)
+    skew = ((0, -z, y), (z, 0, -x), (-y, x, 0))
+    for i in range(3):
+        for j in range(3):
+            outer = axis[i] * axis[j]
+            R[i, j] = outer + c * ((1 if i == j else 0) - outer) + s * skew[i][j]
+    return R

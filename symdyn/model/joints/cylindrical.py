@@ -1,0 +1,30 @@
+"""The cylindrical joint: translation along and rotation about one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from symdyn.model.joints.base import Joint, JointMotion, turn
+from symdyn.spatial.vectors import zeros
+
+
+class Cylindrical(Joint):
+    """coordinates = [angle (rad), distance (m)] about and along `axis`; see Joint for the frames."""
+
+    kind = "cylindrical"
+    coordinate_units = ("rad", "m")
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any], axis: Any = (0, 0, 1),
+                 speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
+                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
+                         child_rotation)
+        self.axis = self._axis(axis)
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        axis = algebra.constants(self.axis)
+        S = zeros(6, 2)
+        S[:3, 0] = axis
+        S[3:, 1] = axis
+        return JointMotion(turn(algebra, axis, s[0]), axis * s[1], S, zeros(6))

@@ -1,0 +1,24 @@
+"""The fixed joint: no motion; the two bodies are one for the derivation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.model.joints.base import IDENTITY, Joint, JointMotion
+from symdyn.spatial.vectors import zeros
+
+
+class Fixed(Joint):
+    """Holds the child on the parent; see Joint for the frames."""
+
+    kind = "fixed"
+
+    def __init__(self, name: str, parent: Any, child: Any, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
+                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, (), None, parent_point, child_point, parent_rotation, child_rotation)
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        return JointMotion(np.array(IDENTITY, dtype=object), zeros(3), zeros(6, 0), zeros(6))

@@ -1,0 +1,35 @@
+"""The planar joint: two translations in a plane and the rotation about its normal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.model.joints.base import Joint, JointMotion, turn
+from symdyn.spatial.vectors import zeros
+
+
+class Planar(Joint):
+    """coordinates = [x (m), y (m), theta (rad)] in the x-y plane of the joint frame on the parent.
+
+    See Joint for the frames.
+    """
+
+    kind = "planar"
+    coordinate_units = ("m", "m", "rad")
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any],
+                 speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
+                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
+                         child_rotation)
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        R = turn(algebra, (0, 0, 1), s[2])
+        S = zeros(6, 3)
+        S[3:, 0] = R.T[:, 0]
+        S[3:, 1] = R.T[:, 1]
+        S[2, 2] = 1
+        return JointMotion(R, np.array([s[0], s[1], 0], dtype=object), S, zeros(6))

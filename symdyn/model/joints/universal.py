@@ -1,0 +1,41 @@
+"""The universal (Cardan) joint: two rotations, the second about an axis that the first has turned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.model.joints.base import Joint, JointMotion, turn
+from symdyn.spatial.vectors import cross, zeros
+
+
+class Universal(Joint):
+    """coordinates = [first angle, second angle] (rad), R = R_1 R_2; `axes` are two unit vectors in the joint frame.
+
+    See Joint for the frames.
+    """
+
+    kind = "universal"
+    coordinate_units = ("rad", "rad")
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any],
+                 axes: Sequence[Any] = ((1, 0, 0), (0, 1, 0)), speeds: Sequence[Any] | None = None,
+                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
+                 child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
+                         child_rotation)
+        if len(axes) != 2:
+            self.faults.append(f"joint {name!r} (universal) takes 2 axes, found {len(axes)}")
+            axes = ((1, 0, 0), (0, 1, 0))
+        self.axes = (self._axis(axes[0], "first axis"), self._axis(axes[1], "second axis"))
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        first, second = (algebra.constants(axis) for axis in self.axes)
+        R2 = turn(algebra, second, s[1])
+        S, c = zeros(6, 2), zeros(6)
+        S[:3, 0] = R2.T @ first
+        S[:3, 1] = second
+        c[:3] = cross(S[:3, 0] * sd[0], second * sd[1])
+        return JointMotion(turn(algebra, first, s[0]) @ R2, zeros(3), S, c)

@@ -1,0 +1,60 @@
+"""Loads: what acts on bodies and joints besides gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force (N) on a point of a body; point (3, 1) in body axes, components in `frame` (None: the n-frame).
+
+    reaction   a body on whose coinciding point the opposite force acts, or None
+    """
+
+    body: Any
+    force: sp.ImmutableMatrix
+    point: sp.ImmutableMatrix
+    frame: Any
+    reaction: Any
+    label: str
+
+
+@dataclass(frozen=True)
+class Torque:
+    """A torque (N m) on a body; components in `frame` (None: the n-frame); the opposite on `reaction`, if any."""
+
+    body: Any
+    torque: sp.ImmutableMatrix
+    frame: Any
+    reaction: Any
+    label: str
+
+
+@dataclass(frozen=True)
+class JointForce:
+    """Forces (N) or torques (N m) along the speeds of a joint."""
+
+    joint: Any
+    values: tuple[sp.Expr, ...]
+    label: str
+
+
+@dataclass(frozen=True)
+class SpringDamper:
+    """A spring (N/m) and damper (N s/m) in line between a point of one body and a point of another.
+
+    length   unstretched length, m; points (3, 1) in the axes of their bodies
+    """
+
+    body_a: Any
+    body_b: Any
+    point_a: sp.ImmutableMatrix
+    point_b: sp.ImmutableMatrix
+    stiffness: sp.Expr
+    damping: sp.Expr
+    length: sp.Expr
+    label: str

@@ -1,0 +1,195 @@
+"""System: the description of a mechanism by bodies, joints and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.errors import ModelError
+from symdyn.model.bodies import Body, Point
+from symdyn.model.check import check
+from symdyn.model.faults import Faults
+from symdyn.model.joints import Free, Joint
+from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.orientation import EulerAngles
+from symdyn.model.record import Model, NamedOutput, State
+from symdyn.model.symbols import as_coordinate
+
+if TYPE_CHECKING:
+    from symdyn.formulation.embedding import EmbeddedEquations
+
+ZERO = (0, 0, 0)
+
+
+class System:
+    """A mechanism: bodies joined in a tree that starts at the ground, with loads, inputs and outputs.
+
+    name         used for generated files
+    gravity      acceleration of gravity in the n-frame, m/s^2: 3 components, or 2 for a planar system
+    planar       True: motion in the x-y plane, described by x, y, theta; default: gravity has 2 components
+    parameters   if given, the only symbols that count as parameters, in this order; default: declared by use
+
+    `ground` is the inertial n-frame (or, after `move_ground`, the moving base). `defaults` holds a number for each
+    parameter, `initial` for coordinates, speeds, states and inputs, `duration` the usual time of simulation, `units`
+    the unit of a symbol where it cannot be told from its use. Faults are collected while describing; `check()` and
+    every formulation raise them all in one ModelError.
+    """
+
+    def __init__(self, name: str, gravity: Any = None, planar: bool | None = None,
+                 parameters: Sequence[sp.Symbol] | None = None) -> None:
+        self.name = name
+        self._faults = Faults()
+        if planar is None:
+            planar = gravity is not None and len(list(gravity)) == 2
+        self.planar = planar
+        self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar)
+        self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)))
+        self.declared = None if parameters is None else tuple(parameters)
+        self.bodies: list[Body] = []
+        self.joints: list[Joint] = []
+        self.loads: list[Any] = []
+        self.outputs: list[NamedOutput] = []
+        self.states: list[State] = []
+        self.constraints: list[sp.Expr] = []
+        self.loops: list[Joint] = []
+        self.ground_motion: Joint | None = None
+        self.defaults: dict[Any, float] = {}
+        self.initial: dict[Any, float] = {}
+        self.duration = 10.0
+        self.units: dict[Any, str] = {}
+
+    # -- bodies and joints
+
+    def add_body(self, name: str, mass: Any = 0, inertia: Any = None, com: Any = ZERO) -> Body:
+        """Add a rigid body, or a point mass where no inertia is given.
+
+        mass      kg
+        inertia   about the centre of mass in body axes, kg m^2: (3, 3), or its diagonal; planar: one number about z
+        com       centre of mass from the body's origin, body axes, m
+        """
+        where = f"body {name!r}"
+        faults = self._faults
+        if inertia is None:
+            matrix = sp.ImmutableMatrix(sp.zeros(3, 3))
+        elif self.planar and not hasattr(inertia, "__len__"):
+            matrix = sp.ImmutableMatrix(sp.diag(0, 0, faults.expression(inertia, f"{where}: inertia")))
+        else:
+            matrix = faults.matrix(inertia, f"{where}: inertia")
+        body = Body(name, faults.expression(mass, f"{where}: mass"), matrix,
+                    faults.vector(com, f"{where}: com", self.planar))
+        self.bodies.append(body)
+        return body
+
+    def add_joint(self, joint: Joint) -> Joint:
+        """Add a joint; parent and child may be given as bodies or by name."""
+        if not isinstance(joint, Joint):
+            self._faults.append(f"add_joint was given {joint!r}; pass a joint such as sd.Revolute(...)")
+        else:
+            self.joints.append(joint)
+        return joint
+
+    def close_loop(self, joint: Joint) -> Joint:
+        """A joint between two bodies that are already in the tree: it becomes constraints."""
+        self.loops.append(joint)
+        return joint
+
+    def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
+        """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t."""
+        p = self._faults.vector(position, "move_ground: position", self.planar)
+        moving = Free("ground_motion", "inertial", "ground", [*p, *angles], EulerAngles(sequence))
+        self._faults.extend(moving.faults)
+        if any(not isinstance(c, sp.Expr) or isinstance(c, sp.Symbol) and c.name != "t" for c in moving.coordinates):
+            free = [str(c) for c in moving.coordinates if isinstance(c, sp.Symbol)]
+            self._faults.append(f"move_ground was given {', '.join(free)}; pass given functions of t")
+        self.ground_motion = moving
+
+    # -- loads
+
+    def add_force(self, body: Any, force: Any, point: Any = None, frame: Any = None, reaction: Any = None,
+                  name: str = "") -> None:
+        """A force (N) on a body.
+
+        point     where it acts, body axes, m; default: the centre of mass
+        frame     the body in whose axes the components are given; default: the n-frame
+        reaction  the body that feels the opposite force at the same place, if any
+        """
+        label = name or f"force_{len(self.loads) + 1}"
+        owner = self._body(body)
+        at = owner.com if point is None and owner is not None else (ZERO if point is None else point)
+        self.loads.append(Force(body, self._faults.vector(force, label, self.planar),
+                                self._faults.vector(at, f"{label}: point", True), frame, reaction, label))
+
+    def add_torque(self, body: Any, torque: Any, frame: Any = None, reaction: Any = None, name: str = "") -> None:
+        """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force."""
+        label = name or f"torque_{len(self.loads) + 1}"
+        if self.planar and not hasattr(torque, "__len__"):
+            torque = [0, 0, torque]
+        self.loads.append(Torque(body, self._faults.vector(torque, label), frame, reaction, label))
+
+    def add_joint_force(self, joint: Any, value: Any, name: str = "") -> None:
+        """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
+        label = name or f"joint_force_{len(self.loads) + 1}"
+        values = list(value) if isinstance(value, (list, tuple, sp.MatrixBase)) else [value]
+        self.loads.append(JointForce(joint, tuple(self._faults.expression(v, label) for v in values), label))
+
+    def add_spring_damper(self, body_a: Any, body_b: Any, point_a: Any = ZERO, point_b: Any = ZERO, stiffness: Any = 0,
+                          damping: Any = 0, length: Any = 0, name: str = "") -> None:
+        """A spring (N/m, unstretched length m) and damper (N s/m) between a point of body_a and one of body_b."""
+        label = name or f"spring_{len(self.loads) + 1}"
+        f = self._faults
+        self.loads.append(SpringDamper(
+            body_a, body_b, f.vector(point_a, f"{label}: point_a", True), f.vector(point_b, f"{label}: point_b", True),
+            f.expression(stiffness, f"{label}: stiffness"), f.expression(damping, f"{label}: damping"),
+            f.expression(length, f"{label}: length"), label))
+
+    # -- outputs, states, constraints
+
+    def add_output(self, name: str, value: Any) -> None:
+        """A named output: an expression in coordinates, speeds, states, inputs, t and parameters, a list of them, or
+        sd.position(body, point), sd.velocity(body, point)."""
+        if isinstance(value, Point):
+            at = self._faults.vector(value.at, f"output {name!r}: point", True)
+            taken: Any = Point(value.body, tuple(at), value.quantity)
+        elif isinstance(value, (list, tuple, sp.MatrixBase)):
+            taken = tuple(self._faults.expression(v, f"output {name!r}") for v in value)
+        else:
+            taken = self._faults.expression(value, f"output {name!r}")
+        self.outputs.append(NamedOutput(name, taken))
+
+    def add_state(self, symbol: Any, rate: Any) -> None:
+        """An extra state z with z_dot = rate, an expression as for add_output."""
+        self.states.append(State(as_coordinate(symbol), self._faults.expression(rate, f"rate of state {symbol}")))
+
+    def add_constraint(self, expression: Any) -> None:
+        """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
+        self.constraints.append(self._faults.expression(expression, f"constraint {len(self.constraints) + 1}"))
+
+    # -- what comes of it
+
+    def check(self) -> Model:
+        """The checked, frozen model. Raises ModelError with every fault found."""
+        return check(self)
+
+    def embedding(self) -> EmbeddedEquations:
+        """The embedded equations M_tilde u_dot + k_tilde = F_tilde. Raises ModelError with every fault found."""
+        from symdyn.formulation.embedding import embed
+
+        return embed(self.check())
+
+    def _body(self, body: Any) -> Body | None:
+        if isinstance(body, Body):
+            return body
+        return next((b for b in [self.ground, *self.bodies] if b.name == body), None)
+
+    def __repr__(self) -> str:
+        return f"System({self.name!r}, {len(self.bodies)} bodies, {len(self.joints)} joints)"
+
+    def set_defaults(self, defaults: Mapping[Any, float]) -> System:
+        """Add numbers for parameters; returns the system."""
+        self.defaults.update(defaults)
+        return self
+
+
+__all__ = ["ModelError", "System"]

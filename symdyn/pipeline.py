@@ -1,0 +1,158 @@
+"""The pipeline, once.
+
+    stage         takes in                          gives out
+    describe      bodies, joints, loads             System          (symdyn.model)
+    check         System                            Model           frozen, every fault reported at once
+    formulate     Model                             Equations       (symdyn.formulation) quantities on a tape
+    emit          Equations, function names         Source          (symdyn.backend) text of files
+    load          Source                            Module          (symdyn.runtime) evaluate, simulate
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symdyn.backend.source import Content, Source, render
+from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
+from symdyn.runtime.compiler import find_compiler, no_compiler_reason
+from symdyn.runtime.module import Module
+from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+from symdyn.tape.tape import Output, Tape
+
+# Functions of a module: name -> (quantity, what the header of generated code says about it).
+FUNCTIONS = {
+    "rhs": ("rhs", "x_dot = f(t, x) with x = [q; u; z]: M_tilde u_dot = F_tilde - k_tilde"),
+    "mass_matrix": ("M_tilde", "mass matrix M_tilde = J^T M J"),
+    "k_tilde": ("k_tilde", "k_tilde = J^T (M J_dot u + Q J u): Coriolis, centrifugal and gyroscopic terms"),
+    "F_tilde": ("F_tilde", "F_tilde = J^T F: generalized forces of loads and gravity"),
+    "J": ("J", "velocity transformation: [v_G; omega] of every body = J u, n-frame"),
+    "energy": ("energy", "kinetic and potential energy, J"),
+    "inverse_dynamics": ("inverse_dynamics", "tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud"),
+    "outputs": ("outputs", "the named outputs, one after the other"),
+    "power": ("power", "power of all loads but gravity and springs, and of prescribed motions, W"),
+    "Jd_qd": ("Jd_qd", "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame"),
+    "frames": ("frames", "origin and rotation (row by row) of every body's frame, n-frame"),
+    "positions": ("positions", "centres of mass, n-frame, m"),
+    "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
+    "jacobian_inputs": ("jacobian_inputs", "exact derivative of x_dot by the inputs"),
+    "jacobian_params": ("jacobian_params", "exact derivative of x_dot by the parameters"),
+}
+# What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
+STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
+
+
+def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
+         templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True) -> Source:
+    """The source of the named functions (default: STANDARD, those the formulation has) in a backend.
+
+    Raises SymdynError for an unknown function, backend or broken template.
+    """
+    names = tuple(functions) if functions is not None else tuple(n for n in STANDARD if has_function(equations, n))
+    unknown = [n for n in names if not has_function(equations, n)]
+    if unknown:
+        there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
+        raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
+    return render(_content(equations, names), backend, templates, standalone, integrator)
+
+
+def has_function(equations: Equations, name: str) -> bool:
+    """Whether the equations can give a function."""
+    if name == "outputs":
+        return any(q.startswith("output_") for q in equations.quantities)
+    return name in FUNCTIONS and FUNCTIONS[name][0] in equations.quantities
+
+
+def compile_equations(equations: Equations, backend: str | None = None,
+                      templates: str | os.PathLike | None = None) -> Module:
+    """A numeric module from equations.
+
+    backend     "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
+    templates   folder whose templates take precedence
+
+    Only what is called is generated: rhs with the integrator first, every other function when it is first used.
+    Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
+    """
+    fallback = ""
+    compiler = None
+    if backend in (None, "c"):
+        compiler = find_compiler()
+        if compiler is None and backend is None:
+            backend, fallback = "numpy", no_compiler_reason()
+        elif compiler is None:
+            from symdyn.runtime.compiler import require_compiler
+
+            compiler = require_compiler()
+        backend = backend or "c"
+    if backend not in ("c", "numpy"):
+        raise SymdynError(f"backend {backend!r} asked for; modules can be loaded from 'c' and 'numpy'; "
+                          "emit() writes source for others")
+
+    def provide(name: str) -> Unit:
+        source = emit(equations, backend, (name,), templates, standalone=False)
+        text = next(iter(source.files.values()))
+        if backend == "c":
+            assert compiler is not None
+            return CUnit(text, source.metadata, compiler)
+        return PythonUnit.from_source(text, source.metadata["name"])
+
+    def write(folder: Path) -> list[Path]:
+        return write_source(emit(equations, backend, templates=templates), folder)
+
+    def report() -> Any:
+        from symdyn.report.text import report as make
+
+        return make(equations, backend, fallback)
+
+    metadata = emit(equations, "numpy", ("rhs",), standalone=False).metadata
+    metadata = {**metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
+                "functions": [n for n in FUNCTIONS if has_function(equations, n)]}
+    return Module(metadata, provide, backend, fallback, write, report)
+
+
+def write_source(source: Source, folder: Path) -> list[Path]:
+    """Write the files of a source into a folder (made if absent); returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, text in source.files.items():
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        paths.append(path)
+    return paths
+
+
+def output_shapes(equations: Equations) -> list[list[Any]]:
+    """Names and shapes of the user's outputs."""
+    return [[q.removeprefix("output_"), list(equations.quantity(q).shape)]
+            for q in equations.quantities if q.startswith("output_")]
+
+
+def _content(equations: Equations, names: Sequence[str]) -> Content:
+    symbols = equations.symbols
+    tapes = {name: _tape(equations, name) for name in names}
+    groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
+              "z": [s.name for s in symbols.states], "ud": [f"{s.name}_dot" for s in symbols.speeds],
+              "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters]}
+    outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
+    return Content(equations.name, equations.formulation, tapes, {n: FUNCTIONS[n][1] for n in names}, groups,
+                   {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
+                   _by_name(symbols.initial), outputs, equations.notes)
+
+
+def _tape(equations: Equations, name: str) -> Tape:
+    if name != "outputs":
+        return equations.tape(FUNCTIONS[name][0])
+    values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
+    whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
+    return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
+
+
+def _by_name(values: Any) -> dict[str, float]:
+    return {str(getattr(key, "name", key)): float(value) for key, value in values.items()}
+
+

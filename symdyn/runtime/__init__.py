@@ -1,0 +1,1 @@
+"""Build, load and integrate the generated code; no symbolic mathematics here."""

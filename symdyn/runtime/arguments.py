@@ -1,0 +1,67 @@
+"""Takes values over at the edge: by name, by symbol or in order; complains about all that does not fit at once."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+
+
+def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, float | None], owner: str) -> np.ndarray:
+    """Values in the order of names.
+
+    values    None for the defaults, a mapping from names or symbols, or a sequence in order
+    defaults  name -> number or None; a name that is left out takes it
+    Raises ArgumentError naming what is missing, unknown, not a number or not finite, and for a wrong length.
+    """
+    if values is None:
+        values = {}
+    if isinstance(values, Mapping):
+        return _from_mapping(values, names, what, defaults, owner)
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{owner}: {what} must be numbers, found {values!r}") from None
+    if array.ndim == 0 and len(names) == 1:
+        array = array.reshape(1)
+    if array.shape != (len(names),):
+        raise ArgumentError(f"{owner}: {what} has the shape {array.shape}, needed are {len(names)} numbers"
+                            f"{': ' + ', '.join(names) if names else ''}")
+    _finite(array, names, what, owner)
+    return array
+
+
+def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Mapping[str, float | None],
+                  owner: str) -> np.ndarray:
+    given: dict[str, Any] = {}
+    faults = []
+    for key, value in values.items():
+        name = str(getattr(key, "name", key))
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 3)
+            hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(names) or 'none'}"
+            faults.append(f"there is no {name!r}{hint}")
+            continue
+        try:
+            given[name] = float(value)
+        except (TypeError, ValueError):
+            faults.append(f"the value of {name} is {value!r}, not a number")
+    missing = [n for n in names if n not in given and defaults.get(n) is None]
+    missing = [n for n in missing if not any(n in f for f in faults)]
+    if missing:
+        faults.append(f"no value for {', '.join(missing)}, which {'have' if len(missing) > 1 else 'has'} no default")
+    if faults:
+        raise ArgumentError(f"{owner}: {what}: " + "; ".join(faults))
+    array = np.array([given.get(n, defaults.get(n)) for n in names], dtype=float)
+    _finite(array, names, what, owner)
+    return array
+
+
+def _finite(array: np.ndarray, names: Sequence[str], what: str, owner: str) -> None:
+    bad = [f"{n} = {v}" for n, v in zip(names, array, strict=True) if not np.isfinite(v)]
+    if bad:
+        raise ArgumentError(f"{owner}: {what} must be finite, found {', '.join(bad)}")

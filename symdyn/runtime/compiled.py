@@ -1,0 +1,163 @@
+"""Drives the compiled integrator: in pieces, so that it can be interrupted and shown in a progress bar."""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.runtime.outcome import Outcome, Request
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+    from symdyn.runtime.unit import CUnit
+
+# Attempted steps in one call; a fraction of a second even for large systems.
+PIECE = 20_000
+STEPS_AT_ONCE = 4096
+_DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
+_INPUT_STOPPED = 100_000
+_InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
+                                  ctypes.POINTER(ctypes.c_double))
+
+
+class Problem(ctypes.Structure):
+    """Parameters, constants and inputs of a run; see `problem` in the generated source."""
+
+    _fields_ = [("p", ctypes.c_void_p), ("c", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("n_table", ctypes.c_long),
+                ("table_t", ctypes.c_void_p), ("table", ctypes.c_void_p), ("function", _InputFunction)]
+
+
+class _Run:
+    """One run of the integrator with the memory it works in."""
+
+    def __init__(self, unit: CUnit, request: Request) -> None:
+        self.unit = unit
+        self.n_x = unit.metadata["sizes"]["x"]
+        self.trouble: list[BaseException] = []
+        size = unit.function("simulation_size")
+        size.restype = ctypes.c_long
+        self.memory = ctypes.create_string_buffer(size() + 64)
+        self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
+        self.p, self.c = np.zeros(max(1, len(request.p))), np.zeros(max(1, unit.metadata["n_c"]))
+        self.p[:len(request.p)] = request.p
+        unit.prologue(self.p, self.c)
+        self.problem = Problem(self.p.ctypes.data, self.c.ctypes.data)
+        self.kept: list[Any] = [request.x0, request.atol]
+        self._inputs(request)
+        span = np.array([*request.span, request.rtol, request.first_step, request.max_step])
+        self.status = unit.function("simulation_start")(
+            self.address, ctypes.byref(self.problem), ctypes.c_void_p(span.ctypes.data),
+            ctypes.c_void_p(request.x0.ctypes.data), ctypes.c_void_p(request.atol.ctypes.data))
+        self.written = ctypes.c_long(0)
+
+    def _inputs(self, request: Request) -> None:
+        free = request.inputs
+        constant = np.ascontiguousarray(free.constant)
+        self.kept.append(constant)
+        self.problem.inputs = constant.ctypes.data
+        if free.table is not None and free.times is not None:
+            self.problem.n_table = len(free.times)
+            self.problem.table_t, self.problem.table = free.times.ctypes.data, free.table.ctypes.data
+        if free.function is not None:
+            n_x, n_in = self.n_x, len(constant)
+
+            def call(t: float, x: Any, out: Any) -> int:
+                try:
+                    np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, np.ctypeslib.as_array(x, (n_x,)).copy())
+                    return 0
+                except BaseException as error:  # noqa: BLE001 - must not cross the C frames; raised again after them
+                    self.trouble.append(error)
+                    return 1
+
+            self.problem.function = _InputFunction(call)
+
+    def at(self, times: np.ndarray, x: np.ndarray, limit: int) -> int:
+        """Go on, writing states at the requested times."""
+        return int(self.unit.function("simulation_at")(self.address, ctypes.c_long(limit), ctypes.c_void_p(times.ctypes.data),
+                                                       ctypes.c_long(len(times)), ctypes.c_void_p(x.ctypes.data),
+                                                       ctypes.byref(self.written)))
+
+    def steps(self, t: np.ndarray, x: np.ndarray, limit: int) -> int:
+        """Go on, writing every accepted step."""
+        return int(self.unit.function("simulation_steps")(self.address, ctypes.c_long(limit), ctypes.c_void_p(t.ctypes.data),
+                                                          ctypes.c_void_p(x.ctypes.data), ctypes.c_long(len(t)),
+                                                          ctypes.byref(self.written)))
+
+    def report(self) -> np.ndarray:
+        out = np.zeros(8 + 2 * self.n_x)
+        self.unit.function("simulation_report")(self.address, ctypes.c_void_p(out.ctypes.data))
+        return out
+
+
+def run_compiled(module: Module, request: Request, bar: Any = None) -> Outcome:
+    """Integrate with the compiled Dormand-Prince 8(5,3).
+
+    An exception of an input function ends the run; it is raised again unless it is a KeyboardInterrupt.
+    """
+    unit: Any = module.unit("rhs")
+    run = _Run(unit, request)
+    interrupted, seconds, stopped = False, 0.0, False
+    times, n_x = request.times, run.n_x
+    stored: list[tuple[np.ndarray, np.ndarray]] = []
+    x_out = np.empty((len(times), n_x)) if times is not None else np.empty((STEPS_AT_ONCE, n_x))
+    t_out = times if times is not None else np.empty(STEPS_AT_ONCE)
+    status, position = run.status, request.span[0]
+    try:
+        while True:
+            done = int(run.report()[2])
+            left = None if request.max_steps is None else request.max_steps - done
+            if left is not None and left <= 0 and status != _STORE_FULL:
+                stopped = True
+                break
+            limit = PIECE if left is None else min(PIECE, left)
+            begun = clock.perf_counter()
+            status = run.at(t_out, x_out, limit) if times is not None else run.steps(t_out, x_out, limit)
+            seconds += clock.perf_counter() - begun
+            if times is None and (status == _STORE_FULL or run.written.value == len(t_out)):
+                stored.append((t_out.copy(), x_out.copy()))
+                run.written.value = 0
+            if bar is not None:
+                now = run.report()[0]
+                bar.update(abs(now - position))
+                position = now
+            if status not in (_STEP_LIMIT, _STORE_FULL):
+                break
+    except KeyboardInterrupt:
+        interrupted = True
+    if run.trouble and isinstance(run.trouble[0], KeyboardInterrupt):
+        interrupted = True
+    elif run.trouble:
+        raise run.trouble[0]
+    written = run.written.value
+    if times is None:
+        stored.append((t_out[:written].copy(), x_out[:written].copy()))
+        t, x = np.concatenate([a for a, _ in stored]), np.concatenate([b for _, b in stored])
+    else:
+        t, x = times[:written], x_out[:written]
+    report = run.report()
+    success = status == _DONE and not interrupted and not stopped
+    message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
+    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds)
+
+
+def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
+    from symdyn.runtime.simulate import describe_stop
+
+    n = run.n_x
+    t, x = report[0], report[8:8 + n]
+    if interrupted:
+        return describe_stop(module.metadata, t, x, "interrupted")
+    if stopped:
+        return describe_stop(module.metadata, t, x, f"{int(report[2])} steps were done, as asked")
+    if status == _FIELD_FAILED:
+        return describe_stop(module.metadata, report[7], report[8 + n:], run.unit.reason(int(report[5])))
+    if status == _NOT_FINITE:
+        bad = int(report[6])
+        name = module.metadata["x"][bad] if 0 <= bad < n else "the state"
+        return describe_stop(module.metadata, report[7], report[8 + n:], f"the derivative of {name} is not finite")
+    if status == _STEP_TOO_SMALL:
+        return describe_stop(module.metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances")
+    return describe_stop(module.metadata, t, x, f"the integrator refused (status {status})")

@@ -1,0 +1,96 @@
+"""Inputs of a simulation: numbers, tables over time, or functions of time and state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.arguments import take
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """One of: constant (n_in,), table over times (linear between rows, ends held), function f(t, x) -> (n_in,)."""
+
+    constant: np.ndarray
+    times: np.ndarray | None = None
+    table: np.ndarray | None = None
+    function: Callable[[float, np.ndarray], Any] | None = None
+
+    def at(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The inputs at a time and state."""
+        if self.function is not None:
+            values = np.asarray(self.function(t, x), dtype=float).reshape(-1)
+            if len(values) != len(self.constant):
+                raise ArgumentError(f"the input function returned {len(values)} values at t = {t:.6g}, needed are "
+                                    f"{len(self.constant)}")
+            return values
+        if self.times is not None and self.table is not None:
+            return np.array([np.interp(t, self.times, column) for column in self.table.T])
+        return self.constant
+
+    def rows(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The inputs at every time, (n_t, n_in)."""
+        if self.function is None and self.table is None:
+            return self.constant[None, :]
+        return np.array([self.at(tk, xk) for tk, xk in zip(t, x, strict=True)]).reshape(len(t), len(self.constant))
+
+
+def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], owner: str) -> Inputs:
+    """Inputs as the user gave them.
+
+    given   None (defaults, else zero); numbers in order; a function of (t, x) for all; a pair (times, values); or a
+            mapping from names or symbols to a number, a function of (t, x), or a pair (times, values)
+    Raises ArgumentError for what fits none of these.
+    """
+    zeros = {n: initial.get(n, 0.0) for n in names}
+    start = np.array([zeros[n] for n in names], dtype=float)
+    if given is None or (not callable(given) and not isinstance(given, Mapping) and np.size(given) == 0 if not isinstance(
+            given, tuple) else given == ()):
+        return Inputs(start)
+    if not names:
+        raise ArgumentError(f"{owner}: inputs were given, but the system has none")
+    if callable(given):
+        return Inputs(start, function=given)
+    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
+        return Inputs(start, *_table(given, len(names), owner))
+    if not isinstance(given, Mapping):
+        return Inputs(take(given, names, "inputs", zeros, owner))
+    parts = {str(getattr(key, "name", key)): value for key, value in given.items()}
+    varying = {n: v for n, v in parts.items() if callable(v) or isinstance(v, tuple)}
+    constant = take({n: v for n, v in parts.items() if n not in varying} | {n: 0.0 for n in varying}, names, "inputs",
+                    zeros, owner)
+    if not varying:
+        return Inputs(constant)
+    places = {n: k for k, n in enumerate(names)}
+    sources: list[tuple[int, Callable[[float, np.ndarray], Any]]] = []
+    for name, value in varying.items():
+        if callable(value):
+            sources.append((places[name], value))
+        else:
+            times, table = _table(value, 1, owner)
+            column = table[:, 0]
+            sources.append((places[name], lambda t, x, times=times, column=column: np.interp(t, times, column)))
+
+    def mixed(t: float, x: np.ndarray) -> np.ndarray:
+        values = constant.copy()
+        for place, source in sources:
+            values[place] = source(t, x)
+        return values
+
+    return Inputs(constant, function=mixed)
+
+
+def _table(pair: tuple, n: int, owner: str) -> tuple[np.ndarray, np.ndarray]:
+    times = np.ascontiguousarray(pair[0], dtype=float)
+    values = np.ascontiguousarray(np.asarray(pair[1], dtype=float).reshape(len(times), -1)) if len(times) else np.zeros((0, n))
+    if len(times) == 0 or values.shape[1] != n:
+        raise ArgumentError(f"{owner}: a table of inputs has {len(times)} times and values of shape "
+                            f"{np.shape(pair[1])}; give one row of {n} values for each time")
+    if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
+        raise ArgumentError(f"{owner}: the times of a table of inputs must increase, and all of it be finite")
+    return times, values

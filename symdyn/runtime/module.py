@@ -1,0 +1,274 @@
+"""Module: generated code as an object that evaluates and simulates. No SymPy here."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.arguments import take
+from symdyn.runtime.unit import Evaluator, Unit
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solution import Solution
+
+Provider = Callable[[str], Unit]
+
+
+class Jacobian(NamedTuple):
+    """Derivatives of x_dot by the state (n_x, n_x), the inputs (n_x, n_in) and the parameters (n_x, n_p)."""
+
+    x: np.ndarray | None
+    inputs: np.ndarray | None
+    params: np.ndarray | None
+
+
+class Module:
+    """Functions of a mechanism.
+
+    metadata   names, order, shapes, units, defaults
+    provider   function name -> unit that has it; asked once for each function, when it is first called
+
+    Parameters are given as an array in the order of `metadata["parameters"]`, or as a mapping from names or symbols;
+    what is left out takes its default. Every function takes one state, or arrays with the states along the first axis.
+    Raises ArgumentError for values that do not fit, EvaluationError where the equations cannot be evaluated.
+    """
+
+    def __init__(self, metadata: Mapping[str, Any], provider: Provider, backend: str, fallback: str = "",
+                 writer: Callable[[Path], list[Path]] | None = None, reporter: Callable[[], Any] | None = None) -> None:
+        self.metadata = metadata
+        self.name: str = metadata["name"]
+        self.backend = backend
+        self.fallback = fallback
+        self._provider = provider
+        self._units: dict[str, Unit] = {}
+        self._writer = writer
+        self._reporter = reporter
+        self._local = threading.local()
+        self._n_x: int = metadata["sizes"]["x"]
+        self._n_in: int = metadata["sizes"]["inputs"]
+        self._defaults = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
+
+    # -- evaluation
+
+    def rhs(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> np.ndarray:
+        """x_dot (n_x,) at time t and state x = [q; u; z]."""
+        try:
+            evaluator, seen, mark = self._local.rhs
+        except AttributeError:
+            evaluator, seen, mark = self._ready("rhs", params)
+        if params is not seen or _mark(params) != mark:
+            evaluator, seen, mark = self._ready("rhs", params)
+        if len(x) != self._n_x or len(inputs) != self._n_in or self._n_in:
+            return self.evaluate("rhs", t, x, params, inputs)
+        return evaluator.one(t, x)
+
+    def evaluate(self, name: str, t: Any, x: Any, params: Any = None, inputs: Any = (), ud: Any = ()) -> np.ndarray:
+        """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
+        evaluator = self._evaluator(name, params)
+        state = self._rows(x, "x", "x")
+        free = self._rows(inputs, "inputs", "inputs")
+        acceleration = self._rows(ud, "ud", "u")
+        times = np.asarray(t, dtype=float)
+        if max(state.ndim, free.ndim, acceleration.ndim, times.ndim + 1) == 1:
+            return evaluator.one(float(times), state, free, acceleration)
+        rows = [np.atleast_1d(times), *[np.atleast_2d(a) for a in (state, free, acceleration)]]
+        lengths = {len(r) for r in rows if len(r) != 1}
+        if len(lengths) > 1:
+            raise ArgumentError(f"{self.name}: t, x, inputs and ud have {[len(r) for r in rows]} rows; give each one row "
+                                "or the same number")
+        return evaluator.many(*rows)
+
+    def mass_matrix(self, q: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
+        """M_tilde (n_u, n_u)."""
+        return self.evaluate("mass_matrix", t, self._state(q), params)
+
+    def k_tilde(self, q: Any, u: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
+        """k_tilde (n_u,): Coriolis, centrifugal and gyroscopic terms."""
+        return self.evaluate("k_tilde", t, self._state(q, u), params)
+
+    def F_tilde(self, q: Any, u: Any, params: Any = None, t: float = 0.0, inputs: Any = ()) -> np.ndarray:
+        """F_tilde (n_u,): generalized forces of all loads and gravity."""
+        return self.evaluate("F_tilde", t, self._state(q, u), params, inputs)
+
+    def J(self, q: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
+        """J (6 n_b, n_u), planar (3 n_b, n_u): [v_G; omega] of every body = J u, n-frame."""
+        return self.evaluate("J", t, self._state(q), params)
+
+    def energy(self, q: Any, u: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
+        """Kinetic and potential energy (2,), J."""
+        return self.evaluate("energy", t, self._state(q, u), params)
+
+    def inverse_dynamics(self, q: Any, u: Any, ud: Any, params: Any = None, t: float = 0.0,
+                         inputs: Any = ()) -> np.ndarray:
+        """tau (n_u,) = M_tilde u_dot + k_tilde - F_tilde: what must be added for the accelerations ud."""
+        return self.evaluate("inverse_dynamics", t, self._state(q, u), params, inputs, ud)
+
+    def outputs(self, t: Any, x: Any, params: Any = None, inputs: Any = ()) -> dict[str, np.ndarray]:
+        """The user's named outputs."""
+        return self.split_outputs(self.evaluate("outputs", t, x, params, inputs))
+
+    def jacobian(self, t: float, x: Any, params: Any = None, inputs: Any = (),
+                 wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
+        """Exact derivatives of x_dot by state, inputs and parameters; `wrt` leaves out what is not needed."""
+        unknown = [w for w in wrt if w not in Jacobian._fields]
+        if unknown:
+            raise ArgumentError(f"{self.name}: jacobian by {', '.join(unknown)} asked for; there are x, inputs and params")
+        return Jacobian(*[self.evaluate(f"jacobian_{w}", t, x, params, inputs) if w in wrt else None
+                          for w in Jacobian._fields])
+
+    def function(self, name: str) -> Callable[..., np.ndarray]:
+        """One function as f(q, u, params, t=0, inputs=()), of one state or of rows of states."""
+        self._unit(name)
+
+        def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> np.ndarray:
+            return self.evaluate(name, t, self._state(q, u), params, inputs)
+
+        return call
+
+    def bind(self, params: Any = None) -> BoundModule:
+        """The module with fixed parameters: the prologue runs here and not again."""
+        return BoundModule(self, self.parameters(params))
+
+    def parameters(self, params: Any = None) -> np.ndarray:
+        """Parameters in order, (n_p,)."""
+        return take(params, self.metadata["parameters"], "parameters", self._defaults, self.name)
+
+    # -- motion
+
+    def simulate(self, t: Any = None, q: Any = None, u: Any = None, params: Any = None, **options: Any) -> Solution:
+        """Integrate the motion; see symdyn.runtime.simulate.simulate for all options."""
+        from symdyn.runtime.simulate import simulate
+
+        return simulate(self, t, q, u, params, **options)
+
+    # -- about the module
+
+    def report(self) -> Any:
+        """What was generated, what was skipped and why, operation counts; prints as text."""
+        if self._reporter is None:
+            raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
+        return self._reporter()
+
+    def write(self, folder: Any) -> list[Path]:
+        """Write the generated files, complete with header, example and reference vectors; returns their paths."""
+        if self._writer is None:
+            raise ArgumentError(f"{self.name} was loaded from files; copy them, or compile the equations it came from")
+        return self._writer(Path(folder))
+
+    def split_outputs(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """The user's outputs by name from the rows of the function `outputs`."""
+        result, start = {}, 0
+        for name, shape in self.metadata["outputs"]:
+            size = int(np.prod(shape))
+            part = rows[..., start:start + size]
+            result[name] = part.reshape(*rows.shape[:-1], *shape)
+            start += size
+        return result
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Names of the functions that can be evaluated."""
+        return tuple(self.metadata["functions"])
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Shape of the result of a function at one state."""
+        return tuple(self._unit(name).metadata["shapes"][name])
+
+    def unit(self, name: str) -> Unit:
+        """The loaded unit that has a function."""
+        return self._unit(name)
+
+    def _unit(self, name: str) -> Unit:
+        if name not in self._units:
+            self._units[name] = self._provider(name)
+        return self._units[name]
+
+    def _evaluator(self, name: str, params: Any) -> Evaluator:
+        return self._ready(name, params)[0]
+
+    def _ready(self, name: str, params: Any) -> tuple[Evaluator, Any, Any]:
+        """The evaluator of this thread with these parameters; remembered until they change."""
+        known = getattr(self._local, name, None)
+        mark = _mark(params)
+        if known is None or known[1] is not params or known[2] != mark:
+            evaluator = known[0] if known is not None else self._unit(name).evaluator(name)
+            evaluator.set_params(self.parameters(params))
+            known = (evaluator, params, mark)
+            setattr(self._local, name, known)
+        return known
+
+    def _state(self, q: Any, u: Any = None) -> np.ndarray:
+        sizes = self.metadata["sizes"]
+        q = self._rows(q, "q", "q")
+        u = self._rows(() if u is None else u, "u", "u")
+        n = max(q.ndim, u.ndim)
+        if n == 1:
+            return np.concatenate([q, u, np.zeros(sizes["z"])])
+        rows = max(len(a) for a in (q, u) if a.ndim == n)
+        return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, np.zeros(sizes["z"]))], axis=1)
+
+    def _rows(self, values: Any, what: str, group: str) -> np.ndarray:
+        """One row or rows of numbers of a group; nothing stands for zeros."""
+        wanted = self.metadata["sizes"][group]
+        if isinstance(values, Mapping):
+            names = self.metadata["u" if what == "ud" else group]
+            return take(values, names, what, dict.fromkeys(names, 0.0), self.name)
+        try:
+            array = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{self.name}: {what} must be numbers, found {values!r}") from None
+        if array.ndim == 0 and wanted == 1:
+            array = array.reshape(1)
+        if array.shape == (0,) and what != "x":
+            return np.zeros(wanted)
+        if array.ndim not in (1, 2) or array.shape[-1] != wanted:
+            raise ArgumentError(f"{self.name}: {what} has the shape {array.shape}, needed are {wanted} numbers a state: "
+                                f"{', '.join(self.metadata['u' if what == 'ud' else group])}")
+        return array
+
+    def __repr__(self) -> str:
+        sizes = self.metadata["sizes"]
+        return f"<Module {self.name}: {self.backend}, {sizes['q']} coordinates, {sizes['u']} speeds, {sizes['p']} parameters>"
+
+
+class BoundModule:
+    """A module with fixed parameters. Each thread that uses it has its own buffers."""
+
+    def __init__(self, module: Module, p: np.ndarray) -> None:
+        self.module = module
+        self.params = p
+        self._local = threading.local()
+        self._ready("rhs")
+
+    def rhs(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
+        """x_dot (n_x,) at time t and state x = [q; u; z]."""
+        try:
+            evaluator = self._local.rhs
+        except AttributeError:
+            evaluator = self._ready("rhs")
+        return evaluator.one(t, x, inputs) if len(inputs) else evaluator.one(t, x)
+
+    def jacobian_x(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
+        """d x_dot / d x (n_x, n_x)."""
+        evaluator = getattr(self._local, "jacobian_x", None) or self._ready("jacobian_x")
+        return evaluator.one(t, x, inputs) if len(inputs) else evaluator.one(t, x)
+
+    def _ready(self, name: str) -> Any:
+        evaluator = self.module.unit(name).evaluator(name)
+        evaluator.set_params(self.params)
+        setattr(self._local, name, evaluator)
+        return evaluator
+
+
+def _mark(params: Any) -> Any:
+    """What tells that parameters were changed in place."""
+    if params is None:
+        return None
+    if isinstance(params, np.ndarray):
+        return params.tobytes()
+    return tuple(params.values()) if isinstance(params, Mapping) else tuple(params)

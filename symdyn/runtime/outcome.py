@@ -1,0 +1,40 @@
+"""What a simulation is asked for, and what an integrator gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symdyn.runtime.inputs import Inputs
+
+
+@dataclass(frozen=True)
+class Request:
+    """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator."""
+
+    span: tuple[float, float]
+    times: np.ndarray | None
+    x0: np.ndarray
+    p: np.ndarray
+    inputs: Inputs
+    rtol: float
+    atol: np.ndarray
+    max_step: float
+    first_step: float
+    max_steps: int | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why."""
+
+    t: np.ndarray
+    x: np.ndarray
+    success: bool
+    message: str
+    interrupted: bool
+    n_steps: int
+    n_rejected: int
+    n_evaluations: int
+    seconds: float | None = None

@@ -1,0 +1,203 @@
+"""Simulation: by the compiled integrator where there is one, else by SciPy's, with the same interface."""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.runtime.arguments import take
+from symdyn.runtime.compiled import run_compiled
+from symdyn.runtime.inputs import Inputs, take_inputs
+from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.solution import Solution
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+N_POINTS = 1001
+_SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+
+
+def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
+             inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
+             max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
+             progress: bool = False) -> Solution:
+    """Integrate the motion.
+
+    t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
+                output times; default: from 0 over the system's duration
+    q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
+    params      as everywhere in Module
+    inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
+    rtol, atol  relative and absolute tolerance of a step; atol a number or (n_x,), default rtol
+    method      "dop853" compiled (default with the C backend), or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or
+                an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian
+    max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
+    progress    show a bar (needs tqdm)
+
+    Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
+    and why, and a SimulationWarning is given. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
+    Raises ArgumentError for values that do not fit.
+    """
+    metadata = module.metadata
+    p = module.parameters(params)
+    start = _start(module, q, u, z)
+    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name)
+    times, span, every = _times(module, t, steps)
+    request = Request(span, None if every else times, start, p, free, *_tolerances(module, rtol, atol),
+                      _positive(module, max_step, "max_step"), _positive(module, first_step, "first_step"), max_steps)
+    method = method or ("dop853" if module.backend == "c" else "DOP853")
+    bar = _bar(module, span) if progress else None
+    begun = clock.perf_counter()
+    try:
+        if method == "dop853":
+            if module.backend != "c":
+                raise ArgumentError(f"{module.name}: the compiled integrator 'dop853' needs the C backend; this module "
+                                    f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
+            outcome = run_compiled(module, request, bar)
+        else:
+            outcome = _run_scipy(module, request, method, bar)
+    finally:
+        if bar is not None:
+            bar.close()
+    solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun)
+    if outcome.interrupted:
+        raise SimulationInterrupted(solution, outcome.message)
+    if not outcome.success:
+        warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
+    return solution
+
+
+def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
+    initial = module.metadata["initial"]
+    parts = []
+    for what, values in (("q", q), ("u", u), ("z", z)):
+        names = module.metadata[what]
+        parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
+    return np.concatenate(parts)
+
+
+def _times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
+    """Output times, span, whether every step is stored."""
+    if t is None:
+        t = (0.0, module.metadata["duration"])
+    try:
+        times = np.ascontiguousarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of times, found {t!r}") from None
+    if times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
+        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of at least two finite times, found {t!r}")
+    direction = np.sign(times[-1] - times[0])
+    if isinstance(t, (tuple, list)) and len(t) == 2:
+        return np.linspace(times[0], times[1], N_POINTS), (times[0], times[1]), steps
+    if not (np.diff(times) * direction > 0).all():
+        raise ArgumentError(f"{module.name}: the output times must increase, or decrease, throughout")
+    return times, (times[0], times[-1]), False
+
+
+def _tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray]:
+    n = module.metadata["sizes"]["x"]
+    absolute = rtol if atol is None else atol
+    try:
+        relative, vector = float(rtol), np.ascontiguousarray(np.broadcast_to(np.asarray(absolute, dtype=float), (n,)))
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{module.name}: rtol must be a number and atol a number or {n} numbers, found rtol = {rtol!r}, "
+                            f"atol = {atol!r}") from None
+    if not (0 <= relative < 1 and (vector >= 0).all() and np.isfinite(vector).all() and (relative > 0 or (vector > 0).all())):
+        raise ArgumentError(f"{module.name}: tolerances must be positive (rtol below 1), found rtol = {rtol}, atol = {atol}")
+    return relative, vector
+
+
+def _positive(module: Module, value: float, what: str) -> float:
+    if not (np.isscalar(value) and value >= 0):
+        raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {value!r}")
+    return 0.0 if not np.isfinite(value) else float(value)
+
+
+def _bar(module: Module, span: tuple[float, float]) -> Any:
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
+    return tqdm(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s", bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
+
+
+def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outcome:
+    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
+    from scipy import integrate
+
+    if isinstance(method, str):
+        if method not in _SCIPY:
+            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
+                                f"{', '.join(_SCIPY)}, or pass an OdeSolver class")
+        solver_class = getattr(integrate, method)
+    else:
+        solver_class = method
+    bound = module.bind(request.p)
+    free: Inputs = request.inputs
+    n_in = len(free.constant)
+    options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
+    if request.max_step:
+        options["max_step"] = request.max_step
+    if request.first_step:
+        options["first_step"] = request.first_step
+    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
+        options["jac"] = lambda s, x: bound.jacobian_x(s, x, free.at(s, x)) if n_in else bound.jacobian_x(s, x)
+    trouble: list[EvaluationError] = []
+
+    def field(s: float, x: np.ndarray) -> np.ndarray:
+        try:
+            return bound.rhs(s, x, free.at(s, x)) if n_in else bound.rhs(s, x)
+        except EvaluationError as error:
+            trouble.append(error)
+            return np.full(len(x), np.nan)
+
+    t0, t_end = request.span
+    ts, xs = [t0], [request.x0]
+    pending = list(request.times[1:]) if request.times is not None else []
+    accepted, message, interrupted = 0, "", False
+    solver: Any = None
+    try:
+        with np.errstate(all="ignore"):
+            solver = solver_class(field, t0, request.x0, t_end, **options)
+            while solver.status == "running":
+                before = solver.t
+                note = solver.step()
+                if solver.status == "failed" or not np.isfinite(solver.y).all():
+                    message = str(trouble[-1]) if trouble else note or "the state is not finite"
+                    break
+                accepted += 1
+                if request.times is None:
+                    ts.append(solver.t)
+                    xs.append(solver.y.copy())
+                else:
+                    dense = None
+                    while pending and (pending[0] - solver.t) * solver.direction <= 0:
+                        dense = dense or solver.dense_output()
+                        xs.append(solver.y.copy() if pending[0] == solver.t else dense(pending[0]))
+                        ts.append(pending.pop(0))
+                if bar is not None:
+                    bar.update(abs(solver.t - before))
+                if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
+                    message = f"stopped after {accepted} steps, as asked"
+                    break
+    except KeyboardInterrupt:
+        interrupted, message = True, "interrupted"
+    except (ValueError, ArithmeticError) as error:
+        message = str(trouble[-1]) if trouble else str(error)
+    done = not message
+    here = float(solver.t) if solver is not None else t0
+    state = solver.y if solver is not None else request.x0
+    return Outcome(np.array(ts), np.array(xs), done, "reached the end" if done else describe_stop(module.metadata, here, state,
+                   message), interrupted, accepted, 0, int(solver.nfev) if solver is not None else 0)
+
+
+def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:
+    """When, where and why a run stopped."""
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=True))
+    return f"{metadata['name']}: stopped at t = {t:.9g}: {reason}; the state there: {state}"

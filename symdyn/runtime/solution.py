@@ -1,0 +1,163 @@
+"""Solution: a computed motion; time first. Energy and outputs are evaluated when asked for."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.outcome import Outcome
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+
+class Solution:
+    """A motion.
+
+    t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
+    success, message    whether the end was reached, and if not when, where and why
+    n_steps, n_rejected, nfev   of the integrator; seconds: wall time of the call, integrator_seconds: inside compiled code
+    """
+
+    def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
+                 seconds: float) -> None:
+        self.module = module
+        self.t, self.x = outcome.t, outcome.x
+        self.success, self.message = outcome.success, outcome.message
+        self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
+        self.integrator_seconds = outcome.seconds
+        self.seconds = seconds
+        self.params, self.method, self.backend = params, method, module.backend
+        self._inputs = inputs
+
+    @property
+    def y(self) -> np.ndarray:
+        """(n_x, n_t)"""
+        return self.x.T
+
+    @property
+    def status(self) -> int:
+        """0: reached the end, -1: stopped early, as in SciPy."""
+        return 0 if self.success else -1
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.x[:, :self._sizes["q"]]
+
+    @property
+    def u(self) -> np.ndarray:
+        return self.x[:, self._sizes["q"]:self._sizes["q"] + self._sizes["u"]]
+
+    @property
+    def z(self) -> np.ndarray:
+        return self.x[:, self._sizes["q"] + self._sizes["u"]:]
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """Kinetic plus potential energy, (n_t,), J."""
+        return self.energies.sum(axis=1)
+
+    @cached_property
+    def energies(self) -> np.ndarray:
+        """Kinetic and potential energy, (n_t, 2), J."""
+        return self._rows("energy")
+
+    @cached_property
+    def inputs(self) -> np.ndarray:
+        """The inputs at every time, (n_t, n_in)."""
+        rows = self._inputs.rows(self.t, self.x)
+        return np.broadcast_to(rows, (len(self.t), rows.shape[1]))
+
+    @cached_property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """The user's named outputs, each (n_t, ...)."""
+        if not self.module.metadata["outputs"]:
+            return {}
+        return self.module.split_outputs(self._rows("outputs"))
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """Origin and rotation (row by row) of every body's frame, n-frame, (n_t, n_b, 12)."""
+        return self._rows("frames")
+
+    @property
+    def lam(self) -> np.ndarray:
+        """Multipliers (n_t, n_c); none in the embedded form."""
+        return np.zeros((len(self.t), 0))
+
+    @property
+    def constraint_violation(self) -> np.ndarray:
+        """(n_t, n_c); none in the embedded form."""
+        return np.zeros((len(self.t), 0))
+
+    def energy_error(self) -> float:
+        """Largest change of energy over the largest of kinetic energy and range of potential energy; for motion without
+        loads other than gravity and springs."""
+        kinetic, potential = self.energies.T
+        scale = max(kinetic.max(), np.ptp(potential))
+        return float(np.abs(self.energy - self.energy[0]).max() / scale) if scale > 0 else 0.0
+
+    # -- pictures and files
+
+    def plot(self, path: Any = None) -> Any:
+        """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given."""
+        from symdyn.runtime.pictures import plot
+
+        return plot(self, path)
+
+    def animate(self, path: Any = None, fps: int = 25, speed: float = 1.0) -> Any:
+        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given."""
+        from symdyn.runtime.pictures import animate
+
+        return animate(self, path, fps, speed)
+
+    def save(self, path: Any) -> Path:
+        """Save to .npz (arrays, names, parameters, message) or .csv (t, x and outputs in columns).
+
+        Raises ArgumentError for another ending.
+        """
+        path = Path(path)
+        if path.suffix == ".npz":
+            about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
+                     "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
+                     "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
+            outputs = {f"output_{name}": rows for name, rows in self.outputs.items()}
+            extra = {"energy": self.energy} if "energy" in self.module.functions else {}
+            np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params, **extra,
+                     about=np.array(json.dumps(about)), **outputs)  # type: ignore[arg-type]
+        elif path.suffix == ".csv":
+            names, columns = ["t", *self.module.metadata["x"]], [self.t, *self.x.T]
+            for name, rows in self.outputs.items():
+                flat = rows.reshape(len(self.t), -1)
+                names += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
+                columns += list(flat.T)
+            with path.open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(names)
+                writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
+        else:
+            raise ArgumentError(f"cannot save to {path.name}: the ending must be .npz or .csv")
+        return path
+
+    @property
+    def _sizes(self) -> Mapping[str, int]:
+        return self.module.metadata["sizes"]  # type: ignore[no-any-return]
+
+    def _rows(self, name: str) -> np.ndarray:
+        if len(self.t) == 0:
+            return np.zeros((0, *self.module.shape(name)))
+        return self.module.evaluate(name, self.t, self.x, self.params, self._inputs.rows(self.t, self.x)).reshape(
+            len(self.t), *self.module.shape(name))
+
+    def __repr__(self) -> str:
+        end = f"{self.t[-1]:.6g}" if len(self.t) else "nothing"
+        return (f"<Solution of {self.module.name}: {len(self.t)} times to t = {end}, {self.n_steps} steps, "
+                f"{self.method} on {self.backend}: {self.message}>")

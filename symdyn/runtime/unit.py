@@ -1,0 +1,216 @@
+"""A unit: loaded generated code with some of the functions of a module, called through one narrow interface.
+
+There are two: a C library through ctypes, and a generated Python module. No SymPy here.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import importlib.util
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+from symdyn.runtime import cache
+from symdyn.runtime.compiler import Compiler
+
+NOT_FINITE = -1
+
+
+class Evaluator(Protocol):
+    """One function of a unit with its own buffers and parameters; for one thread."""
+
+    def set_params(self, p: np.ndarray) -> None:
+        """Take parameters over and run the prologue."""
+
+    def one(self, t: float, x: Any, inputs: Any, ud: Any) -> np.ndarray:
+        """The result at one state."""
+
+    def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
+        """Results at rows of states; arguments with one row hold for all."""
+
+
+class Unit(Protocol):
+    """Generated code that is loaded."""
+
+    backend: str
+    metadata: Mapping[str, Any]
+
+    def evaluator(self, name: str) -> Evaluator:
+        """A new evaluator of one function."""
+
+
+class Frame(ctypes.Structure):
+    """The record that one call of the C library takes; see `frame` in the generated source."""
+
+    _fields_ = [("n", ctypes.c_long), *[(k, ctypes.c_void_p) for k in ("t", "x", "ud", "inputs", "p", "c", "out")],
+                *[(k, ctypes.c_long) for k in ("t_stride", "x_stride", "ud_stride", "inputs_stride", "failed")]]
+
+
+class CUnit:
+    """A compiled C library."""
+
+    backend = "c"
+
+    def __init__(self, source: str, metadata: Mapping[str, Any], compiler: Compiler) -> None:
+        self.metadata = metadata
+        self.source = source
+        self.library = cache.load(source, metadata["name"], compiler)
+        # Evaluations are too short to be worth releasing the interpreter lock for; integrations are not.
+        self.quick = ctypes.PyDLL(self.library._name)
+
+    def function(self, name: str, quick: bool = False) -> Any:
+        """An exported function of the library, without the module's prefix."""
+        return getattr(self.quick if quick else self.library, f"{self.metadata['name']}_{name}")
+
+    def reason(self, code: int) -> str:
+        """What a return code means."""
+        if code == NOT_FINITE:
+            return "the result is not finite"
+        reasons = self.metadata["reasons"]
+        return reasons[code - 1] if 0 < code <= len(reasons) else f"code {code}"
+
+    def evaluator(self, name: str) -> CEvaluator:
+        return CEvaluator(self, name)
+
+    def prologue(self, p: np.ndarray, c: np.ndarray) -> None:
+        """Compute the constants. Raises EvaluationError if they cannot be."""
+        code = self.function("prologue")(ctypes.c_void_p(p.ctypes.data), ctypes.c_void_p(c.ctypes.data))
+        if code:
+            raise EvaluationError(f"{self.metadata['name']}: {self.reason(code)}; check the parameters")
+        if not np.isfinite(c).all():
+            raise EvaluationError(f"{self.metadata['name']}: {np.count_nonzero(~np.isfinite(c))} of the constants that "
+                                  "depend on parameters only are not finite; check for a division by a zero parameter")
+
+
+class CEvaluator:
+    """One function of a C library, with buffers whose addresses are bound once."""
+
+    def __init__(self, unit: CUnit, name: str) -> None:
+        sizes = unit.metadata["sizes"]
+        self.unit = unit
+        self.name = name
+        self.shape = tuple(unit.metadata["shapes"][name])
+        self.size = int(np.prod(self.shape))
+        self.p, self.c = np.zeros(max(1, sizes["p"])), np.zeros(max(1, unit.metadata["n_c"]))
+        self.t, self.x = np.zeros(1), np.zeros(sizes["x"])
+        self.ud, self.inputs = np.zeros(sizes["u"]), np.zeros(sizes["inputs"])
+        self.out = np.zeros(self.size)
+        self.result = self.out.reshape(self.shape)
+        self.frame = Frame(1, *[a.ctypes.data for a in (self.t, self.x, self.ud, self.inputs, self.p, self.c, self.out)],
+                           1, 1, 1, 1, 0)
+        self.call = unit.function(f"{name}_rows", quick=True)
+        self.address = ctypes.c_void_p(ctypes.addressof(self.frame))
+
+    def set_params(self, p: np.ndarray) -> None:
+        self.p[:len(p)] = p
+        self.unit.prologue(self.p, self.c)
+
+    def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
+        self.t[0] = t
+        self.x[:] = x
+        if inputs is not None:
+            self.inputs[:] = inputs
+        if ud is not None:
+            self.ud[:] = ud
+        code = self.call(self.address)
+        if code:
+            raise EvaluationError(failure(self.unit.metadata, self.name, self.unit.reason(code), t, self.x))
+        return self.result.copy()
+
+    def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
+        arrays = [np.ascontiguousarray(a, dtype=float) for a in (t, x, ud, inputs)]
+        n = max(len(a) for a in arrays)
+        out = np.empty((n, self.size))
+        frame = Frame(n, *[a.ctypes.data for a in (*arrays, self.p, self.c, out)], *[int(len(a) > 1) for a in arrays], 0)
+        code = self.unit.function(f"{self.name}_rows")(ctypes.byref(frame))
+        if code:
+            k = frame.failed
+            raise EvaluationError(failure(self.unit.metadata, self.name, self.unit.reason(code),
+                                          arrays[0][min(k, len(arrays[0]) - 1)], arrays[1][min(k, len(arrays[1]) - 1)])
+                                  + (f" (row {k} of {n})" if n > 1 else ""))
+        return out.reshape(n, *self.shape)
+
+
+class PythonUnit:
+    """A generated Python module: plain floats for one state, NumPy for many."""
+
+    backend = "numpy"
+
+    def __init__(self, module: ModuleType) -> None:
+        self.module = module
+        self.metadata = module.METADATA
+
+    @classmethod
+    def from_source(cls, source: str, name: str) -> PythonUnit:
+        """Put the source into the cache and import it from there."""
+        key = hashlib.sha256(source.encode()).hexdigest()[:16]
+        path = cache.cache_dir() / f"{name}-{key}.py"
+        if not path.is_file() or path.read_text(encoding="utf-8") != source:
+            scratch = path.with_suffix(f".{os.getpid()}.tmp")
+            scratch.write_text(source, encoding="utf-8")
+            os.replace(scratch, path)
+        return cls.from_file(path)
+
+    @classmethod
+    def from_file(cls, path: Path) -> PythonUnit:
+        """Import a generated module from its file."""
+        spec = importlib.util.spec_from_file_location(f"symdyn_generated_{path.stem.replace('-', '_')}", path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module
+        spec.loader.exec_module(module)
+        return cls(module)
+
+    def evaluator(self, name: str) -> PythonEvaluator:
+        return PythonEvaluator(self, name)
+
+
+class PythonEvaluator:
+    """One function of a generated Python module."""
+
+    def __init__(self, unit: PythonUnit, name: str) -> None:
+        self.unit = unit
+        self.name = name
+        self.p: tuple[float, ...] = ()
+
+    def set_params(self, p: np.ndarray) -> None:
+        self.p = tuple(p.tolist())
+
+    def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
+        sizes = self.unit.metadata["sizes"]
+        inputs = [0.0] * sizes["inputs"] if inputs is None else inputs
+        ud = [0.0] * sizes["u"] if ud is None else ud
+        return self._evaluate(float(t), np.asarray(x, dtype=float), inputs, ud)
+
+    def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
+        n = max(len(a) for a in (t, x, inputs, ud))
+        rows = [np.broadcast_to(a, (n, *np.shape(a)[1:])) for a in (t, x, inputs, ud)]
+        with np.errstate(all="ignore"):
+            return self._evaluate(*rows)
+
+    def _evaluate(self, t: Any, x: Any, inputs: Any, ud: Any) -> np.ndarray:
+        try:
+            result: np.ndarray = self.unit.module.evaluate(self.name, t, x, self.p, inputs, ud)
+        except (ArithmeticError, ValueError) as error:
+            raise EvaluationError(failure(self.unit.metadata, self.name, str(error), t, x)) from None
+        if not np.isfinite(result).all():
+            raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
+        return result
+
+
+def failure(metadata: Mapping[str, Any], name: str, reason: str, t: Any, x: Any) -> str:
+    """The sentence for an evaluation that failed."""
+    text = f"{metadata['name']}: {name} cannot be evaluated: {reason}"
+    if np.ndim(x) > 1:
+        return text
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], np.asarray(x, dtype=float), strict=True))
+    bad = [n for n, v in zip(metadata["x"], np.asarray(x, dtype=float), strict=True) if not np.isfinite(v)]
+    return f"{text}; at t = {float(t):.6g}, {state}" + (f" ({', '.join(bad)} given not finite)" if bad else "")

@@ -1,0 +1,66 @@
+"""The catalogue: mechanisms with numbers, ready to derive and run.
+
+Each name is a function that returns a System with `.defaults` (a number in SI units for every parameter), `.initial`
+(a start state) and `.duration` (s). `names()` lists them without loading any; `get(name, **options)` builds one.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from symdyn.errors import SymdynError
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+# name -> module:function; text only, so that listing the names imports no SymPy. No module may bear the name of a
+# function: loading it would put the module in the function's place.
+_CATALOGUE = {
+    "pendulum": "pendulums:pendulum",
+    "double_pendulum": "pendulums:double_pendulum",
+    "n_link_pendulum": "pendulums:n_link_pendulum",
+    "cart_pole": "carts:cart_pole",
+    "vehicle_on_track": "tracks:vehicle_on_track",
+    "vehicle_on_rotating_track": "tracks:vehicle_on_rotating_track",
+    "prismatic_chain": "chains:prismatic_chain",
+    "spatial_chain": "chains:spatial_chain",
+    "two_link_arm": "arms:two_link_arm",
+    "three_link_arm": "arms:three_link_arm",
+    "puma560": "puma:puma560",
+}
+
+__all__ = [*_CATALOGUE, "get", "names"]  # noqa: PLE0604
+
+
+def names() -> list[str]:
+    """The names of the catalogue."""
+    return list(_CATALOGUE)
+
+
+def get(name: str, **options: Any) -> System:
+    """The system of this name, with the options of its function.
+
+    Raises SymdynError for a name that the catalogue does not have.
+    """
+    if name not in _CATALOGUE:
+        near = difflib.get_close_matches(str(name), _CATALOGUE, n=3, cutoff=0.5)
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        raise SymdynError(f"the catalogue has no system {name!r}; {hint}It has {', '.join(_CATALOGUE)}")
+    return _function(name)(**options)
+
+
+def _function(name: str) -> Any:
+    module, function = _CATALOGUE[name].split(":")
+    return getattr(importlib.import_module(f"symdyn.systems.{module}"), function)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _CATALOGUE:
+        return _function(name)
+    raise AttributeError(f"symdyn.systems has no {name!r}; it has {', '.join(sorted(__all__))}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,78 @@
+"""Exact derivatives by the chain rule over the assignments, forward and reverse.
+
+Source: Griewank and Walther, Evaluating Derivatives, 2nd ed., chapters 3 (forward) and 3.2 (reverse).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.tape.node import Node, is_zero
+from symdyn.tape.ops import OPERATIONS
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.tape import reachable
+
+
+def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any]) -> list[Any]:
+    """The directional derivative of each entry along the seeds (node -> its derivative)."""
+    tangent: dict[Node, Any] = {}
+    for node in reachable(entries):
+        if node in seeds:
+            tangent[node] = seeds[node]
+            continue
+        moving = [k for k, a in enumerate(node.args) if isinstance(a, Node) and not is_zero(tangent.get(a, 0))]
+        rule = OPERATIONS[node.op].partials if moving else None
+        if rule is None:
+            continue
+        partials = rule(recorder, node, node.args)
+        total: Any = 0
+        for k in moving:
+            total = total + partials[k] * tangent[node.args[k]]
+        tangent[node] = total
+    return [tangent.get(e, 0) if isinstance(e, Node) else 0 for e in entries]
+
+
+def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
+    """The gradient of one entry by each node of `by`."""
+    if not isinstance(entry, Node):
+        return [0] * len(by)
+    order = reachable([entry])
+    wanted = set(by)
+    active: set[Node] = set()
+    for node in order:
+        if node in wanted or any(isinstance(a, Node) and a in active for a in node.args):
+            active.add(node)
+    adjoint: dict[Node, Any] = {entry: 1}
+    for node in reversed(order):
+        bar = adjoint.get(node, 0)
+        if is_zero(bar) or node not in active or node.op == "leaf":
+            continue
+        rule = OPERATIONS[node.op].partials
+        if rule is None:
+            continue
+        for a, partial in zip(node.args, rule(recorder, node, node.args), strict=True):
+            if isinstance(a, Node) and a in active:
+                adjoint[a] = adjoint.get(a, 0) + bar * partial
+    return [adjoint.get(node, 0) for node in by]
+
+
+def jacobian(recorder: Recorder, entries: Sequence[Any], by: Sequence[Node], mode: str = "auto") -> np.ndarray:
+    """The matrix of derivatives d entries / d by, shape (len(entries), len(by)).
+
+    mode   "forward" a column at a time, "reverse" a row at a time, "auto" the side with fewer passes
+    """
+    if mode == "auto":
+        mode = "reverse" if len(entries) < len(by) else "forward"
+    matrix = np.zeros((len(entries), len(by)), dtype=object)
+    if mode == "forward":
+        for j, node in enumerate(by):
+            matrix[:, j] = forward(recorder, entries, {node: 1})
+    elif mode == "reverse":
+        for i, entry in enumerate(entries):
+            matrix[i, :] = reverse(recorder, entry, by)
+    else:
+        raise ValueError(f"mode {mode!r} asked for; there are 'forward', 'reverse' and 'auto'")
+    return matrix

@@ -1,0 +1,88 @@
+"""A node is one scalar operation of the tape; Python's operators on nodes record new ones."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from numbers import Number
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from symdyn.tape.recorder import Recorder
+
+# What a value depends on, as bits; a node's mask is the union over its arguments.
+PARAMETER, TIME, COORDINATE, SPEED, STATE, INPUT, ACCELERATION, SEED = (1 << k for k in range(8))
+
+
+class Node:
+    """One recorded scalar: an operation with its arguments, or a leaf (an input of the tape).
+
+    Nodes are made by a Recorder only, one per distinct operation, so that `is` means equal.
+    """
+
+    __slots__ = ("recorder", "op", "args", "index", "mask", "section")
+
+    def __init__(self, recorder: Recorder, op: str, args: tuple, index: int, mask: int, section: str) -> None:
+        self.recorder = recorder
+        self.op = op
+        self.args = args
+        self.index = index
+        self.mask = mask
+        self.section = section
+
+    def __add__(self, other: Any) -> Any:
+        return self.recorder.add(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+
+    def __radd__(self, other: Any) -> Any:
+        return self.recorder.add(other, self) if isinstance(other, Number) else NotImplemented
+
+    def __sub__(self, other: Any) -> Any:
+        return self.recorder.sub(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+
+    def __rsub__(self, other: Any) -> Any:
+        return self.recorder.sub(other, self) if isinstance(other, Number) else NotImplemented
+
+    def __mul__(self, other: Any) -> Any:
+        return self.recorder.mul(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+
+    def __rmul__(self, other: Any) -> Any:
+        return self.recorder.mul(other, self) if isinstance(other, Number) else NotImplemented
+
+    def __truediv__(self, other: Any) -> Any:
+        return self.recorder.div(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.recorder.div(other, self) if isinstance(other, Number) else NotImplemented
+
+    def __neg__(self) -> Any:
+        return self.recorder.neg(self)
+
+    def __pos__(self) -> Node:
+        return self
+
+    def __pow__(self, exponent: Any) -> Any:
+        return self.recorder.pow(self, exponent) if isinstance(exponent, (Node, Number)) else NotImplemented
+
+    def __repr__(self) -> str:
+        name = self.recorder.names.get(self)
+        return f"<{name or self.index}: {self.op}{self.args!r}>" if self.op != "leaf" else f"<{self.args[1]}>"
+
+
+def exact(value: Any) -> int | Fraction:
+    """The number as an exact rational, so that folding constants never rounds.
+
+    Raises ValueError for NaN and infinity.
+    """
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, Fraction):
+        return value.numerator if value.denominator == 1 else value
+    try:
+        fraction = Fraction(value.item() if hasattr(value, "item") else value)
+    except (OverflowError, ValueError) as error:
+        raise ValueError(f"a constant of the equations must be a finite real number, found {value!r}") from error
+    return fraction.numerator if fraction.denominator == 1 else fraction
+
+
+def is_zero(value: Any) -> bool:
+    """True for a structural zero."""
+    return not isinstance(value, Node) and value == 0

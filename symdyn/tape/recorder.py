@@ -1,0 +1,232 @@
+"""The recorder: writes each operation down once, folds what is structurally simple, keeps names and sections.
+
+Folding is exact (rational arithmetic), and a sign is moved outwards, so that a - b and b - a, x and -x share
+one assignment; a change of sign costs nothing in the emitted code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from math import isqrt
+from typing import Any
+
+import numpy as np
+
+from symdyn.tape.node import Node, exact
+from symdyn.tape.ops import OPERATIONS
+
+_ODD = {"sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "sign", "erf"}
+_SELF_EXPLAINING = {"leaf", "neg", "sin", "cos"}
+_EVEN = {"cos", "cosh", "abs"}
+_AT_ZERO = {"sin": 0, "tan": 0, "asin": 0, "atan": 0, "sinh": 0, "tanh": 0, "asinh": 0, "atanh": 0, "sqrt": 0,
+            "sign": 0, "abs": 0, "cos": 1, "cosh": 1, "exp": 1, "floor": 0, "ceil": 0, "erf": 0}
+
+
+class Recorder:
+    """Makes nodes; equal operations are one node (value numbering).
+
+    names    node -> the name of the quantity it is, given while deriving
+    checks   node -> reason: values that must be positive, such as pivots of the mass matrix
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple, Node] = {}
+        self._count = 0
+        self._section = ""
+        self.names: dict[Node, str] = {}
+        self.checks: dict[Node, str] = {}
+
+    # -- leaves, names, sections
+
+    def leaf(self, name: str, mask: int) -> Node:
+        """An input of the tape; mask tells its kind (node.COORDINATE, ...)."""
+        return self._make("leaf", (mask, name), mask)
+
+    def name(self, name: str, value: Any, axes: bool = False) -> Any:
+        """Give the entries of a scalar, vector or matrix a name, and return it unchanged.
+
+        axes   number the entries x, y, z instead of 1, 2, 3
+        """
+        array = np.asarray(value, dtype=object)
+        for position in np.ndindex(array.shape):
+            node = array[position]
+            if isinstance(node, Node) and node.op not in _SELF_EXPLAINING and node not in self.names:
+                suffix = "".join("xyz"[k] for k in position) if axes else "_".join(str(k + 1) for k in position)
+                self.names[node] = f"{name}_{suffix}" if suffix else name
+        return value
+
+    @contextmanager
+    def section(self, title: str) -> Iterator[None]:
+        """What is recorded inside stands under this heading in the emitted code."""
+        outer, self._section = self._section, title
+        yield
+        self._section = outer
+
+    def positive(self, node: Any, reason: str) -> Any:
+        """Demand that a value is positive when it is computed; reason tells what it means if not."""
+        if isinstance(node, Node):
+            self.checks.setdefault(node, reason)
+        return node
+
+    def _make(self, op: str, args: tuple, mask: int) -> Node:
+        key = (op, *args)
+        node = self._known.get(key)
+        if node is None:
+            node = self._known[key] = Node(self, op, args, self._count, mask, self._section)
+            self._count += 1
+        return node
+
+    def _record(self, op: str, *args: Any) -> Node:
+        mask = 0
+        for a in args:
+            if isinstance(a, Node):
+                mask |= a.mask
+        return self._make(op, args, mask)
+
+    # -- arithmetic
+
+    def add(self, a: Any, b: Any) -> Any:
+        if not isinstance(a, Node):
+            a = exact(a)
+            if not isinstance(b, Node):
+                return exact(a + exact(b))
+            a, b = b, a
+        if not isinstance(b, Node):
+            b = exact(b)
+            if b == 0:
+                return a
+            if a.op == "add" and not isinstance(a.args[0], Node):
+                return self.add(a.args[1], exact(a.args[0] + b))
+            return self._record("add", b, a)
+        if a.op == "neg":
+            return self.sub(b, a.args[0])
+        if b.op == "neg":
+            return self.sub(a, b.args[0])
+        if a is b:
+            return self.mul(2, a)
+        return self._record("add", a, b) if a.index < b.index else self._record("add", b, a)
+
+    def sub(self, a: Any, b: Any) -> Any:
+        if not isinstance(b, Node):
+            return self.add(a, -exact(b))
+        if not isinstance(a, Node):
+            return self.add(self.neg(b), a)
+        if b.op == "neg":
+            return self.add(a, b.args[0])
+        if a.op == "neg":
+            return self.neg(self.add(a.args[0], b))
+        if a is b:
+            return 0
+        return self._record("sub", a, b) if a.index < b.index else self.neg(self._record("sub", b, a))
+
+    def mul(self, a: Any, b: Any) -> Any:
+        if not isinstance(a, Node):
+            a = exact(a)
+            if not isinstance(b, Node):
+                return exact(a * exact(b))
+            a, b = b, a
+        if not isinstance(b, Node):
+            b = exact(b)
+            if b == 0:
+                return 0
+            if b == 1:
+                return a
+            if b < 0 or a.op == "neg":
+                return self.neg(self.mul(a, -b)) if b < 0 else self.neg(self.mul(a.args[0], b))
+            if a.op == "mul" and not isinstance(a.args[0], Node):
+                return self.mul(a.args[1], exact(a.args[0] * b))
+            return self._record("mul", b, a)
+        if a.op == "neg":
+            return self.neg(self.mul(a.args[0], b))
+        if b.op == "neg":
+            return self.neg(self.mul(a, b.args[0]))
+        if a is b and a.op == "sqrt":
+            return a.args[0]
+        return self._record("mul", a, b) if a.index < b.index else self._record("mul", b, a)
+
+    def div(self, a: Any, b: Any) -> Any:
+        if not isinstance(b, Node):
+            divisor = exact(b)
+            if divisor == 0:
+                raise ZeroDivisionError("an expression divides by zero")
+            return self.mul(a, exact(1 / Fraction(divisor)))
+        if b.op == "neg":
+            return self.neg(self.div(a, b.args[0]))
+        if isinstance(a, Node):
+            if a.op == "neg":
+                return self.neg(self.div(a.args[0], b))
+            return 1 if a is b else self._record("div", a, b)
+        a = exact(a)
+        if a == 0:
+            return 0
+        return self._record("div", a, b) if a > 0 else self.neg(self._record("div", -a, b))
+
+    def neg(self, a: Any) -> Any:
+        if not isinstance(a, Node):
+            return -exact(a)
+        return a.args[0] if a.op == "neg" else self._record("neg", a)
+
+    def pow(self, base: Any, exponent: Any) -> Any:
+        """Integer powers by repeated squaring, half-integer ones by a square root."""
+        if not isinstance(exponent, Node):
+            exponent = exact(exponent)
+            if exponent < 0:
+                return self.div(1, self.pow(base, -exponent))
+            if isinstance(exponent, Fraction) and exponent.denominator == 2:
+                return self.mul(self.pow(base, exponent.numerator // 2), self.apply("sqrt", base))
+            if isinstance(exponent, int):
+                if not isinstance(base, Node):
+                    return exact(Fraction(exact(base)) ** exponent)
+                result: Any = 1
+                while exponent:
+                    if exponent & 1:
+                        result = self.mul(result, base)
+                    exponent >>= 1
+                    if exponent:
+                        base = self.mul(base, base)
+                return result
+        return self.apply("pow", base, exponent)
+
+    # -- functions
+
+    def apply(self, op: str, *args: Any) -> Any:
+        """Any other operation of the table, with the folding that is exact."""
+        args = tuple(a if isinstance(a, (Node, bool)) else exact(a) for a in args)
+        first = args[0] if args else None
+        if len(args) == 1:
+            if op in _AT_ZERO and not isinstance(first, Node) and first == 0:
+                return _AT_ZERO[op]
+            negative = first.op == "neg" if isinstance(first, Node) else first is not None and first < 0
+            if negative and op in _ODD:
+                return self.neg(self.apply(op, self.neg(first)))
+            if negative and op in _EVEN:
+                return self.apply(op, self.neg(first))
+            if op == "sqrt" and not isinstance(first, Node):
+                root = Fraction(isqrt(Fraction(first).numerator), isqrt(Fraction(first).denominator)) if first >= 0 else 0
+                if root * root == first:
+                    return exact(root)
+        if op == "select":
+            if isinstance(first, bool):
+                return args[1] if first else args[2]
+            if args[1] is args[2] or (not isinstance(args[1], Node) and not isinstance(args[2], Node)
+                                      and args[1] == args[2]):
+                return args[1]
+        if op in ("min", "max") and not any(isinstance(a, Node) for a in args):
+            return min(args) if op == "min" else max(args)
+        if op not in OPERATIONS:
+            raise ValueError(f"unknown operation {op!r}; known: {', '.join(OPERATIONS)}")
+        return self._record(op, *args)
+
+    def sin(self, a: Any) -> Any:
+        return self.apply("sin", a)
+
+    def cos(self, a: Any) -> Any:
+        return self.apply("cos", a)
+
+    def sqrt(self, a: Any) -> Any:
+        return self.apply("sqrt", a)
+
+    def pi(self) -> Node:
+        return self._record("pi")

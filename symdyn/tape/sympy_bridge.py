@@ -1,0 +1,151 @@
+"""Between SymPy and the tape: take expressions over, and expand a tape back into explicit SymPy matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+from sympy.logic.boolalg import BooleanFalse, BooleanTrue
+
+from symdyn.errors import UnsupportedExpression
+from symdyn.tape.node import Node
+from symdyn.tape.ops import OPERATIONS
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.tape import Output, reachable
+
+_FUNCTIONS: dict[type, str] = {getattr(sp, row.sympy): op for op, row in OPERATIONS.items()
+                               if op not in ("add", "sub", "mul", "div", "neg", "pow", "sqrt", "pi", "select",
+                                             "min", "max", "and", "or")}
+_FOLDED = {sp.Min: "min", sp.Max: "max", sp.And: "and", sp.Or: "or"}
+_RECIPROCAL = {sp.sec: "cos", sp.csc: "sin", sp.cot: "tan", sp.sech: "cosh", sp.csch: "sinh", sp.coth: "tanh"}
+
+
+def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Basic, Any],
+                      memory: dict[sp.Basic, Any] | None = None) -> Any:
+    """Record a SymPy expression.
+
+    leaves   what each free symbol stands for: a node or a number
+    memory   results already recorded, shared between calls
+    Raises UnsupportedExpression naming the part that has no counterpart on the tape.
+    """
+    memory = {} if memory is None else memory
+
+    def take(e: sp.Basic) -> Any:
+        known = memory.get(e)
+        if known is None:
+            known = memory[e] = convert(e)
+        return known
+
+    def fold(op: str, args: tuple) -> Any:
+        result = take(args[0])
+        for a in args[1:]:
+            result = recorder.apply(op, result, take(a))
+        return result
+
+    def convert(e: sp.Basic) -> Any:
+        if e in leaves:
+            return leaves[e]
+        if isinstance(e, (sp.Integer, sp.Rational)):
+            return Fraction(int(e.p), int(e.q)) if e.q != 1 else int(e.p)
+        if isinstance(e, sp.Float):
+            return Fraction(float(e))
+        if isinstance(e, sp.Add):
+            total: Any = 0
+            for a in e.args:
+                total = recorder.add(total, take(a))
+            return total
+        if isinstance(e, sp.Mul):
+            over, under = [], []
+            for a in e.args:
+                if isinstance(a, sp.Pow) and a.exp.is_Number and a.exp.is_negative:
+                    under.append(recorder.pow(take(a.base), take(-a.exp)))
+                else:
+                    over.append(take(a))
+            product: Any = 1
+            for factor in over:
+                product = recorder.mul(product, factor)
+            for factor in under:
+                product = recorder.div(product, factor)
+            return product
+        if isinstance(e, sp.Pow):
+            if e.base is sp.S.Exp1:
+                return recorder.apply("exp", take(e.exp))
+            return recorder.pow(take(e.base), take(e.exp))
+        if isinstance(e, sp.Piecewise):
+            return piecewise(e)
+        if isinstance(e, sp.UnevaluatedExpr):
+            return take(e.args[0])
+        if e is sp.S.Pi:
+            return recorder.pi()
+        if e is sp.S.Exp1:
+            return recorder.apply("exp", 1)
+        if isinstance(e, (BooleanTrue, BooleanFalse)):
+            return bool(e)
+        for kind, op in _FOLDED.items():
+            if isinstance(e, kind):
+                return fold(op, e.args)
+        for kind, op in _RECIPROCAL.items():
+            if isinstance(e, kind):
+                return recorder.div(1, recorder.apply(op, take(e.args[0])))
+        if isinstance(e, sp.Heaviside):
+            x = take(e.args[0])
+            half = take(e.args[1]) if len(e.args) > 1 else Fraction(1, 2)
+            return recorder.apply("select", recorder.apply("gt", x, 0), 1,
+                                  recorder.apply("select", recorder.apply("eq", x, 0), half, 0))
+        operation = _FUNCTIONS.get(type(e))
+        if operation is None:
+            raise UnsupportedExpression(
+                f"{e} ({type(e).__name__}) has no counterpart in generated code; "
+                "use elementary functions, Piecewise, Min, Max, Abs, sign, atan2, floor or Heaviside")
+        return recorder.apply(operation, *[take(a) for a in e.args])
+
+    def piecewise(e: sp.Piecewise) -> Any:
+        if e.args[-1].cond is not sp.S.true:
+            raise UnsupportedExpression(
+                f"{e} is not defined everywhere; end the Piecewise with (value, True)")
+        result = take(e.args[-1].expr)
+        for value, condition in reversed(e.args[:-1]):
+            result = recorder.apply("select", take(condition), take(value), result)
+        return result
+
+    return take(sp.sympify(expression) if isinstance(expression, (int, float)) else expression)
+
+
+def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node, sp.Expr] | None = None) -> Any:
+    """The output as explicit SymPy: a scalar expression, or a matrix (column for a vector).
+
+    symbols   leaf -> the user's symbol
+    named     nodes to leave as they are, under these symbols
+    """
+    done: dict[Node, Any] = dict(named or {})
+    for node in reachable(output.entries):
+        if node in done:
+            continue
+        if node.op == "leaf":
+            done[node] = symbols[node]
+        else:
+            done[node] = _expression(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
+    entries = [done[e] if isinstance(e, Node) else number(e) for e in output.entries]
+    if output.shape == ():
+        return entries[0]
+    rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
+    return sp.Matrix(rows, columns, entries)
+
+
+def number(value: Any) -> Any:
+    """Short fractions as fractions, long ones as the decimal number they stand for."""
+    if isinstance(value, bool):
+        return sp.true if value else sp.false
+    value = Fraction(value)
+    if value.denominator > 10**6 or value.denominator > 1000 and value.denominator & (value.denominator - 1) == 0:
+        return sp.Float(repr(float(value)))
+    return sp.Rational(value.numerator, value.denominator)
+
+
+def _expression(op: str, a: list) -> Any:
+    arithmetic = {"add": lambda: a[0] + a[1], "sub": lambda: a[0] - a[1], "mul": lambda: a[0] * a[1],
+                  "div": lambda: a[0] / a[1], "neg": lambda: -a[0], "pow": lambda: a[0] ** a[1],
+                  "pi": lambda: sp.pi, "select": lambda: sp.Piecewise((a[1], a[0]), (a[2], True))}
+    return arithmetic[op]() if op in arithmetic else getattr(sp, OPERATIONS[op].sympy)(*a)

@@ -1,0 +1,146 @@
+"""The tape: named outputs and, reached from them, the steps that compute them.
+
+A tape never changes. Dead code is what its outputs do not reach; a pass returns a new tape.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from symdyn.tape.node import PARAMETER, Node
+from symdyn.tape.ops import OPERATIONS
+from symdyn.tape.recorder import Recorder
+
+
+@dataclass(frozen=True)
+class Output:
+    """A scalar, vector or matrix of the tape: name, shape, entries in row-major order (nodes or numbers)."""
+
+    name: str
+    shape: tuple[int, ...]
+    entries: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, name: str, value: Any) -> Output:
+        array = np.asarray(value, dtype=object)
+        return cls(name, array.shape, tuple(array.ravel().tolist()))
+
+    def array(self) -> np.ndarray:
+        result = np.empty(len(self.entries), dtype=object)
+        result[:] = self.entries
+        return result.reshape(self.shape)
+
+
+@dataclass(frozen=True)
+class Tape:
+    """Straight-line code for `outputs`, recorded by `recorder`."""
+
+    recorder: Recorder
+    outputs: Mapping[str, Output]
+
+    @classmethod
+    def of(cls, recorder: Recorder, **values: Any) -> Tape:
+        """A tape from arrays of nodes and numbers, by output name."""
+        return cls(recorder, {name: Output.of(name, value) for name, value in values.items()})
+
+    def prune(self, names: Iterable[str]) -> Tape:
+        """Keep the named outputs only; what no other output needs is gone with them."""
+        missing = [n for n in names if n not in self.outputs]
+        if missing:
+            raise KeyError(f"the tape has no output {', '.join(missing)}; it has {', '.join(self.outputs)}")
+        return Tape(self.recorder, {name: self.outputs[name] for name in names})
+
+    def merge(self, other: Tape) -> Tape:
+        """Outputs of both tapes of one recorder, sharing their common steps."""
+        return Tape(self.recorder, {**self.outputs, **other.outputs})
+
+    @cached_property
+    def steps(self) -> tuple[Node, ...]:
+        """Every node the outputs reach, arguments before use."""
+        return reachable(entry for output in self.outputs.values() for entry in output.entries)
+
+    @cached_property
+    def inputs(self) -> tuple[Node, ...]:
+        """The leaves that occur."""
+        return tuple(node for node in self.steps if node.op == "leaf")
+
+    @cached_property
+    def running(self) -> tuple[Node, ...]:
+        """Steps that must be evaluated at every state: those that depend on more than parameters."""
+        return tuple(n for n in self.steps if n.mask & ~PARAMETER and n.op not in ("leaf", "neg"))
+
+    @cached_property
+    def prologue(self) -> tuple[Node, ...]:
+        """Steps that depend on parameters only; they run once per simulation."""
+        return tuple(n for n in self.steps if n.mask == PARAMETER and n.op not in ("leaf", "neg"))
+
+    @cached_property
+    def hoisted(self) -> tuple[Node, ...]:
+        """The results of the prologue that the running steps or the outputs use, in order of recording."""
+        used: dict[Node, None] = {}
+        for node in self.running:
+            for a in node.args:
+                core = unsigned(a)
+                if isinstance(core, Node) and core.mask == PARAMETER and core.op != "leaf":
+                    used[core] = None
+        for output in self.outputs.values():
+            for entry in output.entries:
+                core = unsigned(entry)
+                if isinstance(core, Node) and core.mask == PARAMETER and core.op != "leaf":
+                    used[core] = None
+        for node in self.prologue:
+            if node in self.recorder.checks:
+                used[node] = None
+        return tuple(sorted(used, key=lambda n: n.index))
+
+    def count(self) -> dict[str, int]:
+        """Operations of one evaluation after hoisting, by kind; one each for + - * / sqrt sin cos."""
+        return _count(self.running)
+
+    def count_prologue(self) -> dict[str, int]:
+        """Operations of the prologue, which runs once per set of parameters."""
+        return _count(self.prologue)
+
+    @property
+    def operations(self) -> int:
+        """The number of operations of one evaluation after hoisting."""
+        return sum(self.count().values())
+
+    def longest_chain(self) -> int:
+        """Length of the longest chain of running operations that wait for each other."""
+        depth: dict[Node, int] = {}
+        for node in self.steps:
+            if node.mask & ~PARAMETER and node.op != "leaf":
+                below = max((depth.get(a, 0) for a in node.args if isinstance(a, Node)), default=0)
+                depth[node] = below + (node.op != "neg")
+        return max(depth.values(), default=0)
+
+
+def unsigned(value: Any) -> Any:
+    """The value without its change of sign."""
+    return value.args[0] if isinstance(value, Node) and value.op == "neg" else value
+
+
+def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
+    """Every node that the entries reach, in order of recording."""
+    seen: set[Node] = set()
+    stack = [e for e in entries if isinstance(e, Node)]
+    while stack:
+        node = stack.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        stack.extend(a for a in node.args if isinstance(a, Node) and a not in seen)
+    return tuple(sorted(seen, key=lambda n: n.index))
+
+
+def _count(nodes: Iterable[Node]) -> dict[str, int]:
+    counter = Counter(OPERATIONS[n.op].kind for n in nodes)
+    counter.pop("free", None)
+    return dict(sorted(counter.items()))

@@ -1,0 +1,1 @@
+"""Independent derivations that the tests compare with."""

