@@ -16,13 +16,14 @@ _HOME = {
     "symdyn.model.joints": ("Cylindrical", "Fixed", "Free", "Planar", "Prismatic", "Revolute", "Spherical", "Universal"),
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
     "symdyn.model.system": ("System",),
+    "symdyn.formulation.explicit": ("embedding",),
     "symdyn.errors": ("CompileError", "CompilerNotFound", "ModelError", "ModelWarning", "SymdynError",
                       "UnsupportedExpression"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = ("systems",)
 
-__all__ = [*_WHERE, *_PACKAGES, "t"]  # noqa: PLE0604
+__all__ = [*_WHERE, *_PACKAGES, "t"]
 
 
 def __getattr__(name: str) -> Any:

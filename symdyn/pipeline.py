@@ -20,6 +20,7 @@ import numpy as np
 from symdyn.backend.source import Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.skipped import skipped
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
@@ -58,7 +59,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
-    return render(_content(equations, names), backend, templates, standalone, integrator)
+    return render(_content(equations, names, standalone), backend, templates, standalone, integrator)
 
 
 def has_function(equations: Equations, name: str) -> bool:
@@ -132,19 +133,20 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
             for q in equations.quantities if q.startswith("output_")]
 
 
-def _content(equations: Equations, names: Sequence[str]) -> Content:
+def _content(equations: Equations, names: Sequence[str], standalone: bool) -> Content:
     symbols = equations.symbols
-    tapes = {name: _tape(equations, name) for name in names}
+    tapes = {name: function_tape(equations, name) for name in names}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [s.name for s in symbols.states], "ud": [f"{s.name}_dot" for s in symbols.speeds],
               "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
     return Content(equations.name, equations.formulation, tapes, {n: FUNCTIONS[n][1] for n in names}, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
-                   _by_name(symbols.initial), outputs, equations.notes)
+                   _by_name(symbols.initial), outputs, skipped(equations) if standalone else ())
 
 
-def _tape(equations: Equations, name: str) -> Tape:
+def function_tape(equations: Equations, name: str) -> Tape:
+    """The tape behind a function of a module."""
     if name != "outputs":
         return equations.tape(FUNCTIONS[name][0])
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]

@@ -7,6 +7,7 @@ k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,8 @@ from symdyn.formulation.newton_euler import inverse_dynamics, inward
 from symdyn.formulation.tree import GROUND, Tree, build
 from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed
+from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model
-from symdyn.model.symbols import time
 from symdyn.spatial.vectors import zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import Node
@@ -98,7 +99,7 @@ def embed(model: Model) -> EmbeddedEquations:
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
                       model.parameters, model.defaults, model.initial, model.units, model.duration)
     return EmbeddedEquations(model.name, "embedding", model.planar, symbols, recorder, algebra.leaves,
-                             derivation.quantities(), tuple(_notes(tree)))
+                             derivation.quantities(), tuple(_notes(model)), _unit_groups(model))
 
 
 class EmbeddedTree(Motion):
@@ -116,7 +117,7 @@ class EmbeddedTree(Motion):
     def quantities(self) -> dict[str, Any]:
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
                "positions": self.positions, "frames": self.frames, "energy": self.energy, "power": self.power,
-               **{f"output_{o.name}": lambda o=o: self.output(o.value) for o in self.model.outputs}}
+               **{f"output_{o.name}": partial(self.output, o.value) for o in self.model.outputs}}
         return {**super().quantities(), **own}
 
     # -- the equations
@@ -275,19 +276,10 @@ def _zero(value: Any) -> bool:
     return not isinstance(value, Node) and value == 0
 
 
-def _notes(tree: Tree) -> list[str]:
-    fixed = [j.name for j in tree.model.joints if isinstance(j, Fixed)]
-    notes = []
-    if fixed:
-        notes.append(f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation")
-    if time not in {s for j in tree.model.joints for q in j.coordinates for s in q.free_symbols} and not any(
-            _mentions_time(load) for load in tree.model.loads):
-        notes.append("nothing depends on time: the generated functions take no t")
-    return notes
+def _notes(model: Model) -> list[str]:
+    fixed = [j.name for j in model.joints if isinstance(j, Fixed)]
+    return [f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation"] if fixed else []
 
 
-def _mentions_time(load: Any) -> bool:
-    values = [*getattr(load, "force", []), *getattr(load, "torque", []), *getattr(load, "values", [])]
-    return any(time in v.free_symbols for v in values)
-
-
+def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:
+    return tuple(tuple(j.coordinates[-4:]) for j in model.joints if isinstance(getattr(j, "orientation", None), EulerParameters))

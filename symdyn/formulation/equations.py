@@ -38,7 +38,8 @@ class Equations:
     name         of the mechanism; formulation: how it was derived
     leaves       symbol -> leaf of the tape
     quantities   name -> function that records it; planar: 3 rows a body instead of 6
-    notes        what was skipped, and why
+    notes        what the formulation left out, and why
+    unit_groups  coordinates that form a unit vector (Euler parameters)
     """
 
     name: str
@@ -49,6 +50,7 @@ class Equations:
     leaves: Mapping[sp.Basic, Any]
     quantities: Mapping[str, Callable[[], Any]]
     notes: tuple[str, ...] = ()
+    unit_groups: tuple[tuple[sp.Symbol, ...], ...] = ()
     simplify_seconds: float = 10.0
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[str, Any] = field(default_factory=dict)
@@ -97,11 +99,11 @@ class Equations:
 
         return compile_equations(self, backend, **options)
 
-    def verify(self, states: int = 5, digits: int = 30) -> Any:
-        """Prove the equations sound by identities at random states; see symdyn.verify."""
-        from symdyn.verify import verify
+    def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Any:
+        """Prove the equations sound by identities at random states; see symdyn.verification.verify."""
+        from symdyn.verification import verify
 
-        return verify(self, states, digits)
+        return verify(self, states, digits, params)
 
     def __repr__(self) -> str:
         s = self.symbols

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,13 +35,13 @@ class Motion:
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
-        recorded = {"M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
+        recorded: dict[str, Callable[[], Any]] = {"M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
                     "accelerations": self.accelerations, "rates": lambda: _array(self.rates), "rhs": self.rhs,
                     "jacobian_x": lambda: self.jacobian(self.x()),
                     "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
                     "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
-        return {name: (lambda name=name: self.recall(name)) if name in ("M_tilde", "bias", "accelerations") else record
-                for name, record in recorded.items()}
+        shared = ("M_tilde", "bias", "accelerations")
+        return {name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()}
 
     def M_tilde(self) -> np.ndarray:
         raise NotImplementedError
@@ -97,10 +98,10 @@ class Motion:
         ud, factors = self.recall("accelerations"), self.recall("factors")
         with self.algebra.section("Jacobian"):
             residual = self.inverse_dynamics()
-            partial = jacobian(recorder, residual.tolist(), by)
-            at = {leaf: value for leaf, value in zip(self.speed_rates, ud, strict=True)}
-            partial = _array(substitute(tuple(partial.ravel()), at, recorder)).reshape(partial.shape)
-            columns = [factors.solve(-partial[:, j]) for j in range(len(by))]
+            derivatives = jacobian(recorder, residual.tolist(), by)
+            at = dict(zip(self.speed_rates, ud, strict=True))
+            derivatives = _array(substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
+            columns = [factors.solve(-derivatives[:, j]) for j in range(len(by))]
             middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
             top = _rows(recorder, self.rates, by)
             bottom = _rows(recorder, self.state_rates(), by)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.spatial.vectors import Inertia, cross, dot, zeros
+from symdyn.spatial.vectors import Inertia, Vector, cross, dot, zeros
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def rates_matrix(omega: np.ndarray, alpha: np.ndarray) -> tuple[np.ndarray, np.n
     return U, P
 
 
-def outward(tree: Tree, w_dot: Sequence[Any], a_0: np.ndarray) -> list[LinkMotion]:
+def outward(tree: Tree, w_dot: Vector, a_0: np.ndarray) -> list[LinkMotion]:
     """Motion of every link for joint accelerations w_dot (n_w,), the base accelerating with a_0 (3,), n-frame.
 
     With a_0 = -gravity the weight is part of the inertial forces.
@@ -75,7 +75,7 @@ def outward(tree: Tree, w_dot: Sequence[Any], a_0: np.ndarray) -> list[LinkMotio
 
 def inertial_wrench(inertia: Inertia, motion: LinkMotion) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment about the link's origin that its motion needs: f = m a + U h, n = I alpha + omega x I omega + h x a."""
-    m, h, I = inertia.m, inertia.h, inertia.I  # noqa: E741
+    m, h, I = inertia.m, inertia.h, inertia.I
     U, P = motion.U, motion.products
     f = m * motion.a + U @ h
     al = motion.alpha
@@ -106,7 +106,7 @@ def inward(tree: Tree, wrenches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.
     return tau
 
 
-def inverse_dynamics(tree: Tree, w_dot: Sequence[Any], a_0: np.ndarray,
+def inverse_dynamics(tree: Tree, w_dot: Vector, a_0: np.ndarray,
                      applied: Sequence[tuple[np.ndarray, np.ndarray]] | None = None) -> np.ndarray:
     """Joint forces (n_w,) for joint accelerations w_dot, less what the applied wrenches give."""
     motions = outward(tree, w_dot, a_0)
@@ -122,7 +122,7 @@ def inverse_dynamics(tree: Tree, w_dot: Sequence[Any], a_0: np.ndarray,
     return inward(tree, wrenches)
 
 
-def _times(S: np.ndarray, values: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
+def _times(S: np.ndarray, values: Vector) -> tuple[np.ndarray, np.ndarray]:
     total = zeros(6)
     for column, value in enumerate(values):
         total = total + S[:, column] * value

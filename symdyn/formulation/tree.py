@@ -196,7 +196,7 @@ class _Builder:
             self.inertias[pose.link] = total
 
 
-def _symmetric(I: np.ndarray) -> np.ndarray:  # noqa: E741
+def _symmetric(I: np.ndarray) -> np.ndarray:
     result = I.copy()
     for i in range(3):
         for j in range(i):

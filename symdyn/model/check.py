@@ -83,7 +83,7 @@ class _Checker:
         where = f"body {body.name!r}"
         if body.mass.is_number and body.mass < 0:
             self.faults.append(f"{where} has the mass {body.mass} kg; pass zero or a positive mass")
-        I = body.inertia  # noqa: E741
+        I = body.inertia
         difference = I - I.T
         if any(e != 0 and abs(numeric(e)) > 1e-12 * max(abs(numeric(a)) for a in I) for e in difference):
             i, j = next((i, j) for i in range(3) for j in range(3) if difference[i, j] != 0)

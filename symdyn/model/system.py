@@ -100,7 +100,7 @@ class System:
         p = self._faults.vector(position, "move_ground: position", self.planar)
         moving = Free("ground_motion", "inertial", "ground", [*p, *angles], EulerAngles(sequence))
         self._faults.extend(moving.faults)
-        if any(not isinstance(c, sp.Expr) or isinstance(c, sp.Symbol) and c.name != "t" for c in moving.coordinates):
+        if any(not isinstance(c, sp.Expr) or (isinstance(c, sp.Symbol) and c.name != "t") for c in moving.coordinates):
             free = [str(c) for c in moving.coordinates if isinstance(c, sp.Symbol)]
             self._faults.append(f"move_ground was given {', '.join(free)}; pass given functions of t")
         self.ground_motion = moving

@@ -68,7 +68,7 @@ class _Run:
                 try:
                     np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, np.ctypeslib.as_array(x, (n_x,)).copy())
                     return 0
-                except BaseException as error:  # noqa: BLE001 - must not cross the C frames; raised again after them
+                except BaseException as error:
                     self.trouble.append(error)
                     return 1
 

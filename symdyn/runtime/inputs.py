@@ -62,7 +62,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(take(given, names, "inputs", zeros, owner))
     parts = {str(getattr(key, "name", key)): value for key, value in given.items()}
     varying = {n: v for n, v in parts.items() if callable(v) or isinstance(v, tuple)}
-    constant = take({n: v for n, v in parts.items() if n not in varying} | {n: 0.0 for n in varying}, names, "inputs",
+    constant = take({n: v for n, v in parts.items() if n not in varying} | dict.fromkeys(varying, 0.0), names, "inputs",
                     zeros, owner)
     if not varying:
         return Inputs(constant)

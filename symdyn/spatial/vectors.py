@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+Vector = Sequence[Any] | np.ndarray
+
 
 def vector(*components: Any) -> np.ndarray:
     """A vector of any scalars."""
@@ -26,12 +28,12 @@ def identity() -> np.ndarray:
     return np.array(((1, 0, 0), (0, 1, 0), (0, 0, 1)), dtype=object)
 
 
-def cross(a: Sequence[Any], b: Sequence[Any]) -> np.ndarray:
+def cross(a: Vector, b: Vector) -> np.ndarray:
     """a x b."""
     return vector(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+def dot(a: Vector, b: Vector) -> Any:
     """a . b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -42,7 +44,7 @@ class Inertia:
 
     m: Any
     h: np.ndarray
-    I: np.ndarray  # noqa: E741
+    I: np.ndarray
 
     def __add__(self, other: Inertia) -> Inertia:
         return Inertia(self.m + other.m, self.h + other.h, self.I + other.I)
@@ -55,7 +57,7 @@ class Inertia:
         h = R @ self.h
         rotated = R @ self.I
         g = h + self.m * p
-        I = zeros(3, 3)  # noqa: E741
+        I = zeros(3, 3)
         # -( [h][p] + [p][g] ) = (h.p + p.g) 1 - (p h^T + g p^T)
         hp, pg = [h[k] * p[k] for k in range(3)], [p[k] * g[k] for k in range(3)]
         both = [hp[k] + pg[k] for k in range(3)]

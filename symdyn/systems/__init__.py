@@ -31,7 +31,7 @@ _CATALOGUE = {
     "puma560": "puma:puma560",
 }
 
-__all__ = [*_CATALOGUE, "get", "names"]  # noqa: PLE0604
+__all__ = [*_CATALOGUE, "get", "names"]
 
 
 def names() -> list[str]:

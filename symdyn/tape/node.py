@@ -19,7 +19,7 @@ class Node:
     Nodes are made by a Recorder only, one per distinct operation, so that `is` means equal.
     """
 
-    __slots__ = ("recorder", "op", "args", "index", "mask", "section")
+    __slots__ = ("args", "index", "mask", "op", "recorder", "section")
 
     def __init__(self, recorder: Recorder, op: str, args: tuple, index: int, mask: int, section: str) -> None:
         self.recorder = recorder

@@ -139,7 +139,7 @@ def number(value: Any) -> Any:
     if isinstance(value, bool):
         return sp.true if value else sp.false
     value = Fraction(value)
-    if value.denominator > 10**6 or value.denominator > 1000 and value.denominator & (value.denominator - 1) == 0:
+    if value.denominator > 10**6 or (value.denominator > 1000 and value.denominator & (value.denominator - 1) == 0):
         return sp.Float(repr(float(value)))
     return sp.Rational(value.numerator, value.denominator)
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion
-from symdyn.spatial.vectors import zeros
 from symdyn.model.joints.spherical import Orientation, orientation_units, rotation_motion, rotation_rates
 from symdyn.model.orientation import EulerAngles
+from symdyn.spatial.vectors import zeros
 
 
 class Free(Joint):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-
 from symdyn.model.joints.base import Joint, JointMotion, turn
 from symdyn.spatial.vectors import zeros
 

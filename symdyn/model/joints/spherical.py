@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion, turn
-from symdyn.spatial.vectors import cross, zeros
 from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.spatial.vectors import cross, zeros
 
 Orientation = EulerAngles | EulerParameters
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))

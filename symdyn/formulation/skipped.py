@@ -1,0 +1,63 @@
+"""What a scene does not need and therefore does not get, in sentences: read off the tape, not remembered beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.tape.node import INPUT, PARAMETER, TIME, Node
+
+
+def skipped(equations: Equations) -> list[str]:
+    """One sentence for each thing that was left out of the right-hand side, and why."""
+    notes = list(equations.notes)
+    tape = equations.tape("rhs")
+    kinds = 0
+    for leaf in tape.inputs:
+        kinds |= leaf.mask
+    if not kinds & TIME:
+        notes.append("time: nothing depends on t, so no function takes it")
+    if not kinds & INPUT:
+        notes.append("inputs: there are none")
+    M = equations.quantity("M_tilde")
+    notes += _mass_matrix(M)
+    k = equations.quantity("k_tilde")
+    if not any(isinstance(e, Node) for e in k):
+        notes.append("k_tilde: zero by structure")
+    if tape.prologue:
+        notes.append(f"{sum(tape.count_prologue().values())} operations on parameters only: hoisted into the prologue, "
+                     "run once a simulation")
+    return notes
+
+
+def _mass_matrix(M: np.ndarray) -> list[str]:
+    n = len(M)
+    notes = []
+    entries = [M[i, j] for i in range(n) for j in range(i + 1)]
+    if n and all(not isinstance(e, Node) or not e.mask & ~PARAMETER for e in entries):
+        notes.append("factorization: the mass matrix is constant and is factorized once, in the prologue")
+    zero = sum(1 for e in entries if not isinstance(e, Node) and e == 0)
+    if zero:
+        notes.append(f"{zero} of the {len(entries)} entries of the mass matrix (symmetric ones once): zero by structure, "
+                     "and so left out of its factors")
+    parts = _components(M)
+    if len(parts) > 1:
+        groups = "; ".join(", ".join(str(k + 1) for k in part) for part in parts[:6])
+        notes.append(f"coupling: speeds {groups}{'; ...' if len(parts) > 6 else ''} do not act on each other through the "
+                     "mass matrix and are solved for separately")
+    return notes
+
+
+def _components(M: np.ndarray) -> list[list[int]]:
+    """Sets of speeds that the mass matrix couples."""
+    left = list(range(len(M)))
+    parts = []
+    while left:
+        part = [left.pop(0)]
+        for k in part:
+            for j in list(left):
+                if isinstance(M[k, j], Node) or M[k, j] != 0:
+                    left.remove(j)
+                    part.append(j)
+        parts.append(sorted(part))
+    return parts

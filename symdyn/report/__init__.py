@@ -1,0 +1,1 @@
+"""For people: simplified and typeset equations, and the report of what was generated."""

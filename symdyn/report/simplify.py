@@ -1,0 +1,97 @@
+"""Simplification for printing only, within a time limit; nothing on the way to numbers goes through here."""
+
+from __future__ import annotations
+
+import time as clock
+from typing import Any
+
+import sympy as sp
+from sympy.simplify.fu import TR10i
+
+from symdyn.model.symbols import Rate, Speed
+
+# SymPy's general methods are tried on expressions up to this many operations: their time cannot be bounded.
+_SHORT = 60
+_LONGEST = 4000
+
+
+def simplified(value: Any, seconds: float) -> Any:
+    """An expression or a matrix, entry by entry, as simple as it gets before the time is up; short entries first.
+
+    Every entry is equal to the one given; entries whose turn comes after the limit stay as they are.
+    """
+    deadline = clock.monotonic() + seconds
+    if not isinstance(value, sp.MatrixBase):
+        return _entry(value, deadline)
+    known: dict[sp.Expr, sp.Expr] = {}
+    result = value.copy().as_mutable()
+    for k in sorted(range(len(value)), key=lambda k: sp.count_ops(value[k])):
+        e = value[k]
+        if e not in known:
+            opposite = known.get(-e)
+            known[e] = -opposite if opposite is not None else _entry(e, deadline)
+        result[k] = known[e]
+    return result
+
+
+def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
+    """The shortest of what each method makes of the best so far."""
+    best = e
+    for attempt in (_polynomial, _angle_sums, _by_speeds, sp.factor_terms, _general):
+        if clock.monotonic() > deadline:
+            break
+        candidate = attempt(best)
+        if _length(candidate) < _length(best):
+            best = candidate
+    return best
+
+
+def _polynomial(e: sp.Expr) -> sp.Expr:
+    """Multiply out, with sin^2 + cos^2 = 1 used for each angle the way that leaves fewer terms."""
+    if sp.count_ops(e) > _LONGEST:
+        return e
+    result = sp.expand(e)
+    for angle in sorted({f.args[0] for f in result.atoms(sp.sin, sp.cos)}, key=str):
+        s, c = sp.sin(angle), sp.cos(angle)
+        choices = [result]
+        for square, other in ((s, c), (c, s)):
+            replaced = result.replace(lambda p, f=square: p.is_Pow and p.base == f and p.exp.is_Integer and p.exp >= 2,
+                                      lambda p, f=square, o=other: (1 - o**2) ** (p.exp // 2) * f ** (p.exp % 2))
+            choices.append(sp.expand(replaced))
+        result = min(choices, key=_length)
+    return result
+
+
+def _angle_sums(e: sp.Expr) -> sp.Expr:
+    """cos a cos b - sin a sin b = cos(a + b) and its like, one product of speeds at a time."""
+    terms = _collected(e)
+    return sp.Add(*[factor * TR10i(rest) for factor, rest in terms.items()]) if sp.count_ops(e) < _LONGEST else e
+
+
+def _by_speeds(e: sp.Expr) -> sp.Expr:
+    """Gather what multiplies each product of speeds."""
+    return sp.Add(*[factor * sp.factor_terms(rest) for factor, rest in _collected(e).items()])
+
+
+def _collected(e: sp.Expr) -> dict[sp.Expr, sp.Expr]:
+    """Products of speeds -> their coefficients."""
+    terms: dict[sp.Expr, list[sp.Expr]] = {}
+    for term in sp.Add.make_args(e):
+        speeds: list[sp.Expr] = []
+        rest: list[sp.Expr] = []
+        for factor in sp.Mul.make_args(term):
+            moving = isinstance(factor.as_base_exp()[0], (Rate, Speed))
+            (speeds if moving else rest).append(factor)
+        terms.setdefault(sp.Mul(*speeds), []).append(sp.Mul(*rest))
+    return {factor: sp.Add(*parts) for factor, parts in terms.items()}
+
+
+def _general(e: sp.Expr) -> sp.Expr:
+    return sp.simplify(e) if sp.count_ops(e) <= _SHORT else e
+
+
+def _length(e: sp.Expr) -> tuple[int, int]:
+    """Operations; double and half angles count extra, since mechanisms are read in the angles they are described by."""
+    multiples = sum(1 for f in e.atoms(sp.sin, sp.cos) for a in sp.Add.make_args(f.args[0])
+                    if a.as_coeff_Mul()[0] not in (1, -1))
+    return int(sp.count_ops(e)) + 6 * multiples, len(str(e))

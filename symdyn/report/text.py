@@ -1,0 +1,68 @@
+"""The report of a module: what was generated, what was skipped and why, and how many operations it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.skipped import skipped
+
+
+@dataclass(frozen=True)
+class Row:
+    """Operations of one function: running by kind, in the prologue, longest chain of operations that wait."""
+
+    function: str
+    operations: dict[str, int]
+    prologue: int
+    chain: int
+
+    @property
+    def total(self) -> int:
+        return sum(self.operations.values())
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was generated, what was skipped and why; prints as text."""
+
+    title: str
+    backend: str
+    fallback: str
+    sizes: dict[str, int]
+    rows: tuple[Row, ...]
+    skipped: tuple[str, ...]
+
+    def __str__(self) -> str:
+        lines = [self.title, f"  backend {self.backend}" + (f": {self.fallback}" if self.fallback else "")]
+        lines.append("  " + ", ".join(f"{n} {what}" for what, n in self.sizes.items()))
+        lines.append(f"  {'function':20}{'operations':>11}{'add':>7}{'mul':>7}{'div':>5}{'trig':>6}{'other':>7}{'prologue':>10}"
+                     f"{'longest chain':>15}")
+        for r in self.rows:
+            kinds = [r.operations.get(k, 0) for k in ("add", "mul", "div", "trig")]
+            other = r.total - sum(kinds)
+            lines.append(f"  {r.function:20}{r.total:>11}{kinds[0]:>7}{kinds[1]:>7}{kinds[2]:>5}{kinds[3]:>6}{other:>7}"
+                         f"{r.prologue:>10}{r.chain:>15}")
+        lines.append("  Every function is generated when it is first used, with nothing in it that it does not need.")
+        lines.append("  Skipped:")
+        lines += [f"    {note}" for note in self.skipped]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def report(equations: Equations, backend: str, fallback: str = "") -> Report:
+    """The report of equations on a backend; counts after hoisting, one each for + - * / sqrt sin cos."""
+    from symdyn.pipeline import STANDARD, function_tape, has_function
+
+    rows = []
+    for name in STANDARD:
+        if has_function(equations, name):
+            tape = function_tape(equations, name)
+            rows.append(Row(name, tape.count(), sum(tape.count_prologue().values()), tape.longest_chain()))
+    s = equations.symbols
+    sizes = {"coordinates": len(s.coordinates), "speeds": len(s.speeds), "extra states": len(s.states),
+             "inputs": len(s.inputs), "parameters": len(s.parameters)}
+    return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
+                  tuple(skipped(equations)))

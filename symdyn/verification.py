@@ -1,0 +1,261 @@
+"""Proves equations of motion sound without a reference: identities that must hold at any state, at 30 digits.
+
+A check is a function of a Sample that returns its residual, or None where it does not apply; a new formulation joins by
+naming its quantities alike, a new check by one line in CHECKS.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.model.symbols import time
+from symdyn.tape.differentiate import forward
+from symdyn.tape.evaluate import evaluate
+from symdyn.tape.tape import Tape
+
+
+@dataclass(frozen=True)
+class Check:
+    """One identity: its largest residual over all states, relative to the size of its terms, and what is allowed."""
+
+    name: str
+    residual: float | None
+    tolerance: float
+    remark: str = ""
+
+    @property
+    def passed(self) -> bool | None:
+        """None where the check does not apply."""
+        return None if self.residual is None else bool(self.residual <= self.tolerance)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of one set of equations; prints as a table."""
+
+    name: str
+    states: int
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed is not False for check in self.checks)
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: verified at {self.states} random states"]
+        for c in self.checks:
+            verdict = {True: "ok", False: "FAIL", None: "-"}[c.passed]
+            figure = "" if c.residual is None else f"{c.residual:9.1e}  (allowed {c.tolerance:.0e})"
+            lines.append(f"  {verdict:5}{c.name:62}{figure}{'  ' + c.remark if c.remark else ''}".rstrip())
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+class Sample:
+    """A random state with the values of quantities there, at high precision."""
+
+    def __init__(self, equations: Equations, values: Mapping[str, Any], digits: int, numbers: bool) -> None:
+        self.equations = equations
+        self.values = dict(values)
+        self.digits = digits
+        self.numbers = numbers
+        self.n_u = len(equations.symbols.speeds)
+
+    def has(self, *names: str) -> bool:
+        return all(n in self.equations.quantities for n in names)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.at({})[name]
+
+    def at(self, changes: Mapping[str, Any]) -> _Values:
+        """Quantities at the state with some values changed."""
+        return _Values(self, {**self.values, **changes})
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        return np.array([mpmath.mpf(self.values[s.name]) for s in self.equations.symbols.speeds], dtype=object)
+
+    @cached_property
+    def with_accelerations(self) -> _Values:
+        names = [f"{s.name}_dot" for s in self.equations.symbols.speeds]
+        return self.at(dict(zip(names, self["accelerations"], strict=True)))
+
+
+class _Values:
+    def __init__(self, sample: Sample, values: Mapping[str, Any]) -> None:
+        self.sample = sample
+        self.values = values
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return evaluate(self.sample.equations.tape(name), self.values, self.sample.digits)[name]
+
+
+# -- the checks
+
+
+def symmetric(s: Sample) -> float | None:
+    M = s["M_tilde"]
+    return _relative(M - M.T, M)
+
+
+def positive_definite(s: Sample) -> float | None:
+    """How far the smallest eigenvalue is below zero, relative to the largest."""
+    if not s.numbers:
+        return None
+    values = mpmath.eigsy(mpmath.matrix(s["M_tilde"].tolist()), eigvals_only=True)
+    smallest, largest = min(values), max(values)
+    return 0.0 if smallest > 0 else float(-smallest / largest) if largest > 0 else 1.0
+
+
+def equations_hold(s: Sample) -> float | None:
+    inertial = s["M_tilde"] @ s["accelerations"]
+    k, F = s["k_tilde"], s["F_tilde"]
+    return _relative(inertial + k - F, np.concatenate([inertial, k, F]))
+
+
+def inverse_of_forward(s: Sample) -> float | None:
+    return _relative(s.with_accelerations["inverse_dynamics"], np.concatenate([s["F_tilde"], s["k_tilde"]]))
+
+
+def energy_balance(s: Sample) -> float | None:
+    if not s.has("energy", "power"):
+        return None
+    eq = s.equations
+    seeds = dict(zip([eq.leaves[q] for q in eq.symbols.coordinates], eq.quantity("rates"), strict=True))
+    seeds.update(zip([eq.leaves[u] for u in eq.symbols.speeds], eq.quantity("accelerations"), strict=True))
+    seeds[eq.leaves[time]] = 1
+    rates = forward(eq.recorder, eq.quantity("energy").ravel().tolist(), seeds)
+    tape = Tape.of(eq.recorder, rates=rates, power=eq.quantity("power"))
+    found = evaluate(tape, s.values, s.digits)
+    power = found["power"].ravel()[0]
+    return _relative(np.array([sum(found["rates"]) - power]), np.array([*found["rates"], power]))
+
+
+def kinetic_energy_quadratic(s: Sample) -> float | None:
+    """T(u) + T(-u) - 2 T(0) = u^T M_tilde u"""
+    if not s.has("energy"):
+        return None
+    names = [u.name for u in s.equations.symbols.speeds]
+    T = [s.at({n: sign * s.values[n] for n in names})["energy"][0] for sign in (1, -1, 0)]
+    wanted = s.u @ s["M_tilde"] @ s.u
+    return _relative(np.array([T[0] + T[1] - 2 * T[2] - wanted]), np.array([wanted]))
+
+
+def jacobian_of_positions(s: Sample) -> float | None:
+    """J u against central differences of the positions of the centres of mass along the motion."""
+    if not s.has("positions", "J", "rates"):
+        return None
+    step = mpmath.mpf(10) ** (-s.digits // 3)
+
+    def difference(values: Mapping[str, Any]) -> np.ndarray:
+        rates = s.at(values)["rates"]
+        ends = []
+        for sign in (1, -1):
+            moved = {q.name: mpmath.mpf(s.values[q.name]) + sign * step * rate
+                     for q, rate in zip(s.equations.symbols.coordinates, rates, strict=True)}
+            ends.append(s.at({**values, **moved, "t": mpmath.mpf(s.values["t"]) + sign * step})["positions"])
+        return (ends[0] - ends[1]) / (2 * step)
+
+    at_rest = {u.name: 0 for u in s.equations.symbols.speeds}
+    velocities = difference({}) - difference(at_rest)
+    J = s["J"]
+    if velocities.ndim == 1:
+        found = J @ s.u
+    else:
+        rows = 3 if s.equations.planar else 6
+        picked = [rows * b + k for b in range(len(velocities)) for k in range(2 if s.equations.planar else 3)]
+        found, velocities = (J @ s.u)[picked], velocities[:, :2 if s.equations.planar else 3].ravel()
+    return _relative(found - velocities, velocities)
+
+
+def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
+    """The right-hand side of a compiled module against the tape at high precision, over the condition of M_tilde."""
+    def check(s: Sample) -> float | None:
+        eq = s.equations
+        module = eq.compile(backend=backend)
+        x = [s.values[n.name] for g in (eq.symbols.coordinates, eq.symbols.speeds, eq.symbols.states) for n in g]
+        found = module.rhs(s.values["t"], x, [s.values[p.name] for p in eq.symbols.parameters],
+                           [s.values[i.name] for i in eq.symbols.inputs])
+        M = s["M_tilde"].astype(float)
+        condition = np.linalg.cond(M) if len(M) else 1.0
+        exact = s["rhs"]
+        return _relative(found - exact, exact) / max(1.0, condition)  # type: ignore[operator]
+    return check
+
+
+CHECKS: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
+    ("M_tilde is symmetric", symmetric, 1e-25),
+    ("M_tilde is positive definite", positive_definite, 0.0),
+    ("M_tilde u_dot + k_tilde = F_tilde", equations_hold, 1e-20),
+    ("inverse dynamics of the accelerations gives zero", inverse_of_forward, 1e-20),
+    ("rate of energy equals power of the loads", energy_balance, 1e-20),
+    ("kinetic energy is quadratic in u with M_tilde", kinetic_energy_quadratic, 1e-20),
+    ("J u is the rate of the positions", jacobian_of_positions, 1e-15),
+)
+
+
+def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None,
+           seed: int = 1) -> Verification:
+    """Check equations at random states: coordinates, speeds, states, inputs in [-1, 1], t in [0, 1].
+
+    params   numbers for parameters (by symbol or name); others take their default, else a number in [0.5, 1.5]; then
+             the mass matrix need not be positive definite and is not tested for it
+    Returns a Verification; its `passed` is False if a check failed.
+    """
+    from symdyn.runtime.compiler import find_compiler
+
+    samples = _samples(equations, states, digits, params, seed)
+    checks = [*CHECKS, ("NumPy module agrees with the tape, over the condition", backend_agrees("numpy"), 1e-13)]
+    if find_compiler() is not None:
+        checks.append(("C module agrees with the tape, over the condition", backend_agrees("c"), 1e-13))
+    results = []
+    for name, check, tolerance in checks:
+        with mpmath.workdps(digits + 5):
+            residuals = [check(s) for s in samples]
+        known = [r for r in residuals if r is not None]
+        remark = "" if known else ("parameters without numbers" if check is positive_definite else "does not apply")
+        results.append(Check(name, max(known) if known else None, tolerance, remark))
+    return Verification(f"{equations.name} ({equations.formulation})", states, tuple(results))
+
+
+def _samples(equations: Equations, states: int, digits: int, params: Mapping[Any, float] | None, seed: int) -> list[Sample]:
+    stream = random.Random(seed)
+    symbols = equations.symbols
+    given = {str(getattr(k, "name", k)): float(v) for k, v in {**symbols.defaults, **(params or {})}.items()}
+    numbers = all(p.name in given for p in symbols.parameters)
+    parameters = {p.name: given.get(p.name, stream.uniform(0.5, 1.5)) for p in symbols.parameters}
+    samples = []
+    for _ in range(states):
+        values = {"t": stream.uniform(0, 1), **parameters}
+        for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
+            values.update({s.name: stream.uniform(-1, 1) for s in group})
+        values.update({f"{u.name}_dot": 0.0 for u in symbols.speeds})
+        _on_unit_sphere(equations, values)
+        samples.append(Sample(equations, values, digits, numbers))
+    return samples
+
+
+def _on_unit_sphere(equations: Equations, values: dict[str, Any]) -> None:
+    """Euler parameters have unit norm, to all digits."""
+    for group in equations.unit_groups:
+        parts = [mpmath.mpf(values[q.name]) for q in group]
+        with mpmath.workdps(60):
+            length = mpmath.sqrt(sum(p * p for p in parts))
+            values.update({q.name: p / length for q, p in zip(group, parts, strict=True)})
+
+
+def _relative(difference: np.ndarray, terms: np.ndarray) -> float:
+    """Largest entry of the difference over the largest of its terms."""
+    size = max((abs(float(v)) for v in np.ravel(terms)), default=0.0)
+    error = max((abs(float(v)) for v in np.ravel(difference)), default=0.0)
+    return error / size if size > 0 else error
