@@ -66,7 +66,12 @@ def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
     if name == "outputs":
         return any(q.startswith("output_") for q in equations.quantities)
-    return name in FUNCTIONS and FUNCTIONS[name][0] in equations.quantities
+    return _quantity(name) in equations.quantities
+
+
+def _quantity(name: str) -> str:
+    """The quantity behind a function; any quantity is a function under its own name, too."""
+    return FUNCTIONS[name][0] if name in FUNCTIONS else name
 
 
 def compile_equations(equations: Equations, backend: str | None = None,
@@ -140,7 +145,8 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool) -> Co
               "z": [s.name for s in symbols.states], "ud": [f"{s.name}_dot" for s in symbols.speeds],
               "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
-    return Content(equations.name, equations.formulation, tapes, {n: FUNCTIONS[n][1] for n in names}, groups,
+    titles = {n: FUNCTIONS[n][1] if n in FUNCTIONS else n for n in names}
+    return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else ())
 
@@ -148,7 +154,7 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool) -> Co
 def function_tape(equations: Equations, name: str) -> Tape:
     """The tape behind a function of a module."""
     if name != "outputs":
-        return equations.tape(FUNCTIONS[name][0])
+        return equations.tape(_quantity(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
     whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
     return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})

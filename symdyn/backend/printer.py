@@ -65,11 +65,11 @@ class Printer:
                 return self._infix("+", second, first, _SUM)
             return self._infix("+", first, second, _SUM)
         if op == "sub":
-            return self._infix("-", *args, _SUM)
+            return self._infix("-", args[0], args[1], _SUM)
         if op == "mul":
-            return self._infix("*", *args, _PRODUCT)
+            return self._infix("*", args[0], args[1], _PRODUCT)
         if op == "div":
-            return self._infix("/", *args, _PRODUCT)
+            return self._infix("/", args[0], args[1], _PRODUCT)
         if op in _COMPARE:
             return f"({self._text(args[0])[0]} {_COMPARE[op]} {self._text(args[1])[0]})", _ATOM
         return f"{op}({', '.join(self._text(a)[0] for a in args)})", _ATOM

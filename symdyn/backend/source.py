@@ -114,7 +114,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
     name = identifier(content.name, set())
-    calls = {f.name: ", ".join([g for g in f.arguments] + ["out"]) for f in program.functions}
+    calls = {f.name: ", ".join([*f.arguments, "out"]) for f in program.functions}
     reference = make_reference(content.tapes, groups, content.defaults, calls) if standalone else None
     uses = {f.name: f.arguments for f in program.functions}
 
@@ -140,7 +140,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
                                                                                      *groups["z"]],
         "ud": list(groups["ud"]), "inputs": list(groups["inputs"]), "parameters": list(groups["p"]),
         "defaults": [content.defaults.get(n) for n in groups["p"]],
-        "initial": {n: v for n, v in content.initial.items()},
+        "initial": dict(content.initial),
         "units": {n: content.units.get(n, "") for g in ("q", "u", "z", "inputs", "p") for n in groups[g]},
         "sizes": {"x": n_x, **sizes}, "shapes": {f.name: list(f.shape) for f in program.functions},
         "outputs": [[n, list(shape)] for n, shape in content.outputs], "reasons": list(program.reasons),

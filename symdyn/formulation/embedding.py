@@ -278,8 +278,11 @@ def _zero(value: Any) -> bool:
 
 def _notes(model: Model) -> list[str]:
     fixed = [j.name for j in model.joints if isinstance(j, Fixed)]
-    return [f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation"] if fixed else []
+    if not fixed:
+        return []
+    return [f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation"]
 
 
 def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:
-    return tuple(tuple(j.coordinates[-4:]) for j in model.joints if isinstance(getattr(j, "orientation", None), EulerParameters))
+    joints = [j for j in model.joints if isinstance(getattr(j, "orientation", None), EulerParameters)]
+    return tuple(tuple(j.coordinates[-4:]) for j in joints)

@@ -87,7 +87,10 @@ class Equations:
         return sp.Matrix(len(self.symbols.speeds), 1, [u.dot for u in self.symbols.speeds])
 
     def lambdify(self, name: str) -> Callable[..., np.ndarray]:
-        """One quantity as a NumPy function f(q, u, params, t=0, inputs=()), of one state or of arrays of states."""
+        """One quantity, such as "M_tilde", as a NumPy function f(q, u, params, t=0, inputs=()).
+
+        It takes one state or arrays of states; params as everywhere in Module. Raises SymdynError for an unknown name.
+        """
         return self.compile(backend="numpy").function(name)
 
     def compile(self, backend: str | None = None, **options: Any) -> Any:

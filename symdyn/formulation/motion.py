@@ -35,11 +35,12 @@ class Motion:
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
-        recorded: dict[str, Callable[[], Any]] = {"M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
-                    "accelerations": self.accelerations, "rates": lambda: _array(self.rates), "rhs": self.rhs,
-                    "jacobian_x": lambda: self.jacobian(self.x()),
-                    "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
-                    "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
+        recorded: dict[str, Callable[[], Any]] = {
+            "M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
+            "accelerations": self.accelerations, "rates": lambda: _array(self.rates), "rhs": self.rhs,
+            "jacobian_x": lambda: self.jacobian(self.x()),
+            "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
+            "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
         shared = ("M_tilde", "bias", "accelerations")
         return {name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()}
 

@@ -35,15 +35,15 @@ class Point:
     """
 
     body: Any
-    at: tuple
+    at: Any
     quantity: str = "position"
 
 
 def position(body: Body, at: Any = (0, 0, 0)) -> Point:
     """The position of a point of a body in the n-frame, for `System.add_output`; m."""
-    return Point(body, tuple(at), "position")
+    return Point(body, at, "position")
 
 
 def velocity(body: Body, at: Any = (0, 0, 0)) -> Point:
     """The velocity of a point of a body in the n-frame, for `System.add_output`; m/s."""
-    return Point(body, tuple(at), "velocity")
+    return Point(body, at, "velocity")

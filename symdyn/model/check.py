@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 import keyword
+import math
+import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +18,18 @@ import sympy as sp
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body, Point
 from symdyn.model.faults import Faults
-from symdyn.model.joints import Joint, Revolute
+from symdyn.model.joints import Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, time
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, take_over, time
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
+
+
+# Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
+_NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
 
 
 def check(system: System) -> Model:
@@ -36,29 +44,37 @@ class _Checker:
     def __init__(self, system: System) -> None:
         self.system = system
         self.faults = Faults(system._faults)
-        self.known = {"ground": system.ground, **{b.name: b for b in system.bodies}}
+        self.known = {"ground": system.ground, **{b.name: b for b in system.bodies if isinstance(b.name, str)}}
         self.index = {id(system.ground): -1, **{id(b): k for k, b in enumerate(system.bodies)}}
+        self.joints = list(dict.fromkeys(system.joints))
+        self.loads = [self._at_com(load) for load in system.loads]
 
     def model(self) -> Model:
         s = self.system
         self._names()
         for body in s.bodies:
             self._inertia(body)
-        joints = [*s.joints, *s.loops]
-        for joint in joints:
+        for joint in [*self.joints, *s.loops]:
             self.faults.extend(joint.faults)
         order = self._tree()
+        if s.planar:
+            self._plane()
         self._coordinates()
         self._symbols()
         self._loads()
+        defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
+        initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states],
+                                                       *self.inputs], "coordinate, speed, state or input")
+        duration = self._number(s.duration, "duration")
+        if duration is not None and duration <= 0:
+            self.faults.append(f"duration is {s.duration} s; pass a positive number")
         if self.faults:
             raise ModelError(list(dict.fromkeys(self.faults)), s.name)
         return Model(
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
-            tuple(c for _, _, c in order), s.ground_motion, tuple(s.loads), tuple(s.outputs), tuple(s.states),
+            tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
-            self._numbers(s.defaults, "defaults"), self._numbers(s.initial, "initial"), float(s.duration),
-            self._units())
+            defaults, initial, float(s.duration), self._units())
 
     # -- names
 
@@ -67,15 +83,28 @@ class _Checker:
         if not isinstance(s.name, str) or not s.name.isidentifier() or keyword.iskeyword(s.name):
             self.faults.append(f"the system's name is {s.name!r}; pass an identifier such as 'arm', it names files and "
                                "functions")
+        moving = [] if s.ground_motion is None else [s.ground_motion.name]
         for kind, names in (("bodies", ["ground", *[b.name for b in s.bodies]]),
-                            ("joints", [j.name for j in [*s.joints, *s.loops]]),
-                            ("outputs", [o.name for o in s.outputs]), ("states", [z.symbol.name for z in s.states])):
-            for name, count in Counter(names).items():
-                if count > 1:
+                            ("joints", [*moving, *[j.name for j in [*self.joints, *s.loops]]]),
+                            ("outputs", [o.name for o in s.outputs]), ("states", [z.symbol.name for z in s.states]),
+                            ("loads", [load.label for load in s.loads])):
+            for name, count in Counter(map(_hashable, names)).items():
+                if count > 1 and kind != "loads":
                     self.faults.append(f"{count} {kind} are named {name!r}; give each a name of its own")
+            if kind != "outputs":
+                self._spelling(f"the {kind}", names)
+        for joint, count in Counter(s.joints).items():
+            if count > 1:
+                self.faults.append(f"joint {joint.name!r} was added {count} times; add it once")
         for output in s.outputs:
-            if not str(output.name).isidentifier():
+            if not isinstance(output.name, str) or not output.name.isidentifier():
                 self.faults.append(f"an output is named {output.name!r}; pass an identifier such as 'tip'")
+
+    def _spelling(self, what: str, names: Iterable[Any]) -> None:
+        for name in names:
+            if not isinstance(name, str) or not _NAME.fullmatch(name):
+                self.faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
+                                   "_ . , : + - * / ^ ' # % and brackets")
 
     # -- bodies
 
@@ -110,24 +139,47 @@ class _Checker:
         if isinstance(body, Body):
             if id(body) in self.index:
                 return self.index[id(body)]
-            name = body.name
+            name, what = body.name, "is a body of another system"
         else:
-            if body in self.known:
+            if isinstance(body, str) and body in self.known:
                 return self.index[id(self.known[body])]
-            name = body
-        self.faults.append(f"{where} is {name!r}, which is no body of the system; bodies: {', '.join(self.known)}")
+            name, what = body, "is no body of the system"
+        self.faults.append(f"{where} is {name!r}, which {what}; bodies: {', '.join(self.known)}{self._nearest(name, self.known)}")
         return None
+
+    @staticmethod
+    def _nearest(name: Any, known: Iterable[str]) -> str:
+        near = difflib.get_close_matches(str(name), [k for k in known if k != name], n=1)
+        return f"; did you mean {near[0]!r}?" if near else ""
+
+    def _at_com(self, load: Any) -> Any:
+        """A force without a point acts at the centre of mass."""
+        if not isinstance(load, Force) or load.point is not None:
+            return load
+        body = load.body if isinstance(load.body, Body) else self.known.get(load.body) if isinstance(load.body, str) else None
+        return replace(load, point=sp.ImmutableMatrix(sp.zeros(3, 1)) if body is None else body.com)
 
     def _tree(self) -> list[tuple[Joint, int, int]]:
         s = self.system
         edges: dict[int, tuple[Joint, int]] = {}
-        for joint in s.joints:
+        doubtful: set[int] = set()
+        if not s.bodies:
+            self.faults.append("the system has no bodies; add one with add_body and join it with add_joint")
+        for joint in s.loops:
+            self._resolve(joint.parent, f"joint {joint.name!r}: parent")
+            self._resolve(joint.child, f"joint {joint.name!r}: child")
+        for joint in self.joints:
             parent = self._resolve(joint.parent, f"joint {joint.name!r}: parent")
             child = self._resolve(joint.child, f"joint {joint.name!r}: child")
             if parent is None or child is None:
-                continue
-            if child == -1:
+                doubtful.update(range(len(s.bodies)) if child is None else {child})
+            elif child == -1:
                 self.faults.append(f"joint {joint.name!r}: the ground is its child; exchange parent and child")
+                doubtful.add(parent)
+            elif child == parent:
+                self.faults.append(f"joint {joint.name!r} joins body {s.bodies[child].name!r} to itself; "
+                                   "pass two different bodies")
+                doubtful.add(child)
             elif child in edges:
                 self.faults.append(
                     f"body {s.bodies[child].name!r} is the child of joints {edges[child][0].name!r} and {joint.name!r}, "
@@ -140,18 +192,42 @@ class _Checker:
         while waiting:
             ready = [c for c, (_, p) in waiting.items() if p in placed]
             if not ready:
-                names = ", ".join(repr(s.bodies[c].name) for c in waiting)
-                self.faults.append(f"bodies {names} hang on each other in a loop and not on the ground; "
-                                   "join one of them to the ground and close the loop with close_loop")
+                looped = [c for c in waiting if _in_loop(c, edges)]
+                if looped:
+                    names = ", ".join(repr(s.bodies[c].name) for c in looped)
+                    self.faults.append(f"bodies {names} hang on each other in a loop and not on the ground; "
+                                       "join one of them to the ground and close the loop with close_loop")
                 break
             for c in ready:
                 joint, p = waiting.pop(c)
                 order.append((joint, p, c))
                 placed.add(c)
         for k, body in enumerate(s.bodies):
-            if k not in edges:
+            if k not in edges and k not in doubtful:
                 self.faults.append(f"body {body.name!r} has no joint; join it to a parent (a body that moves freely: Free)")
-        return sorted(order, key=lambda e: s.joints.index(e[0])) if _sorted_is_tree(order, s.joints) else order
+        return sorted(order, key=lambda e: self.joints.index(e[0])) if _sorted_is_tree(order, self.joints) else order
+
+    def _plane(self) -> None:
+        """In a planar system every joint keeps its bodies in the x-y plane."""
+        for joint in [*self.joints, *self.system.loops]:
+            where = f"joint {joint.name!r}"
+            for what in ("parent_rotation", "child_rotation"):
+                R = getattr(joint, what)
+                if any(abs(numeric(R[k])) > 1e-9 for k in (2, 5)):
+                    self.faults.append(f"{where}: {what} turns out of the x-y plane, but the system is planar; "
+                                       "turn about z only, or make the system spatial: planar=False")
+            if not isinstance(joint, (Revolute, Prismatic, Planar, Fixed)):
+                self.faults.append(f"{where} is {joint.kind}, but the system is planar; use Revolute, Prismatic, Planar or "
+                                   "Fixed, or make the system spatial: planar=False")
+            elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in joint.axis[:2]):
+                self.faults.append(f"{where}: axis {list(joint.axis)} is not along z, but the system is planar; "
+                                   "pass [0, 0, 1] or [0, 0, -1], or make the system spatial: planar=False")
+            elif isinstance(joint, Prismatic) and abs(numeric(joint.axis[2])) > 1e-9:
+                self.faults.append(f"{where}: axis {list(joint.axis)} is not in the x-y plane, but the system is planar; "
+                                   "pass an axis without a z component, or make the system spatial: planar=False")
+        if self.system.ground_motion is not None and any(e != 0 for e in self.system.ground_motion.coordinates[4:]):
+            self.faults.append("move_ground: angles turn the ground out of the x-y plane, but the system is planar; "
+                               "pass [angle about z, 0, 0], or make the system spatial: planar=False")
 
     # -- coordinates and speeds
 
@@ -160,7 +236,7 @@ class _Checker:
         driver: dict[sp.Symbol, Joint] = {}
         coordinates: list[sp.Symbol] = []
         speeds: list[sp.Symbol] = []
-        for joint in s.joints:
+        for joint in self.joints:
             independent = [isinstance(q, Coordinate) for q in joint.coordinates]
             if joint.n_speeds != len(joint.coordinates) and not all(independent):
                 self.faults.append(f"joint {joint.name!r}: with Euler parameters every coordinate must be a symbol; "
@@ -183,6 +259,15 @@ class _Checker:
             if count > 1:
                 self.faults.append(f"the speed {u} belongs to {count} joints; give each a name of its own")
         self.coordinates, self.speeds = tuple(dict.fromkeys(coordinates)), tuple(dict.fromkeys(speeds))
+        states = [z.symbol for z in s.states]
+        for symbol, count in Counter([*self.coordinates, *self.speeds, *dict.fromkeys(states)]).items():
+            if count > 1:
+                roles = [role for role, members in (("a coordinate", self.coordinates), ("a speed", self.speeds),
+                                                    ("a state", states)) if symbol in members]
+                self.faults.append(f"{symbol} is {' and '.join(roles)} at once; give each a symbol of its own")
+        if s.bodies and s.joints and not coordinates and not states and not any(j.faults for j in s.joints):
+            self.faults.append("no joint has a coordinate of its own, so nothing can move; give one a coordinate: "
+                               "sd.coordinates('q')")
 
     # -- symbols and where they are used
 
@@ -192,7 +277,7 @@ class _Checker:
         yield "gravity", s.gravity, True
         for body in s.bodies:
             yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
-        for joint in [*s.joints, *s.loops]:
+        for joint in [*self.joints, *s.loops]:
             constants = [*joint.parent_point, *joint.child_point, *joint.parent_rotation, *joint.child_rotation,
                          *getattr(joint, "axis", []), *[e for axis in getattr(joint, "axes", []) for e in axis]]
             yield f"joint {joint.name!r}", constants, True
@@ -200,7 +285,7 @@ class _Checker:
                    [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
         if s.ground_motion is not None:
             yield "move_ground", s.ground_motion.coordinates, False
-        for load in s.loads:
+        for load in self.loads:
             if isinstance(load, Force):
                 yield load.label, load.force, False
                 yield f"{load.label}: point", load.point, True
@@ -250,53 +335,87 @@ class _Checker:
                                        f"add {symbol} to the parameters or remove it")
                 else:
                     parameters[symbol] = None
-        for joint in s.joints:
+        states = {z.symbol for z in s.states}
+        for joint in self.joints:
             for q in joint.coordinates:
-                rates = [] if isinstance(q, Coordinate) else [a for a in _symbols_in([q])
-                                                              if a in self.speeds or isinstance(a, (Rate, Input))
-                                                              or a in [z.symbol for z in s.states]]
+                rates = [] if isinstance(q, Coordinate) else [
+                    a for a in _symbols_in([q]) if a in self.speeds or a in states or isinstance(a, (Rate, Input))]
                 if rates:
                     self.faults.append(f"joint {joint.name!r}: its coordinate {q} uses {', '.join(map(str, rates))}; "
                                        "a dependent coordinate may use coordinates, t and parameters")
+        if s.ground_motion is not None:
+            free = [a for a in _symbols_in(s.ground_motion.coordinates) if a in moving - {time} or isinstance(a, Input)]
+            if free:
+                self.faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t and parameters")
         self.parameters, self.inputs = tuple(parameters), tuple(inputs)
-        everything = [*self.coordinates, *self.speeds, *[z.symbol for z in s.states], *self.parameters, *self.inputs]
-        for name, count in Counter(a.name for a in dict.fromkeys(everything)).items():
+        everything = dict.fromkeys([*self.coordinates, *self.speeds, *[z.symbol for z in s.states], *self.parameters,
+                                    *self.inputs])
+        names = Counter(a.name for a in everything)
+        for name, count in names.items():
             if count > 1:
                 self.faults.append(f"{count} different symbols are named {name!r} (by kind or assumptions); "
                                    "make each symbol once, or give them different names")
+        if "t" in names:
+            self.faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
+        for u in self.speeds:
+            if f"{u.name}_dot" in names:
+                self.faults.append(f"the name {u.name + '_dot'!r} stands for the derivative of the speed {u}; "
+                                   "give the other symbol of this name another one")
+        self._spelling("the symbols", names)
 
     # -- loads, numbers, units
 
     def _loads(self) -> None:
-        joints = {j.name: j for j in self.system.joints}
-        for load in self.system.loads:
+        joints = {str(j.name): j for j in self.joints}
+        for load in self.loads:
             if isinstance(load, JointForce):
                 joint = joints.get(load.joint) if isinstance(load.joint, str) else load.joint
-                if joint not in joints.values():
+                if joint not in self.joints:
                     self.faults.append(f"{load.label} acts on the joint {load.joint!r}, which the system does not have; "
-                                       f"joints: {', '.join(joints)}")
+                                       f"joints: {', '.join(joints) or 'none'}{self._nearest(load.joint, joints)}")
                 elif joint is not None and len(load.values) != joint.n_speeds:
                     self.faults.append(f"{load.label} has {len(load.values)} values; joint {joint.name!r} has "
                                        f"{joint.n_speeds} degrees of freedom")
                 continue
-            for attribute in ("body", "body_a", "body_b", "frame", "reaction"):
-                body = getattr(load, attribute, None)
-                if body is not None:
-                    self._resolve(body, f"{load.label}: {attribute}")
+            places = {attribute: self._resolve(getattr(load, attribute), f"{load.label}: {attribute}")
+                      for attribute in ("body", "body_a", "body_b", "frame", "reaction")
+                      if hasattr(load, attribute) and (attribute.startswith("body") or getattr(load, attribute) is not None)}
+            for one, other in (("body", "reaction"), ("body_a", "body_b")):
+                if places.get(one) is not None and places.get(one) == places.get(other):
+                    self.faults.append(f"{load.label}: {one} and {other} are the same body, so that nothing comes of it; "
+                                       "pass two different bodies")
         for output in self.system.outputs:
             if isinstance(output.value, Point):
                 self._resolve(output.value.body, f"output {output.name!r}: body")
 
-    def _numbers(self, given: dict[Any, float], what: str) -> dict[sp.Symbol, float]:
-        faults, result = [], {}
+    def _numbers(self, given: Any, what: str, allowed: Iterable[sp.Symbol], kind: str) -> dict[sp.Symbol, float]:
+        """A table of numbers by symbol; symbols are known by their names."""
+        if not isinstance(given, Mapping):
+            self.faults.append(f"{what} is {given!r}; pass a dict such as {{m: 1.5}}")
+            return {}
+        result = {}
+        symbols = {s.name: s for s in allowed}
         for key, value in given.items():
-            try:
-                result[key] = float(value)
-            except (TypeError, ValueError):
-                faults.append(f"{what}: the value of {key} is {value!r}; pass a number")
-        if faults:
-            raise ModelError(faults, self.system.name)
+            taken = take_over(key) if isinstance(key, sp.Basic) else key
+            name = str(getattr(taken, "name", taken))
+            number = self._number(value, f"{what}: the value of {name}")
+            if name not in symbols:
+                self.faults.append(f"{what} has a number for {name!r}, which is no {kind} of the system; "
+                                   f"there are {', '.join(symbols) or 'none'}{self._nearest(name, symbols)}")
+            elif number is not None:
+                result[symbols[name]] = number
         return result
+
+    def _number(self, value: Any, what: str) -> float | None:
+        """A finite real number."""
+        try:
+            number = math.nan if isinstance(value, str) else float(value)
+        except (TypeError, ValueError):
+            number = math.nan
+        if not math.isfinite(number):
+            self.faults.append(f"{what} is {value!r}; pass a finite number")
+            return None
+        return number
 
     def _units(self) -> dict[sp.Symbol, str]:
         units: dict[sp.Symbol, str] = {time: "s"}
@@ -332,8 +451,8 @@ class _Checker:
             elif isinstance(load, Torque):
                 note(load.torque, "N m")
             elif isinstance(load, JointForce):
-                joint = next((j for j in s.joints if load.joint in (j, j.name)), None)
-                note(load.values, "N m" if isinstance(joint, Revolute) else "N")
+                driven = next((j for j in s.joints if load.joint in (j, j.name)), None)
+                note(load.values, "N m" if isinstance(driven, Revolute) else "N")
             elif isinstance(load, SpringDamper):
                 note([load.stiffness], "N/m")
                 note([load.damping], "N s/m")
@@ -351,6 +470,22 @@ def _symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
         for symbol in sorted(e.free_symbols, key=lambda a: a.name):
             found[symbol] = None
     return list(found)
+
+
+def _in_loop(body: int, edges: dict[int, tuple[Joint, int]]) -> bool:
+    """Whether a body is its own ancestor."""
+    ancestor = body
+    for _ in edges:
+        if ancestor not in edges:
+            return False
+        ancestor = edges[ancestor][1]
+        if ancestor == body:
+            return True
+    return False
+
+
+def _hashable(name: Any) -> Any:
+    return name if isinstance(name, str) else repr(name)
 
 
 def _sorted_is_tree(order: list[tuple[Joint, int, int]], joints: list[Joint]) -> bool:

@@ -34,6 +34,16 @@ class Faults(list[str]):
         row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
         return sp.ImmutableMatrix(3, 1, row + [sp.S.Zero] * (3 - len(row)))
 
+    def list(self, value: Any, what: str) -> tuple[sp.Expr, ...]:
+        """Any number of scalar expressions; a single one stands for itself."""
+        if isinstance(value, sp.MatrixBase):
+            entries = list(value)
+        else:
+            if hasattr(value, "tolist"):
+                value = value.tolist()
+            entries = list(value) if isinstance(value, (list, tuple)) else [value]
+        return tuple(self.expression(e, what) for e in entries)
+
     def matrix(self, value: Any, what: str) -> sp.ImmutableMatrix:
         """A 3 x 3 matrix; a list of 3 stands for its diagonal."""
         entries = self._entries(value, what)

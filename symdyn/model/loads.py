@@ -10,14 +10,15 @@ import sympy as sp
 
 @dataclass(frozen=True)
 class Force:
-    """A force (N) on a point of a body; point (3, 1) in body axes, components in `frame` (None: the n-frame).
+    """A force (N) on a point of a body; point (3, 1) in body axes (None, until checked: the centre of mass), components
+    in `frame` (None: the n-frame).
 
     reaction   a body on whose coinciding point the opposite force acts, or None
     """
 
     body: Any
     force: sp.ImmutableMatrix
-    point: sp.ImmutableMatrix
+    point: sp.ImmutableMatrix | None
     frame: Any
     reaction: Any
     label: str

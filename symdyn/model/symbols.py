@@ -77,6 +77,8 @@ class Input(sp.Symbol):
 
 
 def _make(kind: type, names: str, assumptions: dict) -> Any:
+    if not isinstance(names, str) or not names.strip():
+        raise ModelError([f"names of symbols are {names!r}; pass text such as 'q1 q2' or 'm1:4'"])
     return sp.symbols(names, cls=kind, **assumptions)
 
 
@@ -118,9 +120,16 @@ def as_expression(value: Any, what: str) -> sp.Expr:
         value = sp.sympify(value, strict=True)
     if value.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise ModelError([f"{what} is {value}; pass a finite number or expression"])
-    if not isinstance(value, sp.Expr):
+    if not isinstance(value, sp.Expr) or value.is_Matrix:
         raise ModelError([f"{what} is {value} of type {type(value).__name__}; pass a scalar expression"])
-    return take_over(value)
+    if value.has(sp.I):
+        raise ModelError([f"{what} is {value}, a complex number; pass a real number or expression"])
+    taken = take_over(value)
+    unknown = sorted(map(str, taken.atoms(AppliedUndef, sp.Derivative, sp.Integral)))
+    if unknown:
+        raise ModelError([f"{what} uses {', '.join(unknown)}, which has no value; write it out, "
+                          "use a coordinate and its .dot, or an input"])
+    return taken
 
 
 def take_over(expression: sp.Basic) -> Any:

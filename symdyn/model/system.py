@@ -15,7 +15,7 @@ from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, NamedOutput, State
-from symdyn.model.symbols import as_coordinate
+from symdyn.model.symbols import Coordinate, as_coordinate
 
 if TYPE_CHECKING:
     from symdyn.formulation.embedding import EmbeddedEquations
@@ -42,11 +42,11 @@ class System:
         self.name = name
         self._faults = Faults()
         if planar is None:
-            planar = gravity is not None and len(list(gravity)) == 2
+            planar = hasattr(gravity, "__len__") and len(gravity) == 2
         self.planar = planar
         self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar)
         self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)))
-        self.declared = None if parameters is None else tuple(parameters)
+        self.declared = None if parameters is None else self._declared(parameters)
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.loads: list[Any] = []
@@ -92,17 +92,18 @@ class System:
 
     def close_loop(self, joint: Joint) -> Joint:
         """A joint between two bodies that are already in the tree: it becomes constraints."""
-        self.loops.append(joint)
+        if not isinstance(joint, Joint):
+            self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...)")
+        else:
+            self.loops.append(joint)
         return joint
 
     def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
-        """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t."""
+        """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t and parameters."""
         p = self._faults.vector(position, "move_ground: position", self.planar)
-        moving = Free("ground_motion", "inertial", "ground", [*p, *angles], EulerAngles(sequence))
-        self._faults.extend(moving.faults)
-        if any(not isinstance(c, sp.Expr) or (isinstance(c, sp.Symbol) and c.name != "t") for c in moving.coordinates):
-            free = [str(c) for c in moving.coordinates if isinstance(c, sp.Symbol)]
-            self._faults.append(f"move_ground was given {', '.join(free)}; pass given functions of t")
+        turned = self._faults.vector(angles, "move_ground: angles")
+        moving = Free("ground_motion", "inertial", "ground", ZERO * 2, EulerAngles(sequence))
+        moving.coordinates = (*p, *turned)
         self.ground_motion = moving
 
     # -- loads
@@ -116,10 +117,8 @@ class System:
         reaction  the body that feels the opposite force at the same place, if any
         """
         label = name or f"force_{len(self.loads) + 1}"
-        owner = self._body(body)
-        at = owner.com if point is None and owner is not None else (ZERO if point is None else point)
-        self.loads.append(Force(body, self._faults.vector(force, label, self.planar),
-                                self._faults.vector(at, f"{label}: point", True), frame, reaction, label))
+        at = None if point is None else self._faults.vector(point, f"{label}: point", True)
+        self.loads.append(Force(body, self._faults.vector(force, label, self.planar), at, frame, reaction, label))
 
     def add_torque(self, body: Any, torque: Any, frame: Any = None, reaction: Any = None, name: str = "") -> None:
         """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force."""
@@ -131,8 +130,7 @@ class System:
     def add_joint_force(self, joint: Any, value: Any, name: str = "") -> None:
         """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
         label = name or f"joint_force_{len(self.loads) + 1}"
-        values = list(value) if isinstance(value, (list, tuple, sp.MatrixBase)) else [value]
-        self.loads.append(JointForce(joint, tuple(self._faults.expression(v, label) for v in values), label))
+        self.loads.append(JointForce(joint, self._faults.list(value, label), label))
 
     def add_spring_damper(self, body_a: Any, body_b: Any, point_a: Any = ZERO, point_b: Any = ZERO, stiffness: Any = 0,
                           damping: Any = 0, length: Any = 0, name: str = "") -> None:
@@ -152,15 +150,19 @@ class System:
         if isinstance(value, Point):
             at = self._faults.vector(value.at, f"output {name!r}: point", True)
             taken: Any = Point(value.body, tuple(at), value.quantity)
-        elif isinstance(value, (list, tuple, sp.MatrixBase)):
-            taken = tuple(self._faults.expression(v, f"output {name!r}") for v in value)
+        elif hasattr(value, "__len__"):
+            taken = self._faults.list(value, f"output {name!r}")
         else:
             taken = self._faults.expression(value, f"output {name!r}")
         self.outputs.append(NamedOutput(name, taken))
 
     def add_state(self, symbol: Any, rate: Any) -> None:
         """An extra state z with z_dot = rate, an expression as for add_output."""
-        self.states.append(State(as_coordinate(symbol), self._faults.expression(rate, f"rate of state {symbol}")))
+        taken = as_coordinate(symbol)
+        if not isinstance(taken, Coordinate):
+            self._faults.append(f"add_state was given {symbol!r} as its state; pass a symbol such as sd.coordinates('z')")
+            taken = Coordinate(f"state_{len(self.states) + 1}")
+        self.states.append(State(taken, self._faults.expression(rate, f"rate of state {symbol}")))
 
     def add_constraint(self, expression: Any) -> None:
         """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
@@ -178,10 +180,13 @@ class System:
 
         return embed(self.check())
 
-    def _body(self, body: Any) -> Body | None:
-        if isinstance(body, Body):
-            return body
-        return next((b for b in [self.ground, *self.bodies] if b.name == body), None)
+    def _declared(self, given: Any) -> tuple[sp.Symbol, ...]:
+        listed = list(given) if hasattr(given, "__iter__") and not isinstance(given, str) else [given]
+        wrong = [p for p in listed if not isinstance(p, sp.Symbol)]
+        if wrong:
+            self._faults.append(f"parameters has {', '.join(map(repr, wrong))}; pass a list of symbols, "
+                                "such as sd.parameters('m l g')")
+        return tuple(p for p in listed if isinstance(p, sp.Symbol))
 
     def __repr__(self) -> str:
         return f"System({self.name!r}, {len(self.bodies)} bodies, {len(self.joints)} joints)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         else:
             times, table = _table(value, 1, owner)
             column = table[:, 0]
-            sources.append((places[name], lambda t, x, times=times, column=column: np.interp(t, times, column)))
+            sources.append((places[name], partial(_interpolate, times, column)))
 
     def mixed(t: float, x: np.ndarray) -> np.ndarray:
         values = constant.copy()
@@ -83,6 +84,10 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return values
 
     return Inputs(constant, function=mixed)
+
+
+def _interpolate(times: np.ndarray, column: np.ndarray, t: float, x: np.ndarray) -> float:
+    return float(np.interp(t, times, column))
 
 
 def _table(pair: tuple, n: int, owner: str) -> tuple[np.ndarray, np.ndarray]:

@@ -113,8 +113,8 @@ def _tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray
     return relative, vector
 
 
-def _positive(module: Module, value: float, what: str) -> float:
-    if not (np.isscalar(value) and value >= 0):
+def _positive(module: Module, value: Any, what: str) -> float:
+    if not (isinstance(value, (int, float, np.number)) and value >= 0):
         raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {value!r}")
     return 0.0 if not np.isfinite(value) else float(value)
 
@@ -124,7 +124,8 @@ def _bar(module: Module, span: tuple[float, float]) -> Any:
         from tqdm.auto import tqdm
     except ImportError:
         raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s", bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
+    return tqdm(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s",
+                bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
 
 
 def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outcome:

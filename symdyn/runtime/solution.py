@@ -129,10 +129,11 @@ class Solution:
             about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
                      "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
                      "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
-            outputs = {f"output_{name}": rows for name, rows in self.outputs.items()}
-            extra = {"energy": self.energy} if "energy" in self.module.functions else {}
-            np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params, **extra,
-                     about=np.array(json.dumps(about)), **outputs)  # type: ignore[arg-type]
+            arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
+            if "energy" in self.module.functions:
+                arrays["energy"] = self.energy
+            np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
+                     about=np.array(json.dumps(about)), **arrays)
         elif path.suffix == ".csv":
             names, columns = ["t", *self.module.metadata["x"]], [self.t, *self.x.T]
             for name, rows in self.outputs.items():

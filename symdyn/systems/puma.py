@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from symdyn.errors import ModelError
-from symdyn.model.joints import Revolute
+from symdyn.model.joints import Joint, Revolute
 from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
 
@@ -94,7 +94,7 @@ def puma560(convention: str = "standard", general: bool = False, motors: bool = 
         a, d = (_symbol(system, name, value) for name, value in (link.a, link.d))
         R = sp.rot_ccw_axis1(link.alpha)
         if convention == "standard":
-            joint = Revolute(f"joint{i}", parent, body, q[i - 1], child_point=-R.T * sp.Matrix([a, 0, d]),
+            joint: Joint = Revolute(f"joint{i}", parent, body, q[i - 1], child_point=-R.T * sp.Matrix([a, 0, d]),
                              child_rotation=R.T)
         else:
             joint = Revolute(f"joint{i}", parent, body, q[i - 1], parent_point=sp.Matrix([a, 0, 0]) + d * R[:, 2],
@@ -126,7 +126,7 @@ def _inertial(system: System, i: int, link: _Link, general: bool) -> list[sp.Exp
     return [_symbol(system, name.format(i), value, general) for name, value in zip(_ENTRIES, values, strict=True)]
 
 
-def _add_motors(system: System, joints: list[Revolute], q: tuple[sp.Symbol, ...]) -> None:
+def _add_motors(system: System, joints: list[Joint], q: tuple[sp.Symbol, ...]) -> None:
     for i, (joint, values) in enumerate(zip(joints, _MOTORS, strict=True), start=1):
         Jm, G, B, Tp, Tn = symbols = parameters(f"Jm{i} G{i} B{i} Tp{i} Tn{i}")
         system.defaults |= dict(zip(symbols, values, strict=True))

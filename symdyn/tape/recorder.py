@@ -203,8 +203,8 @@ class Recorder:
                 return self.neg(self.apply(op, self.neg(first)))
             if negative and op in _EVEN:
                 return self.apply(op, self.neg(first))
-            if op == "sqrt" and not isinstance(first, Node):
-                root = Fraction(isqrt(Fraction(first).numerator), isqrt(Fraction(first).denominator)) if first >= 0 else 0
+            if op == "sqrt" and isinstance(first, (int, Fraction)) and first >= 0:
+                root = Fraction(isqrt(Fraction(first).numerator), isqrt(Fraction(first).denominator))
                 if root * root == first:
                     return exact(root)
         if op == "select":

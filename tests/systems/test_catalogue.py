@@ -38,6 +38,7 @@ CASES = [
     Case("prismatic_chain", {"n": 3}, kane.kane_prismatic_chain, (3,)),
     Case("spatial_chain", {"n": 3}, kane.kane_spatial_chain, (3,)),
     Case("spatial_chain", {"n": 4}, kane.kane_spatial_chain, (4,)),
+    Case("spatial_chain", {"n": 7}, kane.kane_spatial_chain, (7,)),
     Case("two_link_arm", {}, kane.kane_two_link_arm),
     Case("three_link_arm", {}, kane.kane_three_link_arm),
     Case("puma560", {"convention": "standard"}, kane.kane_puma560, ("standard",)),

@@ -11,6 +11,7 @@ import sympy as sp
 
 from symdyn.model.faults import Faults
 from symdyn.model.symbols import Coordinate, as_coordinate
+from symdyn.spatial.vectors import Vector
 
 IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
@@ -80,9 +81,9 @@ class Joint:
 
     def _coordinates(self, given: Sequence[Any]) -> tuple[sp.Expr, ...]:
         wanted = len(self.coordinate_units)
-        if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+        if not _listed(given):
             self.faults.append(f"joint {self.name!r}: coordinates is {given!r}; pass a list of {wanted}")
-            given = []
+            given = [sp.S.Zero] * wanted
         given = list(given)
         if len(given) != wanted:
             self.faults.append(f"joint {self.name!r} ({self.kind}) takes {wanted} coordinates "
@@ -96,22 +97,26 @@ class Joint:
     def _speeds(self, given: Sequence[Any] | None) -> tuple[sp.Symbol, ...] | None:
         if given is None:
             return None
-        given = [as_coordinate(e) for e in given]
-        if len(given) != self.n_speeds or not all(isinstance(e, sp.Symbol) for e in given):
+        given = [as_coordinate(e) for e in given] if _listed(given) else given
+        if not isinstance(given, list) or len(given) != self.n_speeds or not all(isinstance(e, sp.Symbol) for e in given):
             self.faults.append(f"joint {self.name!r} ({self.kind}) takes {self.n_speeds} symbols as speeds, found {given}")
             return None
         return tuple(given)
 
     def _rotation(self, value: Any, what: str) -> sp.ImmutableMatrix:
+        before = len(self.faults)
         matrix = self.faults.matrix(IDENTITY if value is None else value, f"joint {self.name!r}: {what}")
-        residual = rotation_residual(matrix)
+        residual = rotation_residual(matrix) if len(self.faults) == before else 0.0
         if residual > 1e-9:
             self.faults.append(f"joint {self.name!r}: {what} is not a rotation: R R^T differs from the identity "
                                f"by {residual:.2g} or its determinant is not +1; pass a rotation matrix")
         return matrix
 
     def _axis(self, value: Any, what: str = "axis") -> sp.ImmutableMatrix:
+        before = len(self.faults)
         axis = self.faults.vector(value, f"joint {self.name!r}: {what}", planar=True)
+        if len(self.faults) > before:
+            return sp.ImmutableMatrix([0, 0, 1])
         length = numeric(sp.sqrt(axis.dot(axis)))
         if abs(length - 1) > 1e-9:
             found = f"has length {length:.6g}"
@@ -122,6 +127,10 @@ class Joint:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"
+
+
+def _listed(value: Any) -> bool:
+    return hasattr(value, "__iter__") and not isinstance(value, (str, bytes, dict))
 
 
 def _exactly_unit(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
@@ -141,9 +150,10 @@ def _exactly_unit(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix([sp.Rational(sp.N(e / length, 60)) for e in exact])
 
 
-def numeric(expression: sp.Expr) -> float:
-    """The value of an expression with its symbols, if any, at fixed arbitrary numbers."""
-    symbols = sorted(expression.free_symbols, key=str)
+def numeric(expression: sp.Expr, symbols: Sequence[sp.Symbol] | None = None) -> float:
+    """The value of an expression with its symbols (or more of them, in a given order), at fixed arbitrary numbers."""
+    if symbols is None:
+        symbols = sorted(expression.free_symbols, key=str)
     value = expression.xreplace({s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)})
     return float(sp.re(sp.N(value)))
 
@@ -153,12 +163,11 @@ def rotation_residual(matrix: sp.ImmutableMatrix) -> float:
     if matrix == sp.eye(3):
         return 0.0
     symbols = sorted(matrix.free_symbols, key=str)
-    values = {s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)}
-    R = np.array([[float(sp.N(e.xreplace(values))) for e in matrix.row(i)] for i in range(3)])
+    R = np.array([[numeric(e, symbols) for e in matrix.row(i)] for i in range(3)])
     return float(max(np.abs(R @ R.T - np.eye(3)).max(), abs(np.linalg.det(R) - 1)))
 
 
-def turn(algebra: Any, axis: Sequence[Any], angle: Any) -> np.ndarray:
+def turn(algebra: Any, axis: Vector, angle: Any) -> np.ndarray:
     """Rotation about a unit axis e by an angle: e e^T + cos (1 - e e^T) + sin [e x] (Rodrigues)."""
     s, c = algebra.sin(angle), algebra.cos(angle)
     x, y, z = axis

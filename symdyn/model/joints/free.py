@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion
-from symdyn.model.joints.spherical import Orientation, orientation_units, rotation_motion, rotation_rates
-from symdyn.model.orientation import EulerAngles
+from symdyn.model.joints.spherical import (
+    Orientation,
+    orientation_units,
+    rotation_motion,
+    rotation_rates,
+    taken_orientation,
+)
 from symdyn.spatial.vectors import zeros
 
 
@@ -26,10 +31,11 @@ class Free(Joint):
                  orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None) -> None:
-        self.orientation = orientation or EulerAngles("ZYX")
+        self.orientation, faults = taken_orientation(name, orientation)
         self.coordinate_units = ("m", "m", "m", *orientation_units(self.orientation))
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
+        self.faults.extend(faults)
 
     @property
     def n_speeds(self) -> int:

@@ -29,10 +29,11 @@ class Spherical(Joint):
                  orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None) -> None:
-        self.orientation = orientation or EulerAngles("ZYX")
+        self.orientation, faults = taken_orientation(name, orientation)
         self.coordinate_units = orientation_units(self.orientation)
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
+        self.faults.extend(faults)
 
     @property
     def n_speeds(self) -> int:
@@ -47,6 +48,14 @@ class Spherical(Joint):
 
     def rates(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> list[Any]:
         return rotation_rates(self.orientation, s, sd)
+
+
+def taken_orientation(name: str, orientation: Any) -> tuple[Orientation, list[str]]:
+    """The orientation (default: EulerAngles("ZYX")), and faults if it is none."""
+    if orientation is None or isinstance(orientation, (EulerAngles, EulerParameters)):
+        return orientation or EulerAngles("ZYX"), []
+    return EulerAngles("ZYX"), [f"joint {name!r}: orientation is {orientation!r}; pass sd.EulerAngles('ZYX') or another "
+                                "sequence, or sd.EulerParameters()"]
 
 
 def orientation_units(orientation: Orientation) -> tuple[str, ...]:

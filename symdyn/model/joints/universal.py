@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from symdyn.model.joints.base import Joint, JointMotion, turn
+from symdyn.model.joints.base import Joint, JointMotion, numeric, turn
 from symdyn.spatial.vectors import cross, zeros
 
 
@@ -24,10 +24,12 @@ class Universal(Joint):
                  child_rotation: Any = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
-        if len(axes) != 2:
-            self.faults.append(f"joint {name!r} (universal) takes 2 axes, found {len(axes)}")
+        if not hasattr(axes, "__len__") or len(axes) != 2:
+            self.faults.append(f"joint {name!r} (universal) takes 2 axes, found {axes!r}")
             axes = ((1, 0, 0), (0, 1, 0))
-        self.axes = (self._axis(axes[0], "first axis"), self._axis(axes[1], "second axis"))
+        first, second = self.axes = (self._axis(axes[0], "first axis"), self._axis(axes[1], "second axis"))
+        if not self.faults and abs(abs(numeric(first.dot(second))) - 1) < 1e-9:
+            self.faults.append(f"joint {name!r} (universal): its two axes are parallel; pass axes at an angle, or use Revolute")
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
         first, second = (algebra.constants(axis) for axis in self.axes)
