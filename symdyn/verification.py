@@ -15,6 +15,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from symdyn.errors import EvaluationError
 from symdyn.formulation.equations import Equations
 from symdyn.model.symbols import time
 from symdyn.tape.differentiate import forward
@@ -184,8 +185,11 @@ def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
         eq = s.equations
         module = eq.compile(backend=backend)
         x = [s.values[n.name] for g in (eq.symbols.coordinates, eq.symbols.speeds, eq.symbols.states) for n in g]
-        found = module.rhs(s.values["t"], x, [s.values[p.name] for p in eq.symbols.parameters],
-                           [s.values[i.name] for i in eq.symbols.inputs])
+        try:
+            found = module.rhs(s.values["t"], x, [s.values[p.name] for p in eq.symbols.parameters],
+                               [s.values[i.name] for i in eq.symbols.inputs])
+        except EvaluationError:
+            return float("inf")
         M = s["M_tilde"].astype(float)
         condition = np.linalg.cond(M) if len(M) else 1.0
         exact = s["rhs"]

@@ -144,7 +144,8 @@ class _Checker:
             if isinstance(body, str) and body in self.known:
                 return self.index[id(self.known[body])]
             name, what = body, "is no body of the system"
-        self.faults.append(f"{where} is {name!r}, which {what}; bodies: {', '.join(self.known)}{self._nearest(name, self.known)}")
+        self.faults.append(f"{where} is {name!r}, which {what}; bodies: {', '.join(self.known)}"
+                           f"{self._nearest(name, self.known)}")
         return None
 
     @staticmethod

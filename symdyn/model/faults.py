@@ -34,7 +34,7 @@ class Faults(list[str]):
         row = [self.expression(e, f"{what}, component {k + 1}") for k, e in enumerate(entries)]
         return sp.ImmutableMatrix(3, 1, row + [sp.S.Zero] * (3 - len(row)))
 
-    def list(self, value: Any, what: str) -> tuple[sp.Expr, ...]:
+    def expressions(self, value: Any, what: str) -> tuple[sp.Expr, ...]:
         """Any number of scalar expressions; a single one stands for itself."""
         if isinstance(value, sp.MatrixBase):
             entries = list(value)

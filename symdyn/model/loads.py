@@ -18,7 +18,7 @@ class Force:
 
     body: Any
     force: sp.ImmutableMatrix
-    point: sp.ImmutableMatrix | None
+    point: Any
     frame: Any
     reaction: Any
     label: str

@@ -130,7 +130,7 @@ class System:
     def add_joint_force(self, joint: Any, value: Any, name: str = "") -> None:
         """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
         label = name or f"joint_force_{len(self.loads) + 1}"
-        self.loads.append(JointForce(joint, self._faults.list(value, label), label))
+        self.loads.append(JointForce(joint, self._faults.expressions(value, label), label))
 
     def add_spring_damper(self, body_a: Any, body_b: Any, point_a: Any = ZERO, point_b: Any = ZERO, stiffness: Any = 0,
                           damping: Any = 0, length: Any = 0, name: str = "") -> None:
@@ -151,7 +151,7 @@ class System:
             at = self._faults.vector(value.at, f"output {name!r}: point", True)
             taken: Any = Point(value.body, tuple(at), value.quantity)
         elif hasattr(value, "__len__"):
-            taken = self._faults.list(value, f"output {name!r}")
+            taken = self._faults.expressions(value, f"output {name!r}")
         else:
             taken = self._faults.expression(value, f"output {name!r}")
         self.outputs.append(NamedOutput(name, taken))

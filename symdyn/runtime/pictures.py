@@ -1,4 +1,4 @@
-"""Pictures of a motion: curves over time, and the moving bodies. No display is needed, and no pyplot state is touched.
+"""Pictures of a motion: curves over time, and the moving bodies. No display is needed; pyplot's state is not touched.
 
 Bodies are drawn as lines: from the point they share with the body that carries them, over their frame's origin, to
 the points that carry others. These points are found in the motion itself, so that every mechanism can be drawn whose
@@ -7,8 +7,9 @@ module gives frames or centres of mass.
 
 from __future__ import annotations
 
+import base64
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,11 +20,12 @@ from symdyn.errors import ArgumentError, MissingExtra
 
 try:
     from matplotlib import colormaps
-    from matplotlib.animation import FuncAnimation, PillowWriter
+    from matplotlib.animation import FuncAnimation
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import BoundaryNorm
     from matplotlib.figure import Figure
+    from PIL import Image
 except ImportError as error:
     raise MissingExtra(f"pictures need matplotlib: pip install 'symdyn[plot]' ({error})") from None
 
@@ -51,10 +53,56 @@ class Picture(Figure):
 
 
 class Film(FuncAnimation):
-    """An animation that shows itself in a notebook, with buttons to play it."""
+    """An animation that shows itself in a notebook; one that nobody looks at is no mistake.
+
+    draw   places what moves in picture k, and returns it
+    """
+
+    def __init__(self, figure: Figure, draw: Callable[[int], list[Any]], count: int, fps: float) -> None:
+        super().__init__(figure, draw, frames=count, interval=1000 / fps, blit=False)
+        self.place, self.count, self.fps = draw, count, fps
+
+    def gif(self) -> bytes:
+        """The film as a GIF: what stays is drawn once, and what moves over it for each picture."""
+        figure = self._fig
+        moving = self.place(self.count - 1)
+        palette = _palette(_pixels(figure))
+        for artist in moving:
+            artist.set_animated(True)
+        figure.canvas.draw()
+        background = figure.canvas.copy_from_bbox(figure.bbox)
+        images = []
+        for k in range(self.count):
+            figure.canvas.restore_region(background)
+            for artist in self.place(k):
+                figure.draw_artist(artist)
+            images.append(_pixels(figure, draw=False).quantize(palette=palette, dither=Image.Dither.NONE))
+        for artist in moving:
+            artist.set_animated(False)
+        data = io.BytesIO()
+        images[0].save(data, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / self.fps), loop=0)
+        return data.getvalue()
 
     def _repr_html_(self) -> str:
-        return self.to_jshtml()  # type: ignore[no-any-return]
+        return f'<img src="data:image/gif;base64,{base64.b64encode(self.gif()).decode()}">'
+
+    def __del__(self) -> None:
+        pass
+
+
+def _pixels(figure: Figure, draw: bool = True) -> Image.Image:
+    if draw:
+        figure.canvas.draw()
+    return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])  # type: ignore[attr-defined]
+
+
+def _palette(image: Image.Image) -> Image.Image:
+    """Colours that all pictures of a film share; the paper stays white."""
+    shared = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    colors = np.array(shared.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    colors[(colors > 248).all(axis=1)] = 255
+    shared.putpalette(colors.tobytes())
+    return shared
 
 
 # -- curves
@@ -280,7 +328,8 @@ def _skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray) -
             pivots.append(point[0])
     lines = []
     for k in range(n_b):
-        points = [origins[:, k]] if starts[k] is None else [starts[k], origins[:, k]]
+        start = starts[k]
+        points = [origins[:, k]] if start is None else [start, origins[:, k]]
         for point in carried[k]:
             points += [point, origins[:, k]]
         lines.append(np.stack(points, axis=1))
@@ -330,7 +379,7 @@ def _evaluate(solution: Solution, name: str) -> np.ndarray:
 
 
 def _axes(figure: Figure, place: Any, drawing: Drawing) -> Any:
-    axes = figure.add_subplot(place, projection="3d" if drawing.spatial else None)
+    axes: Any = figure.add_subplot(place, projection="3d" if drawing.spatial else None)
     limits = drawing.limits()
     axes.set_xlim(*limits[0])
     axes.set_ylim(*limits[1])
@@ -420,23 +469,28 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
                             f"{speed * count / MAX_FRAMES:.3g}, or lower fps")
     times = t[0] + np.sign(t[-1] - t[0]) * np.arange(count) * speed / fps
     drawing = whole.at(t, times)
-    figure = Picture(figsize=(6, 6), layout="constrained", dpi=80)
+    spans = np.ptp(whole.limits(), axis=1)
+    height = 5.0 if drawing.spatial else 6.0 * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.6
+    figure = Picture(figsize=(6, height), layout="constrained", dpi=80)
     axes = _axes(figure, 111, whole)
     trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8)[0]
     artists = _artists(axes, drawing)
     axes.set_title(solution.module.name, fontsize=11)
-    clock = (axes.text2D if drawing.spatial else axes.text)(0.02, 0.96, "", transform=axes.transAxes, family="monospace")
+    clock = figure.text(0.02, 1 - 0.2 / height, "", family="monospace")
 
     def draw(k: int) -> list[Any]:
         _move(trace, whole.centres[: _passed(t, times[k]), -1])
         for artist, points in zip(artists, _points(drawing, k), strict=True):
             _move(artist, points)
-        clock.set_text(f"t = {times[k]:7.2f} s")
+        clock.set_text(f"t = {times[k]:.2f} s")
         return [trace, *artists, clock]
 
-    film = Film(figure, draw, frames=count, interval=1000 / fps, blit=False)
+    # The layout is found once: it is the slowest part of drawing.
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
+    film = Film(figure, draw, count, fps)
     if path is not None:
-        film.save(path, writer=PillowWriter(fps=fps))
+        Path(path).write_bytes(film.gif())
     return film
 
 

@@ -6,7 +6,9 @@ one assignment; a change of sign costs nothing in the emitted code.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import operator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from math import isqrt
@@ -22,6 +24,10 @@ _SELF_EXPLAINING = {"leaf", "neg", "sin", "cos"}
 _EVEN = {"cos", "cosh", "abs"}
 _AT_ZERO = {"sin": 0, "tan": 0, "asin": 0, "atan": 0, "sinh": 0, "tanh": 0, "asinh": 0, "atanh": 0, "sqrt": 0,
             "sign": 0, "abs": 0, "cos": 1, "cosh": 1, "exp": 1, "floor": 0, "ceil": 0, "erf": 0}
+_EXACT: dict[str, Callable] = {
+    "abs": abs, "sign": lambda a: (a > 0) - (a < 0), "floor": math.floor, "ceil": math.ceil, "min": min, "max": max,
+    "lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
+    "not": operator.not_, "and": lambda a, b: a and b, "or": lambda a, b: a or b}
 
 
 class Recorder:
@@ -195,6 +201,9 @@ class Recorder:
         """Any other operation of the table, with the folding that is exact."""
         args = tuple(a if isinstance(a, (Node, bool)) else exact(a) for a in args)
         first = args[0] if args else None
+        if op in _EXACT and not any(isinstance(a, Node) for a in args):
+            value = _EXACT[op](*args)
+            return value if isinstance(value, bool) else exact(value)
         if len(args) == 1:
             if op in _AT_ZERO and not isinstance(first, Node) and first == 0:
                 return _AT_ZERO[op]
@@ -213,8 +222,10 @@ class Recorder:
             if args[1] is args[2] or (not isinstance(args[1], Node) and not isinstance(args[2], Node)
                                       and args[1] == args[2]):
                 return args[1]
-        if op in ("min", "max") and not any(isinstance(a, Node) for a in args):
-            return min(args) if op == "min" else max(args)
+        if op in ("and", "or"):
+            for a, b in (args, args[::-1]):
+                if isinstance(a, bool):
+                    return b if a == (op == "and") else a
         if op not in OPERATIONS:
             raise ValueError(f"unknown operation {op!r}; known: {', '.join(OPERATIONS)}")
         return self._record(op, *args)

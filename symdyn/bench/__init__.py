@@ -1,0 +1,1 @@
+"""Measurements, as commands: `python -m symdyn.bench`. They are not tests; times depend on the machine."""

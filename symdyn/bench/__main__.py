@@ -1,0 +1,91 @@
+"""`python -m symdyn.bench`: the figures of the pipeline, each beside what it should be."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time as clock
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+import symdyn as sd
+from symdyn.bench.kernel import compile_time, evaluation_time
+from symdyn.pipeline import emit
+
+Figure = tuple[str, float, str, str]
+
+
+def chain() -> Iterator[Figure]:
+    """Seven-link spatial chain, every parameter symbolic."""
+    sd.systems.get("spatial_chain", n=2).embedding().tape("rhs")
+    best = np.inf
+    for _ in range(3):
+        begun = clock.perf_counter()
+        equations = sd.systems.get("spatial_chain", n=7).embedding()
+        emit(equations, "c", ("rhs",), standalone=False)
+        best = min(best, clock.perf_counter() - begun)
+    tape = equations.tape("rhs")
+    yield "spatial_chain(7): describe, derive and emit", best, "s", "< 1.0"
+    yield "spatial_chain(7): compile", compile_time(equations), "s", "< 1.0"
+    yield "spatial_chain(7): operations of the right-hand side", tape.operations, "", "<= 1700"
+    yield "spatial_chain(7): operations of the prologue", sum(tape.count_prologue().values()), "", ""
+    yield "spatial_chain(7): longest chain of operations", tape.longest_chain(), "", ""
+    yield "spatial_chain(7): one compiled evaluation", evaluation_time(equations) * 1e6, "us", "< 0.35"
+
+
+def pendulum() -> Iterator[Figure]:
+    """Double pendulum of uniform rods, 10 s, rtol = atol = 1e-9."""
+    module = sd.systems.get("double_pendulum").embedding().compile(backend="c")
+    runs = [module.simulate(t=(0, 10), q=[0, 0.1], u=[0, 0], rtol=1e-9) for _ in range(20)]
+    yield "double_pendulum: 10 s inside the integrator", min(r.integrator_seconds for r in runs) * 1e3, "ms", "< 1"
+    yield "double_pendulum: energy error over these 10 s", runs[0].energy_error(), "", ""
+    x, best = np.array([0.1, 0.2, 0.3, 0.4]), np.inf
+    for _ in range(10):
+        begun = clock.perf_counter()
+        for _ in range(20_000):
+            module.rhs(0.0, x)
+        best = min(best, (clock.perf_counter() - begun) / 20_000)
+    yield "double_pendulum: module.rhs called from Python", best * 1e6, "us", "< 2"
+
+
+def puma() -> Iterator[Figure]:
+    """PUMA 560 moving freely."""
+    module = sd.systems.get("puma560").embedding().compile(backend="c")
+    solution = module.simulate(t=(0, 10), rtol=1e-11)
+    yield "puma560: energy error over 10 s of free motion, rtol 1e-11", solution.energy_error(), "", "<= 1e-10"
+
+
+def start_up() -> Iterator[Figure]:
+    """Whole commands in new processes, nothing cached and then again."""
+    def seconds(code: str) -> float:
+        times = []
+        for _ in range(5):
+            begun = clock.perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True)
+            times.append(clock.perf_counter() - begun)
+        return min(times)
+
+    yield "import symdyn / import sympy", seconds("import symdyn") / seconds("import sympy"), "", "< 1.3"
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "SYMDYN_CACHE_DIR": os.path.join(folder, "cache")}
+        for what, limit in (("first", "< 4"), ("second", "< 2")):
+            begun = clock.perf_counter()
+            subprocess.run([sys.executable, "-m", "symdyn", "simulate", "double_pendulum", "--output",
+                            os.path.join(folder, what)], env=environment, check=True, stdout=subprocess.DEVNULL)
+            yield f"symdyn simulate double_pendulum, {what} time", clock.perf_counter() - begun, "s", limit
+
+
+def main() -> None:
+    """Print every figure."""
+    groups: list[Callable[[], Iterator[Any]]] = [chain, pendulum, puma, start_up]
+    for group in groups:
+        for name, value, unit, wanted in group():
+            print(f"{name:62} {value:10.4g} {unit:3} {wanted}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
