@@ -34,7 +34,7 @@ def test_one_wrong_quantity_is_found(equations, quantity):
     right = equations.quantity(quantity)
     wrong = right * 1
     index = next(i for i in range(wrong.size) if not isinstance(wrong.ravel()[i], int))
-    wrong.ravel()[index] = wrong.ravel()[index] + 1e-9
+    wrong.ravel()[index] = wrong.ravel()[index] * (1 + 1e-9) + 1e-9
     spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, quantity: wrong}, _printed={})
     result = spoilt.verify(states=2)
     assert not result.passed
