@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ from symdyn.formulation.skipped import skipped
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+from symdyn.tape.node import Node
+from symdyn.tape.passes import specialize as specialize_tape
 from symdyn.tape.tape import Output, Tape
 
 # Functions of a module: name -> (quantity, what the header of generated code says about it).
@@ -44,22 +46,29 @@ FUNCTIONS = {
     "jacobian_inputs": ("jacobian_inputs", "exact derivative of x_dot by the inputs"),
     "jacobian_params": ("jacobian_params", "exact derivative of x_dot by the parameters"),
 }
+# The extra state of a simulation that integrates the work of the loads.
+WORK = "(work)"
 # What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
 STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
 
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
-         templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True) -> Source:
+         templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
+         specialize: Mapping[Any, float] | None = None, work: bool = False) -> Source:
     """The source of the named functions (default: STANDARD, those the formulation has) in a backend.
 
-    Raises SymdynError for an unknown function, backend or broken template.
+    specialize   parameters, by symbol or name, that become numbers in the code and are folded
+    work         rhs gets one more state at the end: the work of all loads but gravity and springs
+
+    Raises SymdynError for an unknown function, parameter, backend or a broken template.
     """
     names = tuple(functions) if functions is not None else tuple(n for n in STANDARD if has_function(equations, n))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
-    return render(_content(equations, names, standalone), backend, templates, standalone, integrator)
+    content = _content(equations, names, standalone, _by_name(specialize or {}), work)
+    return render(content, backend, templates, standalone, integrator)
 
 
 def has_function(equations: Equations, name: str) -> bool:
@@ -74,12 +83,13 @@ def _quantity(name: str) -> str:
     return FUNCTIONS[name][0] if name in FUNCTIONS else name
 
 
-def compile_equations(equations: Equations, backend: str | None = None,
-                      templates: str | os.PathLike | None = None) -> Module:
+def compile_equations(equations: Equations, backend: str | None = None, templates: str | os.PathLike | None = None,
+                      specialize: Mapping[Any, float] | None = None) -> Module:
     """A numeric module from equations.
 
-    backend     "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
-    templates   folder whose templates take precedence
+    backend      "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
+    templates    folder whose templates take precedence
+    specialize   parameters, by symbol or name, that become numbers in the code and are folded
 
     Only what is called is generated: rhs with the integrator first, every other function when it is first used.
     Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
@@ -100,7 +110,9 @@ def compile_equations(equations: Equations, backend: str | None = None,
                           "emit() writes source for others")
 
     def provide(name: str) -> Unit:
-        source = emit(equations, backend, (name,), templates, standalone=False)
+        work = name == "rhs_work"
+        source = emit(equations, backend, ("rhs",) if work else (name,), templates, standalone=False,
+                      specialize=specialize, work=work)
         text = next(iter(source.files.values()))
         if backend == "c":
             assert compiler is not None
@@ -108,16 +120,17 @@ def compile_equations(equations: Equations, backend: str | None = None,
         return PythonUnit.from_source(text, source.metadata["name"])
 
     def write(folder: Path) -> list[Path]:
-        return write_source(emit(equations, backend, templates=templates), folder)
+        return write_source(emit(equations, backend, templates=templates, specialize=specialize), folder)
 
     def report() -> Any:
         from symdyn.report.text import report as make
 
         return make(equations, backend, fallback)
 
-    metadata = emit(equations, "numpy", ("rhs",), standalone=False).metadata
+    metadata = emit(equations, "numpy", ("rhs",), standalone=False, specialize=specialize).metadata
     metadata = {**metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
-                "functions": [n for n in FUNCTIONS if has_function(equations, n)]}
+                "functions": [n for n in FUNCTIONS if has_function(equations, n)],
+                "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
     return Module(metadata, provide, backend, fallback, write, report)
 
 
@@ -138,12 +151,22 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
             for q in equations.quantities if q.startswith("output_")]
 
 
-def _content(equations: Equations, names: Sequence[str], standalone: bool) -> Content:
+def _content(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
+             work: bool) -> Content:
     symbols = equations.symbols
     tapes = {name: function_tape(equations, name) for name in names}
+    if work:
+        power = equations.quantity("power").reshape(1)
+        tapes["rhs"] = Tape.of(equations.recorder, rhs=np.concatenate([equations.quantity("rhs"), power]))
+    unknown = [n for n in bound if n not in [s.name for s in symbols.parameters]]
+    if unknown:
+        raise SymdynError(f"{equations.name} has no parameter {', '.join(unknown)} to specialize; it has "
+                          f"{', '.join(s.name for s in symbols.parameters) or 'none'}")
+    if bound:
+        tapes = _bind(equations, tapes, bound)
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
-              "z": [s.name for s in symbols.states], "ud": [f"{s.name}_dot" for s in symbols.speeds],
-              "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters]}
+              "z": [*[s.name for s in symbols.states], *[WORK] * work], "ud": [f"{s.name}_dot" for s in symbols.speeds],
+              "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters if s.name not in bound]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
     titles = {n: FUNCTIONS[n][1] if n in FUNCTIONS else n for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,
@@ -158,6 +181,12 @@ def function_tape(equations: Equations, name: str) -> Tape:
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
     whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
     return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
+
+
+def _bind(equations: Equations, tapes: Mapping[str, Tape], bound: Mapping[str, float]) -> dict[str, Tape]:
+    """Every function's tape with parameters bound to numbers, still sharing their steps."""
+    whole = specialize_tape(Tape(equations.recorder, {n: next(iter(t.outputs.values())) for n, t in tapes.items()}), bound)
+    return {n: whole.prune((n,)) for n in tapes}
 
 
 def _by_name(values: Any) -> dict[str, float]:

@@ -19,7 +19,10 @@ template this throw true try typename using virtual NULL main""".split()
 _LIBRARY = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt cbrt pow fabs fmin fmax floor
 ceil erf erfc gamma lgamma tgamma j0 j1 jn y0 y1 yn isnan isinf abs max min sign pi where sum range len print math numpy
 np t q u z x ud xd p c inputs out n status""".split()
-RESERVED = frozenset(_C_WORDS) | frozenset(_LIBRARY) | frozenset(keyword.kwlist) | frozenset(keyword.softkwlist)
+_OTHERS = """logical_and logical_or logical_not symdyn_sign let var function null undefined typeof super arguments eval
+debugger instanceof""".split()
+RESERVED = frozenset([*_C_WORDS, *_LIBRARY, *_OTHERS, *keyword.kwlist, *keyword.softkwlist])
+LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,30 @@ def read_dialect(folder: Path) -> Dialect:
         faults = [f"missing: {', '.join(missing)}"] * bool(missing) + [f"unknown operations: {', '.join(unknown)}"] * bool(
             unknown)
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
+    _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
                                           "files") if key in table}
     return Dialect(folder.name, **fields)
+
+
+def _check_formats(path: Path, table: dict[str, Any]) -> None:
+    """Raise SymdynError for a format that asks for what it is not given, and for a group that cannot be read."""
+    arguments = ("a", "b", "c")
+    trials: list[tuple[str, str, dict[str, Any]]] = [
+        ("assign", table["assign"], {"name": "a", "value": "b"}), ("store", table["store"], {"k": 0, "value": "a"}),
+        ("check", table["check"], {"name": "a", "code": 1}), ("literal", table.get("literal", ""), {"value": 1.0}),
+        *[(f"load.{group}", text, {"k": 0}) for group, text in table["load"].items()],
+        *[(f"operations.{op}", text, {}) for op, text in table["operations"].items()],
+        *[(f"files.{template}", text, {"name": "a"}) for template, text in table["files"].items()]]
+    faults = [f"load.{group} is missing" for group in LOADED if group not in table["load"]]
+    for key, text, given in trials:
+        try:
+            text.format(*arguments if key.startswith("operations.") else (), **given)
+        except (LookupError, ValueError) as error:
+            wanted = ", ".join(f"{{{name}}}" for name in given) or "{0}, {1}, {2}"
+            faults.append(f"{key} = {text!r} cannot be filled in ({error}); it may use {wanted}, and braces are doubled")
+    if faults:
+        raise SymdynError(f"{path}: {'; '.join(faults)}")
 
 
 def identifier(name: str, taken: set[str]) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -102,18 +104,30 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     for template, target in wanted.items():
         try:
             text = environment.get_template(f"{backend}/{template}").render(context)
-        except jinja2.TemplateError as error:
-            where = getattr(error, "lineno", None)
-            raise SymdynError(f"template {backend}/{template}{f', line {where}' if where else ''}: {error}") from error
+        except (jinja2.TemplateError, TypeError, ValueError, LookupError, AttributeError) as error:
+            raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         files[target.format(name=context["name"])] = text
     return Source(backend, files, program, dict(context["metadata_record"]))
+
+
+def _template_fault(template: str, error: Exception) -> str:
+    """Which template is wrong, in which line, and why."""
+    if isinstance(error, jinja2.TemplateNotFound):
+        return f"template {template} needs {error.name}, which is in none of the template folders"
+    if isinstance(error, jinja2.TemplateSyntaxError):
+        return f"template {error.filename or template}, line {error.lineno}: {error.message}"
+    # Jinja2 gives the frames of a template its file and lines.
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).suffix not in (".py", "")]
+    where = f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else template
+    return f"template {where}: {error}"
 
 
 def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
-    name = identifier(content.name, set())
+    # A file with the name of a standard module would be imported in its place by whatever runs beside it.
+    name = identifier(content.name, set(sys.stdlib_module_names))
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in program.functions}
     reference = make_reference(content.tapes, groups, content.defaults, calls) if standalone else None
     uses = {f.name: f.arguments for f in program.functions}

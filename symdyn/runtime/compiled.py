@@ -62,11 +62,11 @@ class _Run:
             self.problem.n_table = len(free.times)
             self.problem.table_t, self.problem.table = free.times.ctypes.data, free.table.ctypes.data
         if free.function is not None:
-            n_x, n_in = self.n_x, len(constant)
+            n_x, n_in, n_state = self.n_x, len(constant), request.n_state
 
             def call(t: float, x: Any, out: Any) -> int:
                 try:
-                    np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, np.ctypeslib.as_array(x, (n_x,)).copy())
+                    np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, np.ctypeslib.as_array(x, (n_x,))[:n_state].copy())
                     return 0
                 except BaseException as error:
                     self.trouble.append(error)
@@ -92,12 +92,12 @@ class _Run:
         return out
 
 
-def run_compiled(module: Module, request: Request, bar: Any = None) -> Outcome:
+def run_compiled(module: Module, request: Request, bar: Any = None, field: str = "rhs") -> Outcome:
     """Integrate with the compiled Dormand-Prince 8(5,3).
 
     An exception of an input function ends the run; it is raised again unless it is a KeyboardInterrupt.
     """
-    unit: Any = module.unit("rhs")
+    unit: Any = module.unit(field)
     run = _Run(unit, request)
     interrupted, seconds, stopped = False, 0.0, False
     times, n_x = request.times, run.n_x
@@ -144,20 +144,21 @@ def run_compiled(module: Module, request: Request, bar: Any = None) -> Outcome:
 
 
 def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
-    from symdyn.runtime.simulate import describe_stop
+    from symdyn.runtime.simulate import describe_stop, nearly_singular
 
-    n = run.n_x
+    n, metadata = run.n_x, run.unit.metadata
     t, x = report[0], report[8:8 + n]
     if interrupted:
-        return describe_stop(module.metadata, t, x, "interrupted")
+        return describe_stop(metadata, t, x, "interrupted")
     if stopped:
-        return describe_stop(module.metadata, t, x, f"{int(report[2])} steps were done, as asked")
+        return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _FIELD_FAILED:
-        return describe_stop(module.metadata, report[7], report[8 + n:], run.unit.reason(int(report[5])))
+        return describe_stop(metadata, report[7], report[8 + n:], run.unit.reason(int(report[5])))
     if status == _NOT_FINITE:
         bad = int(report[6])
-        name = module.metadata["x"][bad] if 0 <= bad < n else "the state"
-        return describe_stop(module.metadata, report[7], report[8 + n:], f"the derivative of {name} is not finite")
+        name = metadata["x"][bad] if 0 <= bad < n else "the state"
+        return describe_stop(metadata, report[7], report[8 + n:], f"the derivative of {name} is not finite")
     if status == _STEP_TOO_SMALL:
-        return describe_stop(module.metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances")
-    return describe_stop(module.metadata, t, x, f"the integrator refused (status {status})")
+        why = nearly_singular(module, t, x[:module.metadata["sizes"]["x"]], run.p[:module.metadata["sizes"]["p"]])
+        return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
+    return describe_stop(metadata, t, x, f"the integrator refused (status {status})")

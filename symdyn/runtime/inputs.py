@@ -50,8 +50,8 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     """
     zeros = {n: initial.get(n, 0.0) for n in names}
     start = np.array([zeros[n] for n in names], dtype=float)
-    if given is None or (not callable(given) and not isinstance(given, Mapping) and np.size(given) == 0 if not isinstance(
-            given, tuple) else given == ()):
+    empty = given.size == 0 if isinstance(given, np.ndarray) else isinstance(given, (Sequence, Mapping)) and not given
+    if given is None or empty:
         return Inputs(start)
     if not names:
         raise ArgumentError(f"{owner}: inputs were given, but the system has none")

@@ -49,6 +49,7 @@ class Module:
         self._writer = writer
         self._reporter = reporter
         self._local = threading.local()
+        self._lock = threading.Lock()
         self._n_x: int = metadata["sizes"]["x"]
         self._n_in: int = metadata["sizes"]["inputs"]
         self._defaults = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
@@ -63,9 +64,12 @@ class Module:
             evaluator, seen, mark = self._ready("rhs", params)
         if params is not seen or _mark(params) != mark:
             evaluator, seen, mark = self._ready("rhs", params)
-        if len(x) != self._n_x or len(inputs) != self._n_in or self._n_in:
+        try:
+            if self._n_in == 0 == len(inputs) and len(x) == self._n_x != 1:
+                return evaluator.one(t, x)
+        except (TypeError, ValueError):  # rows of states or of times, or no numbers at all
             return self.evaluate("rhs", t, x, params, inputs)
-        return evaluator.one(t, x)
+        return self.evaluate("rhs", t, x, params, inputs)
 
     def evaluate(self, name: str, t: Any, x: Any, params: Any = None, inputs: Any = (), ud: Any = ()) -> np.ndarray:
         """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
@@ -185,7 +189,9 @@ class Module:
 
     def _unit(self, name: str) -> Unit:
         if name not in self._units:
-            self._units[name] = self._provider(name)
+            with self._lock:  # the derivation behind it is for one thread at a time
+                if name not in self._units:
+                    self._units[name] = self._provider(name)
         return self._units[name]
 
     def _evaluator(self, name: str, params: Any) -> Evaluator:
@@ -209,7 +215,10 @@ class Module:
         n = max(q.ndim, u.ndim)
         if n == 1:
             return np.concatenate([q, u, np.zeros(sizes["z"])])
-        rows = max(len(a) for a in (q, u) if a.ndim == n)
+        lengths = {len(a) for a in (q, u) if a.ndim == n}
+        rows = max(lengths)
+        if lengths - {1, rows}:
+            raise ArgumentError(f"{self.name}: q has {len(q)} rows and u has {len(u)}; give the same number")
         return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, np.zeros(sizes["z"]))], axis=1)
 
     def _rows(self, values: Any, what: str, group: str) -> np.ndarray:
@@ -242,6 +251,8 @@ class BoundModule:
     def __init__(self, module: Module, p: np.ndarray) -> None:
         self.module = module
         self.params = p
+        self._n_x: int = module.metadata["sizes"]["x"]
+        self._n_in: int = module.metadata["sizes"]["inputs"]
         self._local = threading.local()
         self._ready("rhs")
 
@@ -251,12 +262,23 @@ class BoundModule:
             evaluator = self._local.rhs
         except AttributeError:
             evaluator = self._ready("rhs")
-        return evaluator.one(t, x, inputs) if len(inputs) else evaluator.one(t, x)
+        if len(x) == self._n_x and len(inputs) == self._n_in:
+            return evaluator.one(t, x, inputs) if self._n_in else evaluator.one(t, x)
+        return evaluator.one(t, x, self._zeros(x, inputs))
 
     def jacobian_x(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
         """d x_dot / d x (n_x, n_x)."""
         evaluator = getattr(self._local, "jacobian_x", None) or self._ready("jacobian_x")
-        return evaluator.one(t, x, inputs) if len(inputs) else evaluator.one(t, x)
+        if len(x) == self._n_x and len(inputs) == self._n_in:
+            return evaluator.one(t, x, inputs) if self._n_in else evaluator.one(t, x)
+        return evaluator.one(t, x, self._zeros(x, inputs))
+
+    def _zeros(self, x: Any, inputs: Any) -> np.ndarray:
+        """Inputs that were left out."""
+        if len(x) != self._n_x or len(inputs):
+            raise ArgumentError(f"{self.module.name}: x has {len(x)} entries and inputs has {len(inputs)}, needed are "
+                                f"{self._n_x} and {self._n_in}")
+        return np.zeros(self._n_in)
 
     def _ready(self, name: str) -> Any:
         evaluator = self.module.unit(name).evaluator(name)
@@ -271,4 +293,4 @@ def _mark(params: Any) -> Any:
         return None
     if isinstance(params, np.ndarray):
         return params.tobytes()
-    return tuple(params.values()) if isinstance(params, Mapping) else tuple(params)
+    return tuple(params.items()) if isinstance(params, Mapping) else tuple(params)

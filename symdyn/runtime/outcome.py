@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from symdyn.runtime.inputs import Inputs
 
 @dataclass(frozen=True)
 class Request:
-    """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator."""
+    """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator.
+
+    n_state   entries of x0 that are the mechanism's state; one more may be the work of the loads
+    """
 
     span: tuple[float, float]
     times: np.ndarray | None
@@ -23,6 +26,11 @@ class Request:
     max_step: float
     first_step: float
     max_steps: int | None
+    n_state: int
+
+    def with_work(self) -> Request:
+        """The same with one more state, the work of the loads, under the largest absolute tolerance."""
+        return replace(self, x0=np.append(self.x0, 0.0), atol=np.append(self.atol, self.atol.max(initial=self.rtol)))
 
 
 @dataclass(frozen=True)

@@ -60,11 +60,11 @@ class Film(FuncAnimation):
 
     def __init__(self, figure: Figure, draw: Callable[[int], list[Any]], count: int, fps: float) -> None:
         super().__init__(figure, draw, frames=count, interval=1000 / fps, blit=False)
-        self.place, self.count, self.fps = draw, count, fps
+        self.figure, self.place, self.count, self.fps = figure, draw, count, fps
 
     def gif(self) -> bytes:
         """The film as a GIF: what stays is drawn once, and what moves over it for each picture."""
-        figure = self._fig
+        figure: Any = self.figure
         moving = self.place(self.count - 1)
         palette = _palette(_pixels(figure))
         for artist in moving:
@@ -278,8 +278,9 @@ class Drawing:
         right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
         a, b = order[right - 1], order[right]
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
-        parts = [points[a] * (1 - w) + points[b] * w for points in (self.arms, self.rails, self.centres, *self.lines)]
-        return Drawing(parts[3:], *parts[:3], self.pivots, self.sliders, self.labels)
+        arms, rails, centres, *lines = [points[a] * (1 - w) + points[b] * w
+                                        for points in (self.arms, self.rails, self.centres, *self.lines)]
+        return Drawing(lines, arms, rails, centres, self.pivots, self.sliders, self.labels)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""

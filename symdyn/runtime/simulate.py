@@ -26,7 +26,7 @@ _SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
-             progress: bool = False) -> Solution:
+             progress: bool = False, work: bool = False) -> Solution:
     """Integrate the motion.
 
     t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
@@ -39,6 +39,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                 an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
     progress    show a bar (needs tqdm)
+    work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
 
     Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
     and why, and a SimulationWarning is given. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
@@ -49,8 +50,16 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     start = _start(module, q, u, z)
     free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name)
     times, span, every = _times(module, t, steps)
+    if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and max_steps > 0)):
+        raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, or None, found {max_steps!r}")
     request = Request(span, None if every else times, start, p, free, *_tolerances(module, rtol, atol),
-                      _positive(module, max_step, "max_step"), _positive(module, first_step, "first_step"), max_steps)
+                      _positive(module, max_step, "max_step"), _positive(module, first_step, "first_step"), max_steps,
+                      len(start))
+    field = "rhs"
+    if work:
+        if "power" not in metadata["functions"]:
+            raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
+        field, request = "rhs_work", request.with_work()
     method = method or ("dop853" if module.backend == "c" else "DOP853")
     bar = _bar(module, span) if progress else None
     begun = clock.perf_counter()
@@ -59,13 +68,14 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             if module.backend != "c":
                 raise ArgumentError(f"{module.name}: the compiled integrator 'dop853' needs the C backend; this module "
                                     f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
-            outcome = run_compiled(module, request, bar)
+            outcome = run_compiled(module, request, bar, field)
         else:
-            outcome = _run_scipy(module, request, method, bar)
+            outcome = _run_scipy(module, request, method, bar, field)
     finally:
         if bar is not None:
             bar.close()
-    solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun)
+    solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
+                        work)
     if outcome.interrupted:
         raise SimulationInterrupted(solution, outcome.message)
     if not outcome.success:
@@ -128,7 +138,7 @@ def _bar(module: Module, span: tuple[float, float]) -> Any:
                 bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
 
 
-def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outcome:
+def _run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
     """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
     from scipy import integrate
 
@@ -137,9 +147,14 @@ def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outco
             raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
                                 f"{', '.join(_SCIPY)}, or pass an OdeSolver class")
         solver_class = getattr(integrate, method)
-    else:
+    elif isinstance(method, type) and issubclass(method, integrate.OdeSolver):
         solver_class = method
+    else:
+        raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
     bound = module.bind(request.p)
+    evaluator = module.unit(field_name).evaluator("rhs")
+    evaluator.set_params(request.p)
+    n_state = request.n_state
     free: Inputs = request.inputs
     n_in = len(free.constant)
     options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
@@ -147,40 +162,55 @@ def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outco
         options["max_step"] = request.max_step
     if request.first_step:
         options["first_step"] = request.first_step
-    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
-        options["jac"] = lambda s, x: bound.jacobian_x(s, x, free.at(s, x)) if n_in else bound.jacobian_x(s, x)
-    trouble: list[EvaluationError] = []
+    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and len(request.x0) == n_state:
+        options["jac"] = lambda s, x: bound.jacobian_x(s, x, given(s, x)) if n_in else bound.jacobian_x(s, x)
+    trouble: list[str] = []  # why the step under way could not be evaluated
+    raised: list[Exception] = []
+
+    def given(s: float, x: np.ndarray) -> np.ndarray:
+        try:
+            return free.at(s, x)
+        except Exception as error:
+            raised.append(error)
+            raise
 
     def field(s: float, x: np.ndarray) -> np.ndarray:
         try:
-            return bound.rhs(s, x, free.at(s, x)) if n_in else bound.rhs(s, x)
+            return evaluator.one(s, x, given(s, x[:n_state]) if n_in else None)
         except EvaluationError as error:
-            trouble.append(error)
+            if np.isfinite(x).all():
+                trouble.append(str(error).removeprefix(f"{module.name}: "))
             return np.full(len(x), np.nan)
 
     t0, t_end = request.span
     ts, xs = [t0], [request.x0]
     pending = list(request.times[1:]) if request.times is not None else []
     accepted, message, interrupted = 0, "", False
+    here, state = t0, request.x0
     solver: Any = None
     try:
         with np.errstate(all="ignore"):
+            if not np.isfinite(field(t0, request.x0)).all():  # SciPy would look for a first step for ever
+                raise EvaluationError(trouble[-1])
             solver = solver_class(field, t0, request.x0, t_end, **options)
             while solver.status == "running":
                 before = solver.t
                 note = solver.step()
                 if solver.status == "failed" or not np.isfinite(solver.y).all():
-                    message = str(trouble[-1]) if trouble else note or "the state is not finite"
+                    message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
+                        module, here, state[:n_state], request.p) if note else "the state is not finite"
                     break
                 accepted += 1
+                here, state = float(solver.t), solver.y.copy()
+                trouble.clear()
                 if request.times is None:
                     ts.append(solver.t)
-                    xs.append(solver.y.copy())
+                    xs.append(state)
                 else:
                     dense = None
                     while pending and (pending[0] - solver.t) * solver.direction <= 0:
                         dense = dense or solver.dense_output()
-                        xs.append(solver.y.copy() if pending[0] == solver.t else dense(pending[0]))
+                        xs.append(state if pending[0] == solver.t else dense(pending[0]))
                         ts.append(pending.pop(0))
                 if bar is not None:
                     bar.update(abs(solver.t - before))
@@ -190,12 +220,31 @@ def _run_scipy(module: Module, request: Request, method: Any, bar: Any) -> Outco
     except KeyboardInterrupt:
         interrupted, message = True, "interrupted"
     except (ValueError, ArithmeticError) as error:
-        message = str(trouble[-1]) if trouble else str(error)
+        if error in raised:
+            raise
+        message = trouble[-1] if trouble else str(error)
     done = not message
-    here = float(solver.t) if solver is not None else t0
-    state = solver.y if solver is not None else request.x0
-    return Outcome(np.array(ts), np.array(xs), done, "reached the end" if done else describe_stop(module.metadata, here, state,
-                   message), interrupted, accepted, 0, int(solver.nfev) if solver is not None else 0)
+    n = min(len(ts), len(xs))  # an interrupt may come between the two
+    if not done:
+        message = describe_stop(module.unit(field_name).metadata, here, state, message)
+    return Outcome(np.array(ts[:n]), np.array(xs[:n]), done, message or "reached the end", interrupted, accepted, 0, int(solver.nfev) if solver is not None else 0)
+
+
+def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
+    """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
+    if "mass_matrix" not in module.functions or not module.metadata["u"]:
+        return ""
+    try:
+        M = module.evaluate("mass_matrix", t, x, p)
+    except EvaluationError:
+        return ""
+    scale = np.sqrt(np.maximum(np.diagonal(M), 1e-300))
+    values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+    if values[0] > 1e-8 * values[-1]:
+        return ""
+    share = np.abs(vectors[:, 0])
+    names = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
+    return f"; the mass matrix is nearly singular there, along {', '.join(names)}"
 
 
 def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:

@@ -28,9 +28,11 @@ class Solution:
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
-                 seconds: float) -> None:
+                 seconds: float, work: bool = False) -> None:
         self.module = module
-        self.t, self.x = outcome.t, outcome.x
+        self.t = outcome.t
+        self.x = outcome.x[:, :-1] if work else outcome.x
+        self._work = outcome.x[:, -1] if work else None
         self.success, self.message = outcome.success, outcome.message
         self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
         self.integrator_seconds = outcome.seconds
@@ -70,6 +72,18 @@ class Solution:
         """Kinetic and potential energy, (n_t, 2), J."""
         return self._rows("energy")
 
+    @property
+    def work(self) -> np.ndarray:
+        """Work of all loads but gravity and springs since the start, (n_t,), J.
+
+        Raises ArgumentError if the simulation was not asked for it and there are such loads.
+        """
+        if self._work is not None:
+            return self._work
+        if self.module.metadata["conservative"]:
+            return np.zeros(len(self.t))
+        raise ArgumentError(f"{self.module.name} has loads that do work; pass work=True to simulate")
+
     @cached_property
     def inputs(self) -> np.ndarray:
         """The inputs at every time, (n_t, n_in)."""
@@ -99,11 +113,13 @@ class Solution:
         return np.zeros((len(self.t), 0))
 
     def energy_error(self) -> float:
-        """Largest change of energy over the largest of kinetic energy and range of potential energy; for motion without
-        loads other than gravity and springs."""
+        """Largest |change of energy - work of the loads| over the larger of kinetic energy and range of potential energy.
+
+        Raises ArgumentError as `work` does.
+        """
         kinetic, potential = self.energies.T
         scale = max(kinetic.max(), np.ptp(potential))
-        return float(np.abs(self.energy - self.energy[0]).max() / scale) if scale > 0 else 0.0
+        return float(np.abs(self.energy - self.energy[0] - self.work).max() / scale) if scale > 0 else 0.0
 
     # -- pictures and files
 

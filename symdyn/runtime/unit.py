@@ -10,7 +10,7 @@ import hashlib
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
@@ -30,7 +30,7 @@ class Evaluator(Protocol):
     def set_params(self, p: np.ndarray) -> None:
         """Take parameters over and run the prologue."""
 
-    def one(self, t: float, x: Any, inputs: Any, ud: Any) -> np.ndarray:
+    def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
         """The result at one state."""
 
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
@@ -110,8 +110,10 @@ class CEvaluator:
         self.address = ctypes.c_void_p(ctypes.addressof(self.frame))
 
     def set_params(self, p: np.ndarray) -> None:
-        self.p[:len(p)] = p
-        self.unit.prologue(self.p, self.c)
+        taken, constants = np.zeros_like(self.p), np.zeros_like(self.c)
+        taken[:len(p)] = p
+        self.unit.prologue(taken, constants)
+        self.p[:], self.c[:] = taken, constants  # not before the prologue has succeeded
 
     def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
         self.t[0] = t
@@ -127,7 +129,7 @@ class CEvaluator:
 
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
         arrays = [np.ascontiguousarray(a, dtype=float) for a in (t, x, ud, inputs)]
-        n = max(len(a) for a in arrays)
+        n = _rows(arrays)
         out = np.empty((n, self.size))
         frame = Frame(n, *[a.ctypes.data for a in (*arrays, self.p, self.c, out)], *[int(len(a) > 1) for a in arrays], 0)
         code = self.unit.function(f"{self.name}_rows")(ctypes.byref(frame))
@@ -191,7 +193,7 @@ class PythonEvaluator:
         return self._evaluate(float(t), np.asarray(x, dtype=float), inputs, ud)
 
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
-        n = max(len(a) for a in (t, x, inputs, ud))
+        n = _rows((t, x, inputs, ud))
         rows = [np.broadcast_to(a, (n, *np.shape(a)[1:])) for a in (t, x, inputs, ud)]
         with np.errstate(all="ignore"):
             return self._evaluate(*rows)
@@ -204,6 +206,12 @@ class PythonEvaluator:
         if not np.isfinite(result).all():
             raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
         return result
+
+
+def _rows(arrays: Sequence[np.ndarray]) -> int:
+    """How many states there are: one row holds for all, and no row is no state."""
+    lengths = [len(a) for a in arrays]
+    return 0 if 0 in lengths else max(lengths)
 
 
 def failure(metadata: Mapping[str, Any], name: str, reason: str, t: Any, x: Any) -> str:

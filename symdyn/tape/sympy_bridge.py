@@ -83,6 +83,10 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
             return recorder.apply("exp", 1)
         if isinstance(e, (BooleanTrue, BooleanFalse)):
             return bool(e)
+        if isinstance(e, sp.ITE):
+            condition, yes, no = map(take, e.args)
+            return recorder.apply("or", recorder.apply("and", condition, yes),
+                                  recorder.apply("and", recorder.apply("not", condition), no))
         for kind, op in _FOLDED.items():
             if isinstance(e, kind):
                 return fold(op, e.args)

@@ -1,0 +1,97 @@
+"""Keeps what was generated for mechanisms of the catalogue, so that the next run needs neither derivation nor SymPy.
+
+A record is a JSON file in the cache folder: the metadata of a module, and for every function that was used the source
+and the metadata of its unit. It holds as long as no file of symdyn changes; what it lacks is derived and added.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import symdyn
+from symdyn.runtime import cache
+from symdyn.runtime.compiler import Compiler, find_compiler, no_compiler_reason, require_compiler
+from symdyn.runtime.module import Module
+from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+
+
+def recall(name: str, options: Mapping[str, Any], backend: str | None = None) -> Module:
+    """The module of a system of the catalogue, from what is remembered of it as far as that goes.
+
+    backend   "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
+    Raises what deriving and compiling the system raises.
+    """
+    compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
+    chosen = backend or ("c" if compiler else "numpy")
+    memory = _Memory(name, options, chosen, compiler)
+    fallback = no_compiler_reason() if backend is None and compiler is None else ""
+    return Module(memory.metadata, memory.unit, chosen, fallback, lambda folder: memory.derived.write(folder),
+                  lambda: memory.derived.report())
+
+
+class _Memory:
+    """The record of one system with one backend."""
+
+    def __init__(self, name: str, options: Mapping[str, Any], backend: str, compiler: Compiler | None) -> None:
+        self.name, self.options, self.backend, self.compiler = name, dict(options), backend, compiler
+        own = hashlib.sha256(repr((name, sorted(self.options.items()), backend)).encode()).hexdigest()[:16]
+        self.path = cache.cache_dir() / f"{name}-{own}.json"
+        self.state = _state_of_symdyn()
+        self.record = self._read() or {"state": self.state, "metadata": dict(self.derived.metadata), "units": {}}
+        self.metadata: Mapping[str, Any] = self.record["metadata"]
+
+    @cached_property
+    def derived(self) -> Module:
+        """The module made from the description."""
+        from symdyn import systems
+        from symdyn.pipeline import compile_equations
+
+        return compile_equations(systems.get(self.name, **self.options).embedding(), self.backend)
+
+    def unit(self, function: str) -> Unit:
+        """A unit from the record, else a derived one, which is put into it."""
+        units = self.record["units"]
+        if function in units:
+            source, metadata = units[function]["source"], units[function]["metadata"]
+            if self.backend == "c":
+                assert self.compiler is not None
+                return CUnit(source, metadata, self.compiler)
+            return PythonUnit.from_source(source, metadata["name"])
+        unit: Any = self.derived.unit(function)
+        source = unit.source if isinstance(unit, CUnit) else Path(unit.module.__file__).read_text(encoding="utf-8")
+        units[function] = {"source": source, "metadata": dict(unit.metadata)}
+        self._write()
+        return unit
+
+    def _read(self) -> dict[str, Any] | None:
+        try:
+            record = json.loads(self.path.read_text(encoding="utf-8"))
+            found = record["state"] == self.state and isinstance(record["units"], dict) and record["metadata"]["name"]
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return record if found else None
+
+    def _write(self) -> None:
+        """Whoever reads sees a whole record; if the disk is full there is none, and the next run derives again."""
+        scratch = self.path.with_suffix(f".{os.getpid()}.tmp")
+        with contextlib.suppress(OSError):
+            scratch.write_text(json.dumps(self.record), encoding="utf-8")
+            os.replace(scratch, self.path)
+
+
+def _state_of_symdyn() -> str:
+    """Changes whenever a file that shapes generated code may have changed."""
+    package = Path(symdyn.__file__).parent
+    # In a checkout the templates lie beside the package, in an installation inside it.
+    folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
+    files = sorted(p for folder in folders for ending in ("*.py", "*.jinja", "*.toml") for p in folder.rglob(ending))
+    seen = [(str(p), found.st_size, found.st_mtime_ns) for p in files for found in [p.stat()]]
+    return hashlib.sha256(repr((symdyn.__version__, sys.version, seen)).encode()).hexdigest()

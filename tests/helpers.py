@@ -1,0 +1,84 @@
+"""What several tests share: numbers for the inputs of a tape, and closeness at 30 digits."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import sympy as sp
+
+from symdyn.formulation.equations import Equations
+from symdyn.tape import Node, Tape
+from symdyn.tape.evaluate import evaluate
+
+DIGITS = 30
+TOLERANCE = mpmath.mpf(10) ** -25
+
+
+def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:
+    """A number for each name, the same for the same seed, exact in any arithmetic."""
+    rng = random.Random(seed)
+    return {name: Fraction(round(rng.uniform(low, high) * 2**20), 2**20) for name in names}
+
+
+def state(equations: Equations, seed: int = 0, **given: Any) -> dict[str, Any]:
+    """Numbers for every symbol of the equations (derivatives of speeds zero), some given; Euler parameters of unit norm."""
+    s = equations.symbols
+    names = [a.name for a in (*s.coordinates, *s.speeds, *s.states, *s.inputs, *s.parameters)]
+    values: dict[str, Any] = {**numbers(names, seed), "t": Fraction(3, 10), **{f"{u.name}_dot": 0 for u in s.speeds}, **given}
+    with mpmath.workdps(2 * DIGITS):
+        for first in [n for n in values if n.startswith("e0")]:
+            group = [n for n in values if n[:1] == "e" and n[2:] == first[2:]]
+            norm = mpmath.sqrt(sum(mpmath.mpf(values[n].numerator) ** 2 / values[n].denominator**2 for n in group))
+            values.update({n: mpmath.mpf(values[n].numerator) / values[n].denominator / norm for n in group})
+    return values
+
+
+def at(tape: Tape, values: Mapping[str, Any], digits: int = DIGITS) -> dict[str, np.ndarray]:
+    """All outputs of a tape; fractions among the values are taken exactly."""
+    with mpmath.workdps(digits + 10):
+        plain = {k: mpmath.mpf(v.numerator) / v.denominator if isinstance(v, Fraction) else v for k, v in values.items()}
+    return evaluate(tape, plain, digits)
+
+
+def quantities(equations: Equations, values: Mapping[str, Any], *names: str, digits: int = DIGITS) -> list[np.ndarray]:
+    """Quantities of the equations in numbers, in the order of the names."""
+    result = at(equations.tape(*names), values, digits)
+    return [result[name] for name in names]
+
+
+def largest(*arrays: Any) -> Any:
+    """The largest absolute value in some arrays."""
+    return max((abs(v) for a in arrays for v in np.asarray(a, dtype=object).ravel()), default=mpmath.mpf(0))
+
+
+def close(a: Any, b: Any, tolerance: Any = TOLERANCE) -> bool:
+    """Whether two arrays agree, relative to the largest entry (at least 1)."""
+    a, b = np.asarray(a, dtype=object), np.asarray(b, dtype=object)
+    assert a.shape == b.shape, f"shapes {a.shape} and {b.shape}"
+    with mpmath.workdps(2 * DIGITS):
+        return bool(largest(a - b) <= tolerance * max(1, largest(a), largest(b)))
+
+
+def exact(tape: Tape, name: str, values: Mapping[str, Fraction]) -> Fraction:
+    """An output that uses + - * / only, in exact arithmetic."""
+    rules = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
+             "neg": lambda a: -a}
+    done: dict[Node, Fraction] = {}
+    for node in tape.steps:
+        done[node] = values[node.args[1]] if node.op == "leaf" else Fraction(rules[node.op](
+            *[done[a] if isinstance(a, Node) else Fraction(a) for a in node.args]))
+    entry = tape.outputs[name].entries[0]
+    return done[entry] if isinstance(entry, Node) else Fraction(entry)
+
+
+def in_sympy(expression: sp.Expr, values: Mapping[str, Fraction], digits: int = 40) -> Any:
+    """A SymPy expression in numbers, as mpmath's."""
+    at = {s: sp.Rational(values[s.name].numerator, values[s.name].denominator) for s in expression.free_symbols}
+    value = sp.N(expression.doit().xreplace(at), digits, maxn=200)
+    with mpmath.workdps(digits):
+        return mpmath.mpf(str(value)) if value.is_real else complex(value)
