@@ -20,6 +20,7 @@ SOURCES = sorted(FOLDER.glob("*.py"))
 def notebook(source: Path) -> Any:
     """The notebook of a .py file. The id of a cell is made of its content, so that it stays when other cells change."""
     made = jupytext.read(source)
+    made.metadata.jupytext.pop("text_representation", None)
     seen: dict[str, int] = {}
     for cell in made.cells:
         content = f"{cell.cell_type}\n{cell.source}"

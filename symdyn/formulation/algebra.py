@@ -10,6 +10,7 @@ import sympy as sp
 
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
+from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
@@ -35,10 +36,7 @@ class TapeAlgebra:
 
     def constants(self, values: Iterable[Any]) -> np.ndarray:
         """A vector of expressions on the tape."""
-        entries = [self.expression(e) for e in values]
-        result = np.empty(len(entries), dtype=object)
-        result[:] = entries
-        return result
+        return vector(*[self.expression(e) for e in values])
 
     def matrix(self, values: sp.MatrixBase) -> np.ndarray:
         """A matrix of expressions on the tape."""

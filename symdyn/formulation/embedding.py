@@ -26,9 +26,9 @@ from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model
-from symdyn.spatial.vectors import zeros
+from symdyn.spatial.vectors import congruence, cross, inner, zeros
 from symdyn.tape.differentiate import forward
-from symdyn.tape.node import Node
+from symdyn.tape.node import is_zero
 from symdyn.tape.recorder import Recorder
 
 
@@ -127,7 +127,7 @@ class EmbeddedTree(Motion):
         if self.tree.plain:
             return self.algebra.name("M_tilde", M)
         with self.algebra.section("mass matrix in the generalized speeds"):
-            return self.algebra.name("M_tilde", _congruence(M, self.tree.D))
+            return self.algebra.name("M_tilde", congruence(M, self.tree.D))
 
     def bias(self) -> np.ndarray:
         """k_tilde - F_tilde in one pass: the weight as acceleration of the base."""
@@ -161,11 +161,8 @@ class EmbeddedTree(Motion):
                 with self.algebra.section(f"link {link.name}: weight"):
                     turned.append(link.R.T @ (g if link.parent == GROUND else turned[link.parent]))
                     f = link.inertia.m * turned[k]
-                    h = link.inertia.h
-                    n = np.array([h[1] * turned[k][2] - h[2] * turned[k][1], h[2] * turned[k][0] - h[0] * turned[k][2],
-                                  h[0] * turned[k][1] - h[1] * turned[k][0]], dtype=object)
                     force, moment = applied.wrenches[k]
-                    applied.wrenches[k] = (force + f, moment + n)
+                    applied.wrenches[k] = (force + f, moment + cross(link.inertia.h, turned[k]))
         return inward(self.tree, applied.wrenches) + applied.joint
 
     def _project(self, tau: np.ndarray) -> np.ndarray:
@@ -214,13 +211,13 @@ class EmbeddedTree(Motion):
         """Power of all loads but gravity and springs, and of the drives that force prescribed motions, W."""
         with self.algebra.section("power"):
             total: Any = 0
-            if any(not _zero(v) for v in self._joint_forces(False, conservative=False)):
-                total = _sum(self._joint_forces(False, conservative=False), self.tree.w)
-            if any(not _zero(v) for v in self.tree.w_t):
+            if any(not is_zero(v) for v in self._joint_forces(False, conservative=False)):
+                total = inner(self._joint_forces(False, conservative=False), self.tree.w)
+            if any(not is_zero(v) for v in self.tree.w_t):
                 applied = self.loads.applied()
                 w_dot = self.tree.D @ self.accelerations() + self.tree.b
                 tau = inverse_dynamics(self.tree, w_dot, -self._gravity(), applied.wrenches) - applied.joint
-                total = total + _sum(tau, self.tree.w_t)
+                total = total + inner(tau, self.tree.w_t)
             return total
 
     def output(self, value: Any) -> Any:
@@ -240,7 +237,7 @@ class EmbeddedTree(Motion):
         faults = []
         M = self.recall("M_tilde")
         for k, u in enumerate(self.speeds):
-            if _zero(M[k, k]):
+            if is_zero(M[k, k]):
                 joint = next(j for j in self.model.joints if u in [*(j.speeds or ()), *[
                     q.dot for q in j.coordinates if isinstance(q, sp.Symbol) and hasattr(q, "dot")]] or u.name.endswith(
                         f"_{j.name}"))
@@ -249,31 +246,6 @@ class EmbeddedTree(Motion):
                               "or fix the joint")
         if faults:
             raise ModelError(faults, self.model.name)
-
-
-def _congruence(M: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """D^T M D, symmetric entries once."""
-    half = M @ D if M.shape[0] else zeros(0, D.shape[1])
-    n = D.shape[1]
-    result = zeros(n, n)
-    for i in range(n):
-        for j in range(i + 1):
-            total: Any = 0
-            for k in range(D.shape[0]):
-                total = total + D[k, i] * half[k, j]
-            result[i, j] = result[j, i] = total
-    return result
-
-
-def _sum(a: np.ndarray, b: np.ndarray) -> Any:
-    total: Any = 0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
-
-
-def _zero(value: Any) -> bool:
-    return not isinstance(value, Node) and value == 0
 
 
 def _notes(model: Model) -> list[str]:

@@ -20,7 +20,7 @@ from symdyn.formulation.equations import Symbols
 from symdyn.formulation.motion import Motion
 from symdyn.model.faults import Faults
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_coordinate, time
-from symdyn.spatial.vectors import zeros
+from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.recorder import Recorder
@@ -100,13 +100,7 @@ class _PositionMap(Motion):
     def M_tilde(self) -> np.ndarray:
         J = self.J()
         with self.algebra.section("mass matrix J^T M J"):
-            half = self.M @ J
-            n = J.shape[1]
-            result = zeros(n, n)
-            for i in range(n):
-                for j in range(i + 1):
-                    result[i, j] = result[j, i] = _dot(J[:, i], half[:, j])
-            return self.algebra.name("M_tilde", result)
+            return self.algebra.name("M_tilde", congruence(self.M, J))
 
     def k_tilde(self) -> np.ndarray:
         return self.algebra.name("k_tilde", self._onto_columns(self.M @ self.Jd_qd()))
@@ -127,25 +121,14 @@ class _PositionMap(Motion):
     def kinetic_energy(self) -> Any:
         """r_dot^T M r_dot / 2, J."""
         velocity = self._rate(self.r)
-        return _dot(velocity, self.M @ velocity) / 2
+        return inner(velocity, self.M @ velocity) / 2
 
     def _onto_columns(self, values: np.ndarray) -> np.ndarray:
         J = self.J()
-        result = np.empty(J.shape[1], dtype=object)
-        result[:] = [_dot(J[:, j], values) for j in range(J.shape[1])]
-        return result
+        return vector(*[inner(J[:, j], values) for j in range(J.shape[1])])
 
     def _rate(self, values: np.ndarray) -> np.ndarray:
-        result = np.empty(len(values), dtype=object)
-        result[:] = forward(self.algebra.recorder, values.tolist(), self.by_time())
-        return result
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> Any:
-    total: Any = 0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
+        return vector(*forward(self.algebra.recorder, values.tolist(), self.by_time()))
 
 
 def _column(faults: Faults, values: Any, what: str) -> list[sp.Expr]:

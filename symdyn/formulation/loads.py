@@ -14,6 +14,7 @@ from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import cross, dot, zeros
 from symdyn.tape.differentiate import forward
+from symdyn.tape.node import is_zero
 
 
 @dataclass
@@ -103,12 +104,12 @@ class Loads:
         damping = a.expression(load.damping) if damped else 0
         d, length, common = self._line(load)
         along: Any = 0
-        if not _zero(stiffness):
+        if not is_zero(stiffness):
             rest = a.expression(load.length)
-            along = stiffness if _zero(rest) else stiffness * (1 - rest / length)
-        if not _zero(damping):
+            along = stiffness if is_zero(rest) else stiffness * (1 - rest / length)
+        if not is_zero(damping):
             along = along + damping * self._rate(length) / length
-        if _zero(along):
+        if is_zero(along):
             return
         pull = d * along
         for body, point, force in ((load.body_a, load.point_a, pull), (load.body_b, load.point_b, -pull)):
@@ -168,9 +169,3 @@ class Loads:
                 at = self.tree.links[k].r + self.tree.links[k].R @ at
             moved.append(at)
         return common, moved
-
-
-
-
-def _zero(value: Any) -> bool:
-    return isinstance(value, int) and value == 0

@@ -12,6 +12,7 @@ import sympy as sp
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.composite import Factors, factorize
 from symdyn.model.symbols import time
+from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.passes import substitute
@@ -30,14 +31,14 @@ class Motion:
         self.coordinates, self.speeds, self.inputs, self.parameters = coordinates, speeds, inputs, parameters
         self.states = states
         self.rates = list(rates)
-        self.speed_rates = _array([algebra.recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds])
+        self.speed_rates = vector(*[algebra.recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds])
         self._memory: dict[str, Any] = {}
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
         recorded: dict[str, Callable[[], Any]] = {
             "M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
-            "accelerations": self.accelerations, "rates": lambda: _array(self.rates), "rhs": self.rhs,
+            "accelerations": self.accelerations, "rates": lambda: vector(*self.rates), "rhs": self.rhs,
             "jacobian_x": lambda: self.jacobian(self.x()),
             "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
             "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
@@ -78,7 +79,7 @@ class Motion:
 
     def rhs(self) -> np.ndarray:
         """x_dot for x = [q; u; z]."""
-        return _array([*self.rates, *self.recall("accelerations"), *self.state_rates()])
+        return vector(*self.rates, *self.recall("accelerations"), *self.state_rates())
 
     def x(self) -> list[Any]:
         """The leaves of the state."""
@@ -101,7 +102,7 @@ class Motion:
             residual = self.inverse_dynamics()
             derivatives = jacobian(recorder, residual.tolist(), by)
             at = dict(zip(self.speed_rates, ud, strict=True))
-            derivatives = _array(substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
+            derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
             columns = [factors.solve(-derivatives[:, j]) for j in range(len(by))]
             middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
             top = _rows(recorder, self.rates, by)
@@ -117,9 +118,3 @@ def _rows(recorder: Any, entries: Sequence[Any], by: Sequence[Any]) -> np.ndarra
     for j, leaf in enumerate(by):
         rows[:, j] = forward(recorder, entries, {leaf: 1})
     return rows
-
-
-def _array(values: Sequence[Any]) -> np.ndarray:
-    result = np.empty(len(values), dtype=object)
-    result[:] = list(values)
-    return result

@@ -14,7 +14,7 @@ from symdyn.formulation.algebra import TapeAlgebra, add_rates
 from symdyn.model.joints import Fixed, Joint, JointMotion
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
-from symdyn.spatial.vectors import Inertia, cross, dot, identity, zeros
+from symdyn.spatial.vectors import Inertia, identity, vector, zeros
 from symdyn.tape.differentiate import forward
 
 GROUND = -1
@@ -123,8 +123,8 @@ class _Builder:
         D = np.array(self.rows, dtype=object).reshape(len(self.w), n_u)
         links = tuple(Link(k.name, k.joint, k.parent, k.R, k.r, k.S, k.c, k.speeds, inertia)
                       for k, inertia in zip(self.links, self.inertias, strict=True))
-        return Tree(model, a, links, tuple(p for p in poses if p is not None), ground, D, _column(self.w),
-                    _column(self.w_t), _column(self.b), self.rates)
+        return Tree(model, a, links, tuple(p for p in poses if p is not None), ground, D, vector(*self.w),
+                    vector(*self.w_t), vector(*self.b), self.rates)
 
     def _fixed(self, joint: Joint, parent: Pose) -> Pose:
         a = self.algebra
@@ -202,12 +202,3 @@ def _symmetric(I: np.ndarray) -> np.ndarray:
         for j in range(i):
             result[i, j] = result[j, i]
     return result
-
-
-def _column(values: list[Any]) -> np.ndarray:
-    result = np.empty(len(values), dtype=object)
-    result[:] = values
-    return result
-
-
-__all__ = ["GROUND", "Link", "Pose", "Tree", "build", "cross", "dot"]

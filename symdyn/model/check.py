@@ -44,6 +44,7 @@ class _Checker:
     def __init__(self, system: System) -> None:
         self.system = system
         self.faults = Faults(system._faults)
+        self.doubts: list[str] = []
         self.known = {"ground": system.ground, **{b.name: b for b in system.bodies if isinstance(b.name, str)}}
         self.index = {id(system.ground): -1, **{id(b): k for k, b in enumerate(system.bodies)}}
         self.joints = list(dict.fromkeys(system.joints))
@@ -70,6 +71,8 @@ class _Checker:
             self.faults.append(f"duration is {s.duration} s; pass a positive number")
         if self.faults:
             raise ModelError(list(dict.fromkeys(self.faults)), s.name)
+        for doubt in self.doubts:
+            warnings.warn(doubt, ModelWarning, stacklevel=4)
         return Model(
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
@@ -127,11 +130,10 @@ class _Checker:
             elif self.system.planar:
                 return
             elif values[0] + values[1] < values[2] * (1 - 1e-9):
-                warnings.warn(f"{where}: principal moments {_list(values)} kg m^2 violate the triangle inequality; "
-                              "no real body has them", ModelWarning, stacklevel=5)
+                self.doubts.append(f"{where}: principal moments {_list(values)} kg m^2 violate the triangle inequality; "
+                                   "no real body has them")
             elif values[0] <= 1e-12 * scale:
-                warnings.warn(f"{where}: inertia is semidefinite, principal moments {_list(values)} kg m^2",
-                              ModelWarning, stacklevel=5)
+                self.doubts.append(f"{where}: inertia is semidefinite, principal moments {_list(values)} kg m^2")
 
     # -- tree
 
@@ -193,7 +195,7 @@ class _Checker:
         while waiting:
             ready = [c for c, (_, p) in waiting.items() if p in placed]
             if not ready:
-                looped = [c for c in waiting if _in_loop(c, edges)]
+                looped = sorted(c for c in waiting if _in_loop(c, edges))
                 if looped:
                     names = ", ".join(repr(s.bodies[c].name) for c in looped)
                     self.faults.append(f"bodies {names} hang on each other in a loop and not on the ground; "
@@ -239,13 +241,14 @@ class _Checker:
         speeds: list[sp.Symbol] = []
         for joint in self.joints:
             independent = [isinstance(q, Coordinate) for q in joint.coordinates]
-            if joint.n_speeds != len(joint.coordinates) and not all(independent):
+            if joint.n_speeds != len(joint.coordinates) and not all(independent) and not joint.faults:
                 self.faults.append(f"joint {joint.name!r}: with Euler parameters every coordinate must be a symbol; "
                                    "use Euler angles for a prescribed motion")
-            for q in joint.coordinates:
+            for place, q in enumerate(joint.coordinates):
                 if not isinstance(q, Coordinate):
                     continue
                 if q in driver:
+                    independent[place] = False
                     self.faults.append(
                         f"joints {driver[q].name!r} and {joint.name!r} both drive the coordinate {q}; give each its own, "
                         f"or write one as an expression (gear: 2*{q}; mimic: sympy.UnevaluatedExpr({q}))")
@@ -428,7 +431,7 @@ class _Checker:
                     units.setdefault(core, unit)
 
         s = self.system
-        for joint in s.joints:
+        for joint in self.joints:
             for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True):
                 if isinstance(q, Coordinate):
                     units[q] = unit
@@ -443,16 +446,16 @@ class _Checker:
             note([body.mass], "kg")
             note(body.com, "m")
             note(body.inertia, "kg m^2")
-        for joint in s.joints:
+        for joint in self.joints:
             note([*joint.parent_point, *joint.child_point], "m")
-        for load in s.loads:
+        for load in self.loads:
             if isinstance(load, Force):
                 note(load.force, "N")
                 note(load.point, "m")
             elif isinstance(load, Torque):
                 note(load.torque, "N m")
             elif isinstance(load, JointForce):
-                driven = next((j for j in s.joints if load.joint in (j, j.name)), None)
+                driven = next((j for j in self.joints if load.joint in (j, j.name)), None)
                 note(load.values, "N m" if isinstance(driven, Revolute) else "N")
             elif isinstance(load, SpringDamper):
                 note([load.stiffness], "N/m")

@@ -39,8 +39,8 @@ class Faults(list[str]):
         if isinstance(value, sp.MatrixBase):
             entries = list(value)
         else:
-            if hasattr(value, "tolist"):
-                value = value.tolist()
+            if hasattr(value, "ravel"):
+                value = value.ravel().tolist()
             entries = list(value) if isinstance(value, (list, tuple)) else [value]
         return tuple(self.expression(e, what) for e in entries)
 

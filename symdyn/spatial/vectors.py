@@ -38,6 +38,25 @@ def dot(a: Vector, b: Vector) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def inner(a: Vector, b: Vector) -> Any:
+    """Sum of the products of the entries of two vectors of any length."""
+    total: Any = 0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
+def congruence(M: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """D^T M D, symmetric entries once."""
+    half = M @ D if M.shape[0] else zeros(0, D.shape[1])
+    n = D.shape[1]
+    result = zeros(n, n)
+    for i in range(n):
+        for j in range(i + 1):
+            result[i, j] = result[j, i] = inner(D[:, i], half[:, j])
+    return result
+
+
 @dataclass(frozen=True)
 class Inertia:
     """Mass m, first moment h = m r_G and inertia I about the origin of the frame, (3, 3), in the frame's axes."""

@@ -82,7 +82,8 @@ SPATIAL: dict[str, Case] = {
     "inertia number": (lambda s: extra(s, inertia=3), "body 'extra': inertia is 3|pass a list"),
     "inertia text": (lambda s: extra(s, inertia=EVIL), "body 'extra': inertia is|pass a list"),
     "inertia entry text": (lambda s: extra(s, inertia=[1, 1, "1"]), "inertia[3, 3] is the text '1'|never evaluated"),
-    "inertia short": (lambda s: extra(s, inertia=[1, 2]), "inertia is not a 3 x 3 matrix|three rows of three, or the three diagonal"),
+    "inertia short": (lambda s: extra(s, inertia=[1, 2]),
+                      "inertia is not a 3 x 3 matrix|three rows of three, or the three diagonal"),
     "inertia ragged": (lambda s: extra(s, inertia=[[1, 0, 0], [0, 1], [0, 0, 1]]), "inertia is not a 3 x 3 matrix"),
     "inertia asymmetric": (lambda s: extra(s, inertia=[[1, k, 0], [0, 1, 0], [0, 0, 1]]),
                            "inertia is not symmetric|I[1, 2] = k|I[2, 1] = 0|pass a symmetric matrix"),
@@ -101,8 +102,10 @@ SPATIAL: dict[str, Case] = {
     # joints
     "joint no joint": (lambda s: s.add_joint("shoulder"), "add_joint was given 'shoulder'|sd.Revolute"),
     "joint class": (lambda s: s.add_joint(sd.Revolute), "add_joint was given <class|sd.Revolute"),
-    "joint name": (lambda s: s.add_joint(sd.Fixed(None, "lower", s.add_body("extra"))), "one of the joints is named None|pass text"),
-    "joints of one name": (lambda s: s.add_joint(sd.Fixed("elbow", "lower", s.add_body("extra"))), "2 joints are named 'elbow'"),
+    "joint name": (lambda s: s.add_joint(sd.Fixed(None, "lower", s.add_body("extra"))),
+                   "one of the joints is named None|pass text"),
+    "joints of one name": (lambda s: s.add_joint(sd.Fixed("elbow", "lower", s.add_body("extra"))),
+                           "2 joints are named 'elbow'"),
     "joint twice": (lambda s: s.add_joint(s.joints[0]), "joint 'shoulder' was added 2 times|add it once"),
     "joint to itself": (lambda s: s.add_joint(sd.Free("float", s.add_body("extra"), "extra", sd.coordinates("a:6"))),
                         "joint 'float' joins body 'extra' to itself|two different bodies"),
@@ -110,22 +113,27 @@ SPATIAL: dict[str, Case] = {
                         "joint 'hold': the ground is its child|exchange parent and child"),
     "unknown child": (lambda s: s.add_joint(sd.Fixed("hold", "lower", "uper")),
                       "joint 'hold': child is 'uper', which is no body|bodies: ground, upper, lower|did you mean 'upper'"),
-    "unknown parent": (lambda s: s.add_joint(sd.Fixed("hold", None, s.add_body("extra"))), "joint 'hold': parent is None|bodies: ground"),
-    "parent list": (lambda s: s.add_joint(sd.Fixed("hold", ["lower"], s.add_body("extra"))), "joint 'hold': parent is ['lower']"),
+    "unknown parent": (lambda s: s.add_joint(sd.Fixed("hold", None, s.add_body("extra"))),
+                       "joint 'hold': parent is None|bodies: ground"),
+    "parent list": (lambda s: s.add_joint(sd.Fixed("hold", ["lower"], s.add_body("extra"))),
+                    "joint 'hold': parent is ['lower']"),
     "body of another system": (lambda s: s.add_joint(sd.Fixed("hold", "lower", arm().bodies[0])),
                                "joint 'hold': child is 'upper', which is a body of another system"),
     "ground of another system": (lambda s: s.add_joint(sd.Fixed("hold", arm().ground, s.add_body("extra"))),
                                  "joint 'hold': parent is 'ground', which is a body of another system"),
     "two parents": (lambda s: s.add_joint(sd.Revolute("third", s.ground, "lower", q3)),
                     "body 'lower' is the child of joints 'elbow' and 'third'|add one of them with close_loop"),
-    "same coordinate twice": (lambda s: joined(s, sd.Revolute, q1), "joints 'shoulder' and 'wrist' both drive the coordinate q1|"
+    "same coordinate twice": (lambda s: joined(s, sd.Revolute, q1),
+                              "joints 'shoulder' and 'wrist' both drive the coordinate q1|"
                               "gear: 2*q1|mimic: sympy.UnevaluatedExpr(q1)"),
     "coordinate text": (lambda s: joined(s, sd.Revolute, "q3"), "joint 'wrist': coordinate 1 is the text 'q3'|never evaluated"),
     "coordinate None": (lambda s: joined(s, sd.Revolute, None), "joint 'wrist': coordinate 1 is None"),
     "coordinate list": (lambda s: joined(s, sd.Revolute, [q3]), "joint 'wrist': coordinate 1 is [q3] of type list"),
-    "coordinates text": (lambda s: joined(s, sd.Cylindrical, "q3 q4"), "joint 'wrist': coordinates is 'q3 q4'|pass a list of 2"),
+    "coordinates text": (lambda s: joined(s, sd.Cylindrical, "q3 q4"),
+                         "joint 'wrist': coordinates is 'q3 q4'|pass a list of 2"),
     "coordinates one": (lambda s: joined(s, sd.Cylindrical, q3), "joint 'wrist': coordinates is q3|pass a list of 2"),
-    "coordinates few": (lambda s: joined(s, sd.Spherical, [q3, q4]), "joint 'wrist' (spherical) takes 3 coordinates (rad, rad, rad), found 2"),
+    "coordinates few": (lambda s: joined(s, sd.Spherical, [q3, q4]),
+                        "joint 'wrist' (spherical) takes 3 coordinates (rad, rad, rad), found 2"),
     "coordinates for parameters": (lambda s: joined(s, sd.Spherical, [q3, q4, q9], sd.EulerParameters()),
                                    "joint 'wrist' (spherical) takes 4 coordinates (1, 1, 1, 1), found 3"),
     "coordinate driven by nobody": (lambda s: joined(s, sd.Revolute, 2 * q9),
@@ -138,64 +146,94 @@ SPATIAL: dict[str, Case] = {
     "coordinate named t": (lambda s: joined(s, sd.Revolute, sd.coordinates("t")), "named 't', which is the time|another name"),
     "speed twice": (lambda s: joined(s, sd.Revolute, q3, speed=q1.dot), "the speed q1_dot belongs to 2 joints"),
     "speed is its coordinate": (lambda s: joined(s, sd.Revolute, q3, speed=q3), "q3 is a coordinate and a speed at once"),
-    "speed text": (lambda s: joined(s, sd.Revolute, q3, speed="u3"), "joint 'wrist' (revolute) takes 1 symbols as speeds, found ['u3']"),
+    "speed text": (lambda s: joined(s, sd.Revolute, q3, speed="u3"),
+                   "joint 'wrist' (revolute) takes 1 symbols as speeds, found ['u3']"),
     "speeds number": (lambda s: joined(s, sd.Cylindrical, [q3, q4], speeds=5), "takes 2 symbols as speeds, found 5"),
     "speed clashes with a derivative": (lambda s: joined(s, sd.Revolute, q3, speed=sd.speeds("q1_dot_dot")),
                                         "'q1_dot_dot' stands for the derivative of the speed q1_dot"),
-    "axis long": (lambda s: joined(s, sd.Revolute, q3, axis=[1, 1, 0]), "joint 'wrist': axis [1, 1, 0] has length 1.41421, not 1|divide it"),
-    "axis zero": (lambda s: joined(s, sd.Prismatic, q3, axis=[0, 0, 0]), "axis [0, 0, 0] has length 0|a direction that is not zero"),
+    "axis long": (lambda s: joined(s, sd.Revolute, q3, axis=[1, 1, 0]),
+                  "joint 'wrist': axis [1, 1, 0] has length 1.41421, not 1|divide it"),
+    "axis zero": (lambda s: joined(s, sd.Prismatic, q3, axis=[0, 0, 0]),
+                  "axis [0, 0, 0] has length 0|a direction that is not zero"),
     "axis None": (lambda s: joined(s, sd.Revolute, q3, axis=None), "joint 'wrist': axis is None|pass a list"),
     "axis text": (lambda s: joined(s, sd.Revolute, q3, axis="z"), "joint 'wrist': axis is 'z'|pass a list"),
     "axis of 4": (lambda s: joined(s, sd.Revolute, q3, axis=[0, 0, 0, 1]), "joint 'wrist': axis has 4 components|pass 2 or 3"),
-    "axis moving": (lambda s: joined(s, sd.Revolute, q3, axis=[sp.cos(q1), sp.sin(q1), 0]), "joint 'wrist' depends on q1|must be constant"),
-    "one axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0]]), "joint 'wrist' (universal) takes 2 axes, found [[1, 0, 0]]"),
+    "axis moving": (lambda s: joined(s, sd.Revolute, q3, axis=[sp.cos(q1), sp.sin(q1), 0]),
+                    "joint 'wrist' depends on q1|must be constant"),
+    "one axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0]]),
+                 "joint 'wrist' (universal) takes 2 axes, found [[1, 0, 0]]"),
     "axes None": (lambda s: joined(s, sd.Universal, [q3, q4], axes=None), "joint 'wrist' (universal) takes 2 axes, found None"),
-    "second axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0], [0, 2, 0]]), "second axis [0, 2, 0] has length 2"),
-    "parallel axes": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[0, 0, 1], [0, 0, -1]]), "its two axes are parallel|Revolute"),
-    "point text": (lambda s: joined(s, sd.Revolute, q3, parent_point=["l", 0, 0]), "joint 'wrist': parent_point, component 1 is the text 'l'"),
+    "second axis": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[1, 0, 0], [0, 2, 0]]),
+                    "second axis [0, 2, 0] has length 2"),
+    "parallel axes": (lambda s: joined(s, sd.Universal, [q3, q4], axes=[[0, 0, 1], [0, 0, -1]]),
+                      "its two axes are parallel|Revolute"),
+    "point text": (lambda s: joined(s, sd.Revolute, q3, parent_point=["l", 0, 0]),
+                   "joint 'wrist': parent_point, component 1 is the text 'l'"),
     "point long": (lambda s: joined(s, sd.Revolute, q3, child_point=[0] * 4), "joint 'wrist': child_point has 4 components"),
-    "point moving": (lambda s: joined(s, sd.Revolute, q3, parent_point=[q1, 0, 0]), "joint 'wrist' depends on q1|must be constant"),
+    "point moving": (lambda s: joined(s, sd.Revolute, q3, parent_point=[q1, 0, 0]),
+                     "joint 'wrist' depends on q1|must be constant"),
     "rotation skewed": (lambda s: joined(s, sd.Revolute, q3, parent_rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
                         "joint 'wrist': parent_rotation is not a rotation|differs from the identity by 0.1"),
-    "rotation mirrored": (lambda s: joined(s, sd.Revolute, q3, child_rotation=[1, 1, -1]), "child_rotation is not a rotation|determinant"),
-    "rotation shape": (lambda s: joined(s, sd.Revolute, q3, child_rotation=[[1, 0], [0, 1]]), "child_rotation is not a 3 x 3 matrix"),
+    "rotation mirrored": (lambda s: joined(s, sd.Revolute, q3, child_rotation=[1, 1, -1]),
+                          "child_rotation is not a rotation|determinant"),
+    "rotation shape": (lambda s: joined(s, sd.Revolute, q3, child_rotation=[[1, 0], [0, 1]]),
+                       "child_rotation is not a 3 x 3 matrix"),
     "rotation text": (lambda s: joined(s, sd.Revolute, q3, parent_rotation="eye"), "parent_rotation is 'eye'|pass a list"),
-    "orientation text": (lambda s: joined(s, sd.Spherical, [q3, q4, q9], "XYZ"), "joint 'wrist': orientation is 'XYZ'|sd.EulerAngles('ZYX')"),
-    "orientation class": (lambda s: joined(s, sd.Free, sd.coordinates("a:6"), sd.EulerParameters), "orientation is <class|sd.EulerParameters()"),
+    "orientation text": (lambda s: joined(s, sd.Spherical, [q3, q4, q9], "XYZ"),
+                         "joint 'wrist': orientation is 'XYZ'|sd.EulerAngles('ZYX')"),
+    "orientation class": (lambda s: joined(s, sd.Free, sd.coordinates("a:6"), sd.EulerParameters),
+                          "orientation is <class|sd.EulerParameters()"),
     "nothing with inertia": (lambda s: s.add_joint(sd.Revolute("wrist", "lower", s.add_body("extra"), q3)),
                              "joint 'wrist': what it moves has no mass or inertia along q3_dot|give body 'extra'|or fix the joint"),
     # loads
-    "force on nobody": (lambda s: s.add_force("uper", [1, 0, 0]), "force_1: body is 'uper', which is no body|did you mean 'upper'"),
+    "force on nobody": (lambda s: s.add_force("uper", [1, 0, 0]),
+                        "force_1: body is 'uper', which is no body|did you mean 'upper'"),
     "force on None": (lambda s: s.add_force(None, [1, 0, 0]), "force_1: body is None"),
-    "force frame": (lambda s: s.add_force("upper", [1, 0, 0], frame="N"), "force_1: frame is 'N', which is no body|bodies: ground"),
+    "force frame": (lambda s: s.add_force("upper", [1, 0, 0], frame="N"),
+                    "force_1: frame is 'N', which is no body|bodies: ground"),
     "force reaction": (lambda s: s.add_force("upper", [1, 0, 0], reaction="foot"), "force_1: reaction is 'foot'"),
-    "force on itself": (lambda s: s.add_force("upper", [1, 0, 0], reaction="upper"), "force_1: body and reaction are the same body"),
+    "force on itself": (lambda s: s.add_force("upper", [1, 0, 0], reaction="upper"),
+                        "force_1: body and reaction are the same body"),
     "force short": (lambda s: s.add_force("upper", [1, 0]), "force_1 has 2 components|pass 3"),
-    "force text": (lambda s: s.add_force("upper", ["-k*q1", 0, 0], name="wind"), "wind, component 1 is the text '-k*q1'|never evaluated"),
-    "force of nobody's coordinate": (lambda s: s.add_force("upper", [q9, 0, 0]), "force_1 uses q9, which no joint and no state drives"),
+    "force text": (lambda s: s.add_force("upper", ["-k*q1", 0, 0], name="wind"),
+                   "wind, component 1 is the text '-k*q1'|never evaluated"),
+    "force of nobody's coordinate": (lambda s: s.add_force("upper", [q9, 0, 0]),
+                                     "force_1 uses q9, which no joint and no state drives"),
     "force of an acceleration": (lambda s: s.add_force("upper", [q1.ddot, 0, 0]), "force_1 uses the acceleration q1_ddot"),
-    "force of other time": (lambda s: s.add_force("upper", [sp.Symbol("t", real=True), 0, 0]), "force_1 uses a symbol t with assumptions|symdyn.t"),
-    "force of unknown function": (lambda s: s.add_force("upper", [sp.Function("f")(q1), 0, 0]), "force_1, component 1 uses f(q1)|no value"),
-    "force of third derivative": (lambda s: s.add_force("upper", [dynamicsymbols("q1", 3), 0, 0]), "force_1, component 1 uses|no value"),
-    "force point moving": (lambda s: s.add_force("upper", [1, 0, 0], point=[q1, 0, 0]), "force_1: point depends on q1|must be constant"),
+    "force of other time": (lambda s: s.add_force("upper", [sp.Symbol("t", real=True), 0, 0]),
+                            "force_1 uses a symbol t with assumptions|symdyn.t"),
+    "force of unknown function": (lambda s: s.add_force("upper", [sp.Function("f")(q1), 0, 0]),
+                                  "force_1, component 1 uses f(q1)|no value"),
+    "force of third derivative": (lambda s: s.add_force("upper", [dynamicsymbols("q1", 3), 0, 0]),
+                                  "force_1, component 1 uses|no value"),
+    "force point moving": (lambda s: s.add_force("upper", [1, 0, 0], point=[q1, 0, 0]),
+                           "force_1: point depends on q1|must be constant"),
     "force point text": (lambda s: s.add_force("upper", [1, 0, 0], point="tip"), "force_1: point is 'tip'|pass a list"),
-    "plain symbol for a coordinate": (lambda s: s.add_force("upper", [sp.Symbol("q1"), 0, 0]), "2 different symbols are named 'q1'|once"),
-    "same name, other assumptions": (lambda s: s.add_force("upper", [sp.Symbol("m", positive=True), 0, 0]), "2 different symbols are named 'm'"),
+    "plain symbol for a coordinate": (lambda s: s.add_force("upper", [sp.Symbol("q1"), 0, 0]),
+                                      "2 different symbols are named 'q1'|once"),
+    "same name, other assumptions": (lambda s: s.add_force("upper", [sp.Symbol("m", positive=True), 0, 0]),
+                                     "2 different symbols are named 'm'"),
     "input and parameter": (lambda s: s.add_force("upper", [sd.inputs("k"), k, 0]), "2 different symbols are named 'k'"),
-    "symbol's name": (lambda s: s.add_force("upper", [sp.Symbol('a"""\nb'), 0, 0]), "one of the symbols is named|pass text on one line"),
+    "symbol's name": (lambda s: s.add_force("upper", [sp.Symbol('a"""\nb'), 0, 0]),
+                      "one of the symbols is named|pass text on one line"),
     "torque number": (lambda s: s.add_torque("upper", 5), "torque_1 is 5|pass a list"),
     "torque on nobody": (lambda s: s.add_torque("foot", [0, 0, 1]), "torque_1: body is 'foot'"),
     "load's name": (lambda s: s.add_torque("upper", [0, 0, 1], name="a\nb"), "one of the loads is named 'a\\nb'"),
-    "joint force on nobody": (lambda s: s.add_joint_force("elbo", tau), "joint_force_1 acts on the joint 'elbo'|joints: shoulder, elbow|"
+    "joint force on nobody": (lambda s: s.add_joint_force("elbo", tau),
+                              "joint_force_1 acts on the joint 'elbo'|joints: shoulder, elbow|"
                               "did you mean 'elbow'"),
     "joint force on None": (lambda s: s.add_joint_force(None, tau), "joint_force_1 acts on the joint None"),
-    "joint force of another system": (lambda s: s.add_joint_force(arm().joints[0], tau), "joint_force_1 acts on the joint Revolute('shoulder')"),
-    "joint force count": (lambda s: s.add_joint_force("elbow", [1, 2]), "joint_force_1 has 2 values; joint 'elbow' has 1 degrees of freedom"),
+    "joint force of another system": (lambda s: s.add_joint_force(arm().joints[0], tau),
+                                      "joint_force_1 acts on the joint Revolute('shoulder')"),
+    "joint force count": (lambda s: s.add_joint_force("elbow", [1, 2]),
+                          "joint_force_1 has 2 values; joint 'elbow' has 1 degrees of freedom"),
     "joint force text": (lambda s: s.add_joint_force("elbow", EVIL), "joint_force_1 is the text|never evaluated"),
     "spring to nobody": (lambda s: s.add_spring_damper("upper", "wall", stiffness=k), "spring_1: body_b is 'wall'"),
-    "spring to itself": (lambda s: s.add_spring_damper("upper", s.bodies[0], [1, 0, 0], stiffness=k), "body_a and body_b are the same body"),
+    "spring to itself": (lambda s: s.add_spring_damper("upper", s.bodies[0], [1, 0, 0], stiffness=k),
+                         "body_a and body_b are the same body"),
     "spring point": (lambda s: s.add_spring_damper("upper", "lower", point_a=1, stiffness=k), "spring_1: point_a is 1"),
-    "spring stiffness text": (lambda s: s.add_spring_damper("upper", "lower", stiffness="k"), "spring_1: stiffness is the text 'k'"),
+    "spring stiffness text": (lambda s: s.add_spring_damper("upper", "lower", stiffness="k"),
+                              "spring_1: stiffness is the text 'k'"),
     "spring stiffness moving": (lambda s: s.add_spring_damper("upper", "lower", [0, 1, 0], [0, 2, 0], stiffness=k * q1),
                                 "spring_1 depends on q1|must be constant"),
     # outputs, states, constraints
@@ -206,12 +244,14 @@ SPATIAL: dict[str, Case] = {
     "output of nobody's coordinate": (lambda s: s.add_output("tip", [q1, q9]), "output 'tip' uses q9"),
     "position of nobody": (lambda s: s.add_output("tip", sd.position("hand")), "output 'tip': body is 'hand'"),
     "position point": (lambda s: s.add_output("tip", sd.position("upper", 5)), "output 'tip': point is 5|pass a list"),
-    "position point moving": (lambda s: s.add_output("tip", sd.velocity("upper", [q1, 0, 0])), "output 'tip': point depends on q1"),
+    "position point moving": (lambda s: s.add_output("tip", sd.velocity("upper", [q1, 0, 0])),
+                              "output 'tip': point depends on q1"),
     "state text": (lambda s: s.add_state("z", 1), "add_state was given 'z' as its state|sd.coordinates('z')"),
     "state twice": (lambda s: [s.add_state(q9, 1), s.add_state(q9, 2)], "2 states are named 'q9'"),
     "state is a coordinate": (lambda s: s.add_state(q1, 1), "q1 is a coordinate and a state at once"),
     "state rate text": (lambda s: s.add_state(q9, "1"), "rate of state q9 is the text '1'"),
-    "constraint": (lambda s: s.add_constraint(q1 - q2), "the model has 1 constraints or closed loops|takes trees only|augmented()"),
+    "constraint": (lambda s: s.add_constraint(q1 - q2),
+                   "the model has 1 constraints or closed loops|takes trees only|augmented()"),
     "constraint text": (lambda s: s.add_constraint("q1 - q2"), "constraint 1 is the text 'q1 - q2'"),
     "loop": (lambda s: s.close_loop(sd.Revolute("close", "lower", s.ground, q9)), "1 constraints or closed loops|augmented()"),
     "loop no joint": (lambda s: s.close_loop("elbow"), "close_loop was given 'elbow'|sd.Revolute"),
@@ -223,7 +263,8 @@ SPATIAL: dict[str, Case] = {
     "ground text": (lambda s: s.move_ground(["t", 0, 0]), "move_ground: position, component 1 is the text 't'"),
     "ground angles": (lambda s: s.move_ground([0, 0, 0], sd.t), "move_ground: angles is t|pass a list"),
     "ground angles short": (lambda s: s.move_ground([0, 0, 0], [sd.t]), "move_ground: angles has 1 components|pass 3"),
-    "joint named as the ground's": (lambda s: [s.move_ground([sd.t, 0, 0]), s.add_joint(sd.Fixed("ground_motion", "lower", s.add_body("x")))],
+ 
+                                      "joint named as the ground's": (lambda s: [s.move_ground([sd.t, 0, 0]), s.add_joint(sd.Fixed("ground_motion", "lower", s.add_body("x")))],
                                     "2 joints are named 'ground_motion'"),
     # numbers
     "default unknown": (lambda s: s.set_defaults({sp.Symbol("mm"): 1}), "defaults has a number for 'mm', which is no parameter|"
@@ -235,7 +276,8 @@ SPATIAL: dict[str, Case] = {
     "default nan": (lambda s: s.set_defaults({m: math.nan}), "defaults: the value of m is nan|pass a finite number"),
     "default complex": (lambda s: s.set_defaults({m: 1j}), "defaults: the value of m is 1j"),
     "defaults list": (lambda s: setattr(s, "defaults", [1, 2]), "defaults is [1, 2]|pass a dict"),
-    "initial unknown": (lambda s: s.initial.update({"q1dot": 1}), "initial has a number for 'q1dot'|no coordinate, speed, state or input|"
+    "initial unknown": (lambda s: s.initial.update({"q1dot": 1}),
+                        "initial has a number for 'q1dot'|no coordinate, speed, state or input|"
                         "there are q1, q2, q1_dot, q2_dot|did you mean 'q1_dot'"),
     "initial for a parameter": (lambda s: s.initial.update({m: 1}), "initial has a number for 'm'"),
     "initial text": (lambda s: s.initial.update({q1: "0"}), "initial: the value of q1 is '0'"),
@@ -244,12 +286,14 @@ SPATIAL: dict[str, Case] = {
 }
 
 PLANAR: dict[str, Case] = {
-    "spherical": (lambda s: joined(s, sd.Spherical, sd.coordinates("a:3")), "joint 'wrist' is spherical, but the system is planar|"
+    "spherical": (lambda s: joined(s, sd.Spherical, sd.coordinates("a:3")),
+                  "joint 'wrist' is spherical, but the system is planar|"
                   "use Revolute, Prismatic, Planar or Fixed|planar=False"),
     "free": (lambda s: joined(s, sd.Free, sd.coordinates("a:6")), "joint 'wrist' is free, but the system is planar"),
     "axis x": (lambda s: joined(s, sd.Revolute, q3, axis=[1, 0, 0]), "axis [1, 0, 0] is not along z, but the system is planar"),
     "slide along z": (lambda s: joined(s, sd.Prismatic, q3, axis=[0, 0, 1]), "axis [0, 0, 1] is not in the x-y plane"),
-    "parent_rotation": (lambda s: joined(s, sd.Revolute, q3, parent_rotation=turned), "parent_rotation turns out of the x-y plane"),
+    "parent_rotation": (lambda s: joined(s, sd.Revolute, q3, parent_rotation=turned),
+                        "parent_rotation turns out of the x-y plane"),
     "child_rotation": (lambda s: joined(s, sd.Fixed, child_rotation=turned), "child_rotation turns out of the x-y plane"),
     "ground": (lambda s: s.move_ground([0, 0], [0, sd.t, 0]), "move_ground: angles turn the ground out of the x-y plane"),
     "force of 4": (lambda s: s.add_force("upper", [1, 2, 3, 4]), "force_1 has 4 components; pass 2 or 3"),
@@ -285,10 +329,13 @@ def _one(faults: tuple[str, ...], parts: str) -> None:
 @pytest.mark.parametrize(("options", "part"), [
     ({"gravity": 9.81}, "gravity is 9.81; pass a list"), ({"gravity": "down"}, "gravity is 'down'; pass a list"),
     ({"gravity": [1]}, "gravity has 1 components; pass 3"), ({"gravity": [0, 0, 0, 0]}, "gravity has 4 components"),
-    ({"gravity": [0, 0, "-g"]}, "gravity, component 3 is the text '-g'"), ({"gravity": [0, -9.81], "planar": False}, "gravity has 2 components"),
-    ({"gravity": [0, 0, math.inf]}, "gravity, component 3 is oo"), ({"gravity": [0, 0, q1]}, "gravity depends on q1, but must be constant"),
+    ({"gravity": [0, 0, "-g"]}, "gravity, component 3 is the text '-g'"),
+    ({"gravity": [0, -9.81], "planar": False}, "gravity has 2 components"),
+    ({"gravity": [0, 0, math.inf]}, "gravity, component 3 is oo"),
+    ({"gravity": [0, 0, q1]}, "gravity depends on q1, but must be constant"),
     ({"parameters": "m l"}, "parameters has 'm l'; pass a list of symbols"), ({"parameters": [m, "l"]}, "parameters has 'l'"),
-    ({"name": "my arm"}, "the system's name is 'my arm'; pass an identifier"), ({"name": "class"}, "the system's name is 'class'"),
+    ({"name": "my arm"}, "the system's name is 'my arm'; pass an identifier"),
+    ({"name": "class"}, "the system's name is 'class'"),
     ({"name": 5}, "the system's name is 5"), ({"name": ""}, "the system's name is ''"),
 ], ids=str)
 def test_fault_of_the_system_itself(options: dict[str, Any], part: str) -> None:
@@ -348,8 +395,8 @@ def test_all_faults_come_at_once() -> None:
     error = caught.value
     assert len(error.faults) == len(set(error.faults)) >= 20
     assert str(error).startswith(f"the model 'arm' has {len(error.faults)} faults:\n  - gravity, component 3")
-    for word in ("mass", "inertia", "com", "axis", "parent_rotation", "coordinate 1", "2 bodies", "nobody", "joint 'k'", "'a b'", "q9",
-                 "'z'", "rate of state", "defaults", "initial", "duration"):
+    for word in ("mass", "inertia", "com", "axis", "parent_rotation", "coordinate 1", "2 bodies", "nobody", "joint 'k'",
+                 "'a b'", "q9", "'z'", "rate of state", "defaults", "initial", "duration"):
         assert any(word in fault for fault in error.faults), word
 
 
@@ -363,7 +410,8 @@ def test_describing_never_raises_and_check_can_be_repeated() -> None:
 def test_text_is_never_evaluated() -> None:
     s = sd.System("arm", gravity=[EVIL, 0, 0])
     body = s.add_body("b", mass=EVIL, inertia=[[EVIL] * 3] * 3, com=[EVIL] * 3)
-    s.add_joint(sd.Revolute("j", s.ground, body, EVIL, axis=[EVIL] * 3, parent_point=[EVIL] * 3, parent_rotation=[[EVIL] * 3] * 3))
+    s.add_joint(sd.Revolute("j", s.ground, body, EVIL, axis=[EVIL] * 3, parent_point=[EVIL] * 3,
+                            parent_rotation=[[EVIL] * 3] * 3))
     s.add_force(body, [EVIL] * 3, point=[EVIL] * 3)
     s.add_torque(body, [EVIL] * 3)
     s.add_joint_force("j", [EVIL])
@@ -387,7 +435,7 @@ def test_euler_sequences(sequence: Any) -> None:
 @pytest.mark.parametrize("names", ["", " ", 5, None, ["q1"]])
 @pytest.mark.parametrize("make", [sd.coordinates, sd.speeds, sd.parameters, sd.inputs])
 def test_names_of_symbols(make: Any, names: Any) -> None:
-    with pytest.raises(ModelError, match="names of symbols are .*; pass text such as 'q1 q2'"):
+    with pytest.raises(ModelError, match=r"names of symbols are .*; pass text such as 'q1 q2'"):
         make(names)
 
 
@@ -415,18 +463,18 @@ def test_sound_inertias_are_not(inertia: Any, recwarn: pytest.WarningsRecorder) 
 # -- what is accepted
 
 
-@pytest.mark.parametrize("value", [1, 1.5, Fraction(3, 2), np.float64(1.5), np.float32(1.5), np.int64(2), np.array(1.5), np.array([1.5]), m,
-                                   sp.Rational(3, 2), sp.sqrt(2), sp.pi * m], ids=repr)
+@pytest.mark.parametrize("value", [1, 1.5, Fraction(3, 2), np.float64(1.5), np.float32(1.5), np.int64(2), np.array(1.5),
+                                   np.array([1.5]), m, sp.Rational(3, 2), sp.sqrt(2), sp.pi * m], ids=repr)
 def test_scalars(value: Any) -> None:
     s = arm()
     part = extra(s, mass=value)
     s.add_joint_force("elbow", value)
-    assert part.mass == (sp.sympify(value) if isinstance(value, sp.Expr) else sp.sympify(float(value)))
+    assert part.mass - (value if isinstance(value, sp.Expr) else sp.Rational(str(np.ravel(value)[0]))) == 0
     assert len(s.check().bodies) == 3
 
 
-@pytest.mark.parametrize("value", [[1, 2, 3], (1.0, 2, 3), np.array([1, 2, 3]), np.array([[1.0], [2], [3]]), sp.Matrix([1, 2, 3]),
-                                   sp.Matrix([[1, 2, 3]]), sp.ImmutableMatrix([1, 2, 3])], ids=repr)
+@pytest.mark.parametrize("value", [[1, 2, 3], (1.0, 2, 3), np.array([1, 2, 3]), np.array([[1.0], [2], [3]]),
+                                   sp.Matrix([1, 2, 3]), sp.Matrix([[1, 2, 3]]), sp.ImmutableMatrix([1, 2, 3])], ids=repr)
 def test_vectors(value: Any) -> None:
     s = arm()
     part = extra(s, com=value)
@@ -435,17 +483,17 @@ def test_vectors(value: Any) -> None:
     s.joints.pop()
     s.add_force("upper", value)
     s.add_output("o", value)
-    assert list(part.com) == [1, 2, 3] and list(joint.parent_point) == [1, 2, 3]
     model = s.check()
-    assert list(model.loads[0].force) == [1, 2, 3] and list(map(int, np.ravel(model.outputs[0].value).tolist())) == [1, 2, 3]
+    for taken in (part.com, joint.parent_point, model.loads[0].force, model.outputs[0].value):
+        assert [float(e) for e in taken] == [1, 2, 3]
 
 
-@pytest.mark.parametrize("value", [[1, 1, 1], np.eye(3), np.ones(3), sp.eye(3), sp.ImmutableMatrix(sp.eye(3)), [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-                                   [np.array([1, 0, 0]).tolist(), (0, 1, 0), [0, 0, 1]]], ids=repr)
+@pytest.mark.parametrize("value", [[1, 1, 1], np.eye(3), np.ones(3), sp.eye(3), sp.ImmutableMatrix(sp.eye(3)),
+                                   [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [np.array([1, 0, 0]).tolist(), (0, 1, 0), [0, 0, 1]]], ids=repr)
 def test_matrices(value: Any) -> None:
     s = arm()
     part = extra(s, inertia=value)
-    assert part.inertia == sp.eye(3) and s.check()
+    assert [float(e) for e in part.inertia] == list(np.eye(3).ravel()) and s.check()
 
 
 def test_numbers_by_name_or_symbol() -> None:
@@ -472,7 +520,7 @@ def test_unusual_names_are_no_fault(name: str) -> None:
     mass, q = sp.Symbol(name + "1"), sp.Symbol(name)
     bob = s.add_body(name, mass=mass, com=[0, -1])
     s.add_joint(sd.Revolute(name, s.ground, bob, q))
-    s.add_joint_force(name, -q.name.count("z") - sd.coordinates("w").dot if name == "never" else 0, name=name)
+    s.add_joint_force(name, 0, name=name)
     s.defaults, s.initial = {mass: 2.0}, {name: 0.5}
     equations = s.embedding()
     found = equations.compile(backend="numpy").rhs(0.0, [0.5, 0.1])
