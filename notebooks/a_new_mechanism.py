@@ -30,6 +30,7 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
+from symdyn.pipeline import emit, write_source
 
 # %% [markdown]
 # ## 1. Description
@@ -115,39 +116,40 @@ assert verification.passed
 # against reference vectors. Here are the beginnings of source and header.
 
 # %%
-module = equations.compile()
-work = tempfile.TemporaryDirectory()
-files = {path.name: path for path in module.write(work.name)}
-print(", ".join(files), end="\n\n")
-print("\n".join(files["crane.c"].read_text().splitlines()[:60]), end="\n\n...\n\n")
+code = emit(equations, "c")
+print(", ".join(code.files), end="\n\n")
+print("\n".join(code.files["crane.c"].splitlines()[:60]), end="\n\n...\n")
 
 # %%
-header = files["crane.h"].read_text().splitlines()
+header = code.files["crane.h"].splitlines()
 first = next(n for n, line in enumerate(header) if line.startswith("enum"))
 print("\n".join(header[first:first + 20]), end="\n\n...\n")
 
 # %% [markdown]
-# Build it and let it check itself, if there is a compiler.
+# Write it to a folder, build it and let it check itself, if there is a compiler.
 
 # %%
 compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 if compiler:
-    program = str(Path(work.name) / "crane_check")
-    sources = [str(files["main.c"]), str(files["crane.c"])]
-    subprocess.run([compiler, "-std=c99", "-O2", "-Wall", "-Wextra", "-o", program, *sources, "-lm"], check=True)
-    print(subprocess.run([program], check=True, capture_output=True, text=True).stdout)
+    with tempfile.TemporaryDirectory() as folder:
+        write_source(code, Path(folder))
+        build = [compiler, "-std=c99", "-O2", "-Wall", "-Wextra", "-o", "crane_check", "main.c", "crane.c", "-lm"]
+        subprocess.run(build, cwd=folder, check=True)
+        print(subprocess.run([Path(folder) / "crane_check"], check=True, capture_output=True, text=True).stdout)
 else:
-    print("no C compiler here; the module runs on", module.backend)
-work.cleanup()
+    print("there is no C compiler here")
 
 # %% [markdown]
 # ## 5. How the load swings
+#
+# The same code, compiled and loaded, is a module that evaluates and simulates. Without a compiler it is NumPy code.
 #
 # In equilibrium the rope is longer than $l$ by what hook and container stretch it. There the exact Jacobian of the state
 # equations gives the natural periods of the crane: the slow swing of the load, the fast swing of container against hook,
 # the bounce of the rope and the stretch of the belt.
 
 # %%
+module = equations.compile()
 sag = (crane.defaults[m_h] + crane.defaults[m_c]) * crane.defaults[g] / crane.defaults[k_r]
 still = {"x": 0, "alpha": 0, "r": crane.defaults[l] + sag, "beta": 0}
 state = np.array([*still.values(), *np.zeros(5)])

@@ -110,12 +110,14 @@ def symmetric(s: Sample) -> float | None:
 
 
 def positive_definite(s: Sample) -> float | None:
-    """How far the smallest eigenvalue is below zero, relative to the largest."""
+    """Zero if it is; else how far the smallest eigenvalue is below zero, relative to the largest, but at least 1e-20."""
     if not s.numbers:
         return None
     values = mpmath.eigsy(mpmath.matrix(s["M_tilde"].tolist()), eigvals_only=True)
     smallest, largest = min(values), max(values)
-    return 0.0 if smallest > 0 else float(-smallest / largest) if largest > 0 else 1.0
+    if largest <= 0:
+        return 1.0
+    return 0.0 if smallest > 1e-20 * largest else max(1e-20, float(-smallest / largest))
 
 
 def equations_hold(s: Sample) -> float | None:
@@ -139,7 +141,7 @@ def energy_balance(s: Sample) -> float | None:
     tape = Tape.of(eq.recorder, rates=rates, power=eq.quantity("power"))
     found = evaluate(tape, s.values, s.digits)
     power = found["power"].ravel()[0]
-    return _relative(np.array([sum(found["rates"]) - power]), np.array([*found["rates"], power]))
+    return _relative(np.array([sum(found["rates"]) - power]), np.array([*found["rates"], power, *s["energy"]]))
 
 
 def kinetic_energy_quadratic(s: Sample) -> float | None:

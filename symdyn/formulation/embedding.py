@@ -21,6 +21,7 @@ from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.loads import Loads
 from symdyn.formulation.motion import Motion
 from symdyn.formulation.newton_euler import inverse_dynamics, inward
+from symdyn.formulation.rank import first_dependent
 from symdyn.formulation.tree import GROUND, Tree, build
 from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed
@@ -246,6 +247,11 @@ class EmbeddedTree(Motion):
                               "or fix the joint")
         if faults:
             raise ModelError(faults, self.model.name)
+        dependent = first_dependent(self.algebra.recorder, M)
+        if dependent is not None:
+            raise ModelError([f"the mass matrix is singular at every state: {self.speeds[dependent]} moves nothing that the "
+                              "speeds after it do not move already; give the bodies between them mass or inertia, or fix "
+                              "one of their joints"], self.model.name)
 
 
 def _notes(model: Model) -> list[str]:

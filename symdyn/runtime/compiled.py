@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import time as clock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.outcome import Outcome, Request
 
 if TYPE_CHECKING:
@@ -37,6 +39,7 @@ class _Run:
         self.unit = unit
         self.n_x = unit.metadata["sizes"]["x"]
         self.trouble: list[BaseException] = []
+        self.guard: Any = contextlib.nullcontext()
         size = unit.function("simulation_size")
         size.restype = ctypes.c_long
         self.memory = ctypes.create_string_buffer(size() + 64)
@@ -65,26 +68,31 @@ class _Run:
             n_x, n_in, n_state = self.n_x, len(constant), request.n_state
 
             def call(t: float, x: Any, out: Any) -> int:
+                if self.trouble:  # the integrator tries smaller steps before it gives up
+                    return 1
                 try:
+                    guard.check()
                     np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, np.ctypeslib.as_array(x, (n_x,))[:n_state].copy())
                     return 0
                 except BaseException as error:
                     self.trouble.append(error)
                     return 1
 
+            self.guard = guard = Interrupts(call.__code__)
             self.problem.function = _InputFunction(call)
 
     def at(self, times: np.ndarray, x: np.ndarray, limit: int) -> int:
         """Go on, writing states at the requested times."""
-        return int(self.unit.function("simulation_at")(self.address, ctypes.c_long(limit), ctypes.c_void_p(times.ctypes.data),
-                                                       ctypes.c_long(len(times)), ctypes.c_void_p(x.ctypes.data),
-                                                       ctypes.byref(self.written)))
+        return self._go("simulation_at", limit, times, len(times), x)
 
     def steps(self, t: np.ndarray, x: np.ndarray, limit: int) -> int:
         """Go on, writing every accepted step."""
-        return int(self.unit.function("simulation_steps")(self.address, ctypes.c_long(limit), ctypes.c_void_p(t.ctypes.data),
-                                                          ctypes.c_void_p(x.ctypes.data), ctypes.c_long(len(t)),
-                                                          ctypes.byref(self.written)))
+        return self._go("simulation_steps", limit, t, x, len(t))
+
+    def _go(self, name: str, limit: int, *rest: Any) -> int:
+        arguments = [ctypes.c_long(a) if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (limit, *rest)]
+        with self.guard:
+            return int(self.unit.function(name)(self.address, *arguments, ctypes.byref(self.written)))
 
     def report(self) -> np.ndarray:
         out = np.zeros(8 + 2 * self.n_x)

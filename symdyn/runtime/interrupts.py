@@ -28,6 +28,8 @@ class Interrupts:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if self.usual is not None:
             signal.signal(signal.SIGINT, self.usual)
+        if kind is None:
+            self.check()
 
     def check(self) -> None:
         """Do now what Ctrl-C does, if it was kept."""

@@ -227,7 +227,8 @@ def _run_scipy(module: Module, request: Request, method: Any, bar: Any, field_na
     n = min(len(ts), len(xs))  # an interrupt may come between the two
     if not done:
         message = describe_stop(module.unit(field_name).metadata, here, state, message)
-    return Outcome(np.array(ts[:n]), np.array(xs[:n]), done, message or "reached the end", interrupted, accepted, 0, int(solver.nfev) if solver is not None else 0)
+    return Outcome(np.array(ts[:n]), np.array(xs[:n]), done, message or "reached the end", interrupted, accepted, 0,
+                   int(solver.nfev) if solver is not None else 0)
 
 
 def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:

@@ -1,0 +1,251 @@
+"""Pictures: what they show, that bodies are drawn rigid and joined, and that nothing but the picture is touched."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn
+from symdyn import systems
+from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.runtime.module import Module
+from symdyn.runtime.solution import Solution
+
+pytest.importorskip("matplotlib")
+image = pytest.importorskip("PIL.Image")
+
+from symdyn.runtime.pictures import Drawing, animate, plot  # noqa: E402
+
+ROOT = str(Path(symdyn.__file__).parents[1])
+OPTIONS: dict[str, dict[str, Any]] = {"n_link_pendulum": {"n": 3}, "spatial_chain": {"n": 4}, "prismatic_chain": {"n": 3}}
+_modules: dict[str, Module] = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SYMDYN_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def motion(name: str, t: Any = (0.0, 1.0), **options: Any) -> Solution:
+    """A short motion of a system of the catalogue; each module is made once."""
+    options = options or OPTIONS.get(name, {})
+    key = f"{name} {options}"
+    if key not in _modules:
+        _modules[key] = systems.get(name, **options).embedding().compile("numpy")
+    return _modules[key].simulate(t, rtol=1e-5)
+
+
+def labels(figure: Any) -> list[str]:
+    return [axes.get_ylabel() for axes in figure.axes]
+
+
+# -- curves
+
+
+def test_curves_have_names_and_units(tmp_path: Path) -> None:
+    path = tmp_path / "motion.png"
+    figure = plot(motion("double_pendulum"), path)
+    assert labels(figure) == ["coordinates [rad]", "speeds [rad/s]", "energy [J]", "y [m]"]
+    shown = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes[:3]]
+    assert shown == [["q1", "q2"], ["q1_dot", "q2_dot"], ["kinetic", "potential", "total"]]
+    assert "double_pendulum" in figure.get_suptitle()
+    with image.open(path) as picture:
+        assert picture.width > 800 and len(picture.convert("RGB").getcolors(1 << 24)) > 100
+
+
+def test_each_unit_has_its_axes_and_inputs_are_shown() -> None:
+    figure = plot(motion("cart_pole"))
+    assert labels(figure)[:6] == ["q1 [m]", "q2 [rad]", "q1_dot [m/s]", "q2_dot [rad/s]", "F [N]", "energy [J]"]
+
+
+def test_curves_are_the_solution() -> None:
+    solution = motion("double_pendulum")
+    coordinates, speeds, energy, _ = plot(solution).axes
+    for axes, values in ((coordinates, solution.q), (speeds, solution.u), (energy, np.column_stack(
+            [solution.energies, solution.energy]))):
+        for line, column in zip(axes.lines, values.T, strict=True):
+            assert np.array_equal(line.get_xdata(), solution.t) and np.array_equal(line.get_ydata(), column)
+
+
+def test_many_curves_take_a_colour_scale_instead_of_a_legend() -> None:
+    figure = plot(motion("n_link_pendulum", (0.0, 0.01), n=13))
+    assert figure.axes[0].get_legend() is None
+    scale = next(axes for axes in figure.axes if axes.get_label() == "<colorbar>")
+    assert [text.get_text() for text in scale.get_yticklabels()] == ["q1", "q7", "q13"]
+
+
+def test_rounding_errors_of_a_constant_do_not_fill_the_axes() -> None:
+    solution = motion("pendulum")
+    solution.__dict__["energies"] = np.column_stack([np.full(len(solution.t), 5.0), np.zeros(len(solution.t))])
+    solution.__dict__["energies"][3, 0] += 1e-14
+    low, high = next(axes for axes in plot(solution).axes if axes.get_ylabel() == "energy [J]").get_ylim()
+    assert high - low > 0.5
+
+
+def test_states_and_outputs_have_axes() -> None:
+    system = systems.pendulum()
+    q, z = symdyn.coordinates("q1 z")
+    system.add_state(z, q - z)
+    system.add_output("height", 1 - q)
+    system.add_output("pair", [q, z])
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.2))
+    figure = plot(solution)
+    assert {"z", "height", "output"} <= set(re.sub(r" \[.*", "", label) for label in labels(figure))
+    assert len(next(axes for axes in figure.axes if axes.get_ylabel() == "output").lines) == 2
+
+
+def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
+    module = motion("pendulum").module
+    with pytest.warns(SimulationWarning):
+        stopped = module.simulate((0.0, 1.0), max_steps=1)
+    assert "stopped early" in plot(stopped).get_suptitle()
+    for count in (0, 1):
+        stopped.t, stopped.x = stopped.t[:count], stopped.x[:count]
+        for cached in ("energies", "energy", "inputs", "frames"):
+            stopped.__dict__.pop(cached, None)
+        assert plot(stopped)._repr_png_().startswith(b"\x89PNG")
+
+
+# -- bodies
+
+
+@pytest.mark.parametrize("name, options", [*[(name, OPTIONS.get(name, {})) for name in systems.names()],
+                                           ("puma560", {"convention": "modified"})])
+def test_bodies_are_drawn_rigid_and_joined(name: str, options: dict[str, Any]) -> None:
+    drawing = Drawing.of(motion(name, **options))
+    assert drawing is not None
+    assert drawing.spatial == (name in ("spatial_chain", "three_link_arm", "puma560"))
+    points = [line[:, k] for line in drawing.lines for k in range(line.shape[1])]
+    size = max(float(np.ptp(np.array(points), axis=(0, 1)).max()), 1e-3)
+    for k, line in enumerate(drawing.lines):
+        lengths = np.linalg.norm(np.diff(line, axis=1), axis=2)
+        assert np.ptp(lengths, axis=0).max(initial=0.0) < 1e-4 * size
+        if k in drawing.sliders:
+            continue
+        others = [p for j, other in enumerate(drawing.lines) if j != k for p in np.moveaxis(other, 1, 0)]
+        others += [np.broadcast_to(pivot, line[:, 0].shape) for pivot in drawing.pivots]
+        assert min(np.abs(line[:, 0] - p).max() for p in others) < 1e-4 * size, f"body {k} hangs in the air"
+
+
+def test_a_double_pendulum_is_two_rods_from_the_pivot() -> None:
+    solution = motion("double_pendulum")
+    drawing = Drawing.of(solution)
+    assert drawing is not None and list(drawing.labels) == ["x", "y"] and not drawing.sliders
+    assert np.allclose(drawing.pivots, [[0.0, 0.0]])
+    a, b = solution.q[:, 0], solution.q.sum(axis=1)
+    hinge = np.column_stack([np.cos(a), np.sin(a)])
+    upper, lower = drawing.lines
+    assert np.abs(np.linalg.norm(upper, axis=2).max(axis=1) - 1.0).max() < 1e-9
+    assert np.abs(upper - hinge[:, None]).max(axis=2).min(axis=1).max() < 1e-9
+    assert np.allclose(lower[:, 0], hinge)
+    assert np.allclose(lower[:, -1], hinge + 0.5 * np.column_stack([np.cos(b), np.sin(b)]))
+
+
+def test_a_cart_is_a_slider_that_carries_its_pole() -> None:
+    solution = motion("cart_pole")
+    drawing = Drawing.of(solution)
+    assert drawing is not None and list(drawing.sliders) == [0] and not len(drawing.pivots)
+    assert np.allclose(drawing.lines[1][:, 0], np.column_stack([solution.q[:, 0], np.zeros(len(solution.t))]))
+
+
+def test_a_joint_away_from_both_origins_is_found() -> None:
+    q1, q2 = symdyn.coordinates("q1:3")
+    system = symdyn.System("offset", gravity=[0, -9.81])
+    for k, q in enumerate((q1, q2)):
+        body = system.add_body(f"b{k}", mass=1, inertia=0.1)
+        system.add_joint(symdyn.Revolute(f"j{k}", system.ground if k == 0 else "b0", body, q, child_point=[-0.5, 0],
+                                         parent_point=[0, 0] if k == 0 else [0.5, 0]))
+    solution = system.embedding().compile("numpy").simulate((0.0, 1.0), q=[0.3, 0.4])
+    drawing = Drawing.of(solution)
+    assert drawing is not None
+    hinge = np.column_stack([np.cos(solution.q[:, 0]), np.sin(solution.q[:, 0])])
+    assert np.abs(drawing.lines[1][:, 0] - hinge).max() < 1e-6
+
+
+def test_bodies_at_rest_are_drawn() -> None:
+    solution = motion("pendulum").module.simulate((0.0, 1.0), q=[0.0])
+    drawing = Drawing.of(solution)
+    assert drawing is not None and np.allclose(drawing.pivots, 0.0)
+    assert plot(solution)._repr_png_()
+
+
+# -- films
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "spatial_chain"])
+def test_a_film_is_a_gif_with_the_right_speed(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    animate(motion(name), path, fps=10, speed=0.5)
+    with image.open(path) as film:
+        assert film.n_frames == 21 and film.info["duration"] == 100
+        pixels = []
+        for k in (0, 20):
+            film.seek(k)
+            pixels.append(np.asarray(film.convert("RGB"), dtype=int))
+        assert (np.abs(pixels[0] - pixels[1]).sum(axis=2) > 50).sum() > 100
+        assert (pixels[0] == 255).all(axis=2).mean() > 0.5
+
+
+def test_a_film_runs_backwards_with_its_motion() -> None:
+    solution = motion("pendulum", (1.0, 0.0))
+    film = animate(solution, fps=10)
+    whole = Drawing.of(solution)
+    assert film.count == 11 and whole is not None
+    film.place(10)
+    there = np.array(film.figure.axes[0].lines[-1].get_data())[:, 0]
+    assert np.allclose(there, whole.centres[-1, -1], atol=1e-6)
+
+
+def test_films_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    solution = motion("pendulum")
+    with pytest.raises(ArgumentError, match=r"film\.mp4: the ending must be \.gif"):
+        animate(solution, tmp_path / "film.mp4")
+    with pytest.raises(ArgumentError, match="10001 pictures; raise speed above 3.33"):
+        animate(solution, fps=10_000)
+    with pytest.raises(ArgumentError, match="must be positive"):
+        animate(solution, speed=0)
+    assert not list(tmp_path.iterdir())
+
+
+# -- places they are shown in
+
+
+def test_a_notebook_shows_figure_and_film() -> None:
+    solution = motion("pendulum")
+    assert plot(solution)._repr_png_().startswith(b"\x89PNG")
+    shown = animate(solution, fps=5)._repr_html_()
+    data = base64.b64decode(re.search(r"base64,([^\"]+)", shown)[1])  # type: ignore[index]
+    with image.open(io.BytesIO(data)) as film:
+        assert film.n_frames == 6
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": ROOT, "DISPLAY": ""})
+
+
+MOVE = "import sys, symdyn; s = symdyn.systems.pendulum().embedding().compile('numpy').simulate((0, 0.1)); "
+
+
+def test_no_display_and_no_pyplot(tmp_path: Path) -> None:
+    done = run(MOVE + f"s.plot({str(tmp_path / 'a.png')!r}); s.animate({str(tmp_path / 'a.gif')!r}); "
+               "print('matplotlib.pyplot' in sys.modules)")
+    assert done.stdout.split() == ["False"] and not done.stderr
+
+
+def test_without_matplotlib_the_way_to_it_is_told() -> None:
+    done = run("import sys; sys.modules['matplotlib'] = None; " + MOVE + "s.plot()")
+    assert done.returncode == 1
+    assert "MissingExtra: pictures need matplotlib: pip install 'symdyn[plot]'" in done.stderr
