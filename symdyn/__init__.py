@@ -17,7 +17,8 @@ _HOME = {
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
     "symdyn.model.system": ("System",),
     "symdyn.formulation.explicit": ("embedding",),
-    "symdyn.errors": ("CompileError", "CompilerNotFound", "ModelError", "ModelWarning", "SymdynError",
+    "symdyn.errors": ("ArgumentError", "CompileError", "CompilerNotFound", "EvaluationError", "MissingExtra", "ModelError",
+                      "ModelWarning", "SimulationInterrupted", "SimulationWarning", "SymdynError",
                       "UnsupportedExpression"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}

@@ -156,7 +156,8 @@ def kinetic_energy_quadratic(s: Sample) -> float | None:
 
 def jacobian_of_positions(s: Sample) -> float | None:
     """J u against central differences of the positions of the centres of mass along the motion."""
-    if not s.has("positions", "J", "rates"):
+    positions = "positions" if s.has("positions") else "r"
+    if not s.has(positions, "J", "rates"):
         return None
     step = mpmath.mpf(10) ** (-s.digits // 3)
 
@@ -166,7 +167,7 @@ def jacobian_of_positions(s: Sample) -> float | None:
         for sign in (1, -1):
             moved = {q.name: mpmath.mpf(s.values[q.name]) + sign * step * rate
                      for q, rate in zip(s.equations.symbols.coordinates, rates, strict=True)}
-            ends.append(s.at({**values, **moved, "t": mpmath.mpf(s.values["t"]) + sign * step})["positions"])
+            ends.append(s.at({**values, **moved, "t": mpmath.mpf(s.values["t"]) + sign * step})[positions])
         return (ends[0] - ends[1]) / (2 * step)
 
     at_rest = {u.name: 0 for u in s.equations.symbols.speeds}

@@ -124,3 +124,32 @@ def driven_oscillator() -> sd.System:
     s.initial = {q: 1.0, z: 0.5, G: 0.25}
     s.duration = 5.0
     return s
+
+
+def awkward_names() -> sd.System:
+    """Symbols with names that mean something in C, Python or JavaScript, or in the generated code itself."""
+    q1, q2 = sp.symbols("x double", cls=type(sd.coordinates("q")))
+    mass, inertia, length, other, rhs, sign, theta = (
+        sp.Symbol(n) for n in ("lambda", "out", "sin_x", "awkward_names_rhs", "rhs", "symdyn_sign", "θ rod"))
+    s = sd.System("awkward_names", gravity=[0, -sp.Symbol("c")])
+    a = s.add_body("{a}", mass=mass, inertia=inertia, com=[length, 0])
+    b = s.add_body("b'", mass=other, inertia=rhs, com=[sign, 0])
+    s.add_joint(sd.Revolute("int", s.ground, a, q1))
+    s.add_joint(sd.Revolute("%d", a, b, q2, parent_point=[theta, 0]))
+    s.add_joint_force("int", sp.sign(q1) * sp.Symbol("function") - sp.sin(q1) * sp.Symbol("M_tilde_1_1"), name="# 100 %s")
+    s.defaults = {p: 0.7 + k / 10 for k, p in enumerate((mass, inertia, length, other, rhs, sign, theta))}
+    return s
+
+
+def split_by_fixed_joint(split: bool) -> sd.System:
+    """A pendulum whose body is one, or two parts held together by a fixed joint at the body's origin."""
+    q1, q2 = sd.coordinates("q1 q2")
+    g, m, I, l, n, b = sd.parameters("g m I l n b")
+    s = sd.System("split", gravity=[0, -g])
+    first = s.add_body("first", mass=m, inertia=I, com=[l, 0])
+    s.add_joint(sd.Revolute("hinge", s.ground, first, q1))
+    second = s.add_body("second", mass=n, com=[b, 0])
+    s.add_joint(sd.Revolute("elbow", first, second, q2, parent_point=[l, 0]))
+    if split:
+        s.add_joint(sd.Fixed("weld", second, s.add_body("third", mass=n, com=[2 * b, 0])))
+    return s

@@ -73,6 +73,7 @@ def add_rates(model: Model, algebra: Any) -> list[Any]:
         else:
             rates.update({q: algebra.leaves[v] for q, v in zip(joint.coordinates, joint_speeds(joint), strict=True)
                           if isinstance(q, Coordinate)})
+    rates.update({q: algebra.leaves[q.dot] for q in model.coordinates if q not in rates})
     for q, rate in rates.items():
         algebra.leaves[q.dot] = rate
     return [rates[q] for q in model.coordinates]

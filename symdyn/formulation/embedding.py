@@ -26,7 +26,7 @@ from symdyn.formulation.tree import GROUND, Tree, build
 from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed
 from symdyn.model.orientation import EulerParameters
-from symdyn.model.record import Model
+from symdyn.model.record import Model, joint_speeds
 from symdyn.spatial.vectors import congruence, cross, inner, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import is_zero
@@ -239,9 +239,11 @@ class EmbeddedTree(Motion):
         M = self.recall("M_tilde")
         for k, u in enumerate(self.speeds):
             if is_zero(M[k, k]):
-                joint = next(j for j in self.model.joints if u in [*(j.speeds or ()), *[
-                    q.dot for q in j.coordinates if isinstance(q, sp.Symbol) and hasattr(q, "dot")]] or u.name.endswith(
-                        f"_{j.name}"))
+                joint = next((j for j in self.model.joints if u in joint_speeds(j)), None)
+                if joint is None:
+                    faults.append(f"no joint with mass or inertia moves with {u}; use its coordinate in the expression of a "
+                                  "joint, or leave it out")
+                    continue
                 faults.append(f"joint {joint.name!r}: what it moves has no mass or inertia along {u}; give body "
                               f"{getattr(joint.child, 'name', joint.child)!r} or one further out a mass or an inertia, "
                               "or fix the joint")

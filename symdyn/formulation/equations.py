@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,9 @@ class Equations:
     _printed: dict[str, Any] = field(default_factory=dict)
 
     def quantity(self, name: str) -> np.ndarray:
-        """A quantity as an array of nodes and numbers; recorded on first use."""
+        """A quantity, or a named output, as an array of nodes and numbers; recorded on first use."""
+        if name not in self.quantities and f"output_{name}" in self.quantities:
+            name = f"output_{name}"
         if name not in self._recorded:
             if name not in self.quantities:
                 raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {name!r}; it has "
@@ -101,6 +104,15 @@ class Equations:
         from symdyn.pipeline import compile_equations
 
         return compile_equations(self, backend, **options)
+
+    def write(self, folder: Any, backend: str = "c", **options: Any) -> list[Any]:
+        """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
+
+        See symdyn.pipeline.emit for the options: functions, templates, specialize.
+        """
+        from symdyn.pipeline import emit, write_source
+
+        return write_source(emit(self, backend, **options), Path(folder))
 
     def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Any:
         """Prove the equations sound by identities at random states; see symdyn.verification.verify."""

@@ -81,7 +81,7 @@ class _PositionMap(Motion):
 
     def quantities(self) -> dict[str, Any]:
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
-               "F_c": self.F_c, "positions": lambda: self.r, "kinetic_energy": self.kinetic_energy}
+               "F_c": self.F_c, "r": lambda: self.r, "kinetic_energy": self.kinetic_energy}
         return {**super().quantities(), **own}
 
     def J(self) -> np.ndarray:

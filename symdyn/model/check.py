@@ -259,6 +259,15 @@ class _Checker:
                 speeds += [u for u, free in zip(joint_speeds(joint), independent, strict=True) if free]
             else:
                 speeds += joint_speeds(joint)
+        for q in dict.fromkeys(s.extra_coordinates):
+            if not isinstance(q, Coordinate):
+                self.faults.append(f"add_coordinate was given {q!r}; make coordinates with sd.coordinates")
+            elif q in driver:
+                self.faults.append(f"{q} was given to add_coordinate, but joint {driver[q].name!r} has it for its own; "
+                                   "leave out add_coordinate")
+            else:
+                coordinates.append(q)
+                speeds.append(q.dot)
         for u, count in Counter(speeds).items():
             if count > 1:
                 self.faults.append(f"the speed {u} belongs to {count} joints; give each a name of its own")

@@ -20,60 +20,73 @@ def _dotted(latex: str, accent: str) -> str:
     return rf"{accent}{{{head}}}{cut}{tail}"
 
 
-class Coordinate(sp.Symbol):
+def _of_derivative(symbol: sp.Symbol) -> dict[str, bool]:
+    """Assumptions of a derivative: of a positive quantity it is real, no more."""
+    return {"real": True} if symbol.is_real else {}
+
+
+class _Moving(sp.Symbol):
+    """A symbol that is printed after parameters in a product: m l q_dot^2, not q_dot^2 l m."""
+
+    __slots__ = ()
+    _rank = 0
+
+    @classmethod
+    def class_key(cls) -> tuple[int, int, str]:
+        """Where SymPy sorts it: after plain symbols, in the order of `_rank`."""
+        return 2, 0, f"Symbol{cls._rank}"
+
+
+class Coordinate(_Moving):
     """A generalized coordinate; `.dot` and `.ddot` are its derivatives by time, symbols too."""
 
     __slots__ = ()
 
     @property
     def dot(self) -> Rate:
-        return Rate(f"{self.name}_dot", **self._assumptions_orig)
+        return Rate(f"{self.name}_dot", **_of_derivative(self))
 
     @property
     def ddot(self) -> Acceleration:
-        return Acceleration(f"{self.name}_ddot", **self._assumptions_orig)
+        return Acceleration(f"{self.name}_ddot", **_of_derivative(self))
 
 
-class Rate(sp.Symbol):
+class Rate(_Moving):
     """The first derivative of a coordinate by time."""
 
     __slots__ = ()
-
-    @property
-    def coordinate(self) -> Coordinate:
-        return Coordinate(self.name.removesuffix("_dot"), **self._assumptions_orig)
+    _rank = 3
 
     @property
     def dot(self) -> Acceleration:
-        return self.coordinate.ddot
+        return Acceleration(f"{self.name.removesuffix('_dot')}_ddot", **_of_derivative(self))
 
     def _latex(self, printer: Any) -> str:
-        return _dotted(printer.doprint(sp.Symbol(self.coordinate.name)), r"\dot")
+        return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_dot"))), r"\dot")
 
 
-class Acceleration(sp.Symbol):
+class Acceleration(_Moving):
     """The second derivative of a coordinate by time."""
 
     __slots__ = ()
-
-    @property
-    def coordinate(self) -> Coordinate:
-        return Coordinate(self.name.removesuffix("_ddot"), **self._assumptions_orig)
+    _rank = 4
 
     def _latex(self, printer: Any) -> str:
-        return _dotted(printer.doprint(sp.Symbol(self.coordinate.name)), r"\ddot")
+        return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_ddot"))), r"\ddot")
 
 
 class Speed(Coordinate):
     """A generalized speed with a name of its own; `.dot` is its derivative by time."""
 
     __slots__ = ()
+    _rank = 1
 
 
-class Input(sp.Symbol):
+class Input(_Moving):
     """A value given from outside while the motion runs: a number, an array over time, or a function."""
 
     __slots__ = ()
+    _rank = 2
 
 
 def _make(kind: type, names: str, assumptions: dict) -> Any:

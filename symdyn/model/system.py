@@ -55,6 +55,7 @@ class System:
         self.constraints: list[sp.Expr] = []
         self.loops: list[Joint] = []
         self.ground_motion: Joint | None = None
+        self.extra_coordinates: list[sp.Symbol] = []
         self.defaults: dict[Any, float] = {}
         self.initial: dict[Any, float] = {}
         self.duration = 10.0
@@ -97,6 +98,11 @@ class System:
         else:
             self.loops.append(joint)
         return joint
+
+    def add_coordinate(self, *coordinates: Any) -> None:
+        """Coordinates that no joint has for its own, to be used in the expressions of joints: with an absolute angle phi,
+        the joint after one with angle q takes coordinate=phi - q."""
+        self.extra_coordinates += [as_coordinate(c) for c in coordinates]
 
     def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
         """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t and parameters."""

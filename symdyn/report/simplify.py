@@ -43,7 +43,12 @@ def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
         candidate = attempt(best)
         if _length(candidate) < _length(best):
             best = candidate
-    return best
+    return best.replace(_is_minus_sum, lambda e: sp.Add(*[-term for term in e.args[1].args]))
+
+
+def _is_minus_sum(e: sp.Expr) -> bool:
+    """-(a + b), which reads better as -a - b."""
+    return e.is_Mul and len(e.args) == 2 and e.args[0] == -1 and e.args[1].is_Add
 
 
 def _polynomial(e: sp.Expr) -> sp.Expr:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 MANY = 12
 MAX_FRAMES = 3000
+GROUND = -1
 _SAMPLES = 40
 _LEFT_OUT = 1e-9
 _PALETTE = "tab10"
@@ -304,33 +305,24 @@ class _Skeleton:
 def _skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray) -> _Skeleton:
     """Lines of the bodies from origins (n_t, n_b, 3), rotations (n_t, n_b, 3, 3) and centres of mass."""
     n_t, n_b = centres.shape[:2]
-    ground = (np.zeros((n_t, 3)), np.broadcast_to(np.eye(3), (n_t, 3, 3)))
     poses = [(origins[:, k], rotations[:, k]) for k in range(n_b)]
     size = max(np.ptp(origins, axis=(0, 1)).max(), np.ptp(centres, axis=(0, 1)).max(), 1e-12)
-    starts: list[np.ndarray | None] = []
+    starts: dict[int, np.ndarray] = {}
     carried: list[list[np.ndarray]] = [[] for _ in range(n_b)]
     rails, pivots, sliders = [], [], []
-    for k in range(n_b):
-        held = [(*joint, j) for j in range(k - 1, -2, -1)
-                if (joint := _joint(poses[j] if j >= 0 else ground, poses[k], size)) is not None]
-        shared = [found for found in held if not found[1]]
-        # A motion can hide who carries whom; the shortest line between them is then as true as any.
-        best = min(shared or held, key=lambda found: found[2], default=None)
-        starts.append(None if best is None or best[1] else best[0])
-        if best is None:
-            continue
-        point, slides, _, j = best
+    for k, j, point, slides in _tree(poses, (np.zeros((n_t, 3)), np.broadcast_to(np.eye(3), (n_t, 3, 3))), size):
         if slides:
             sliders.append(k)
             rails.append(np.stack([point, poses[k][0]], axis=1))
-        elif j >= 0:
-            carried[j].append(point)
-        else:
+            continue
+        starts[k] = point
+        if j == GROUND:
             pivots.append(point[0])
+        else:
+            carried[j].append(point)
     lines = []
     for k in range(n_b):
-        start = starts[k]
-        points = [origins[:, k]] if start is None else [start, origins[:, k]]
+        points = [starts[k], origins[:, k]] if k in starts else [origins[:, k]]
         for point in carried[k]:
             points += [point, origins[:, k]]
         lines.append(np.stack(points, axis=1))
@@ -342,6 +334,32 @@ def _skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray) -
             lines[k] = np.stack([origins[:, k], centres[:, k]], axis=1)
     return _Skeleton(lines, np.concatenate(arms, axis=1), np.concatenate([lifted, *rails], axis=1),
                      np.array(pivots).reshape(-1, 3), sliders)
+
+
+def _tree(poses: Sequence[tuple], ground: tuple, size: float) -> Iterator[tuple[int, int, np.ndarray, bool]]:
+    """Who carries whom: (child, parent, shared point over time, whether the child slides), parents first."""
+    waiting, placed = list(range(len(poses))), [GROUND]
+    ways: dict[int, list[tuple]] = {k: [] for k in waiting}
+    compared = dict.fromkeys(waiting, 0)
+    while waiting:
+        chosen = None
+        for k in waiting:
+            for j in placed[compared[k]:]:
+                found = _joint(ground if j == GROUND else poses[j], poses[k], size)
+                if found is not None:
+                    ways[k].insert(0, (j, *found))
+            compared[k] = len(placed)
+            # A motion can hide who carries whom; the shortest connection is then as true as any.
+            best = min(ways[k], key=lambda way: (way[2], way[3]), default=None)
+            if best is not None and (chosen is None or not best[2]):
+                chosen = (k, *best[:3])
+                if not best[2]:
+                    break
+        if chosen is None:
+            return
+        waiting.remove(chosen[0])
+        placed.append(chosen[0])
+        yield chosen
 
 
 def _joint(parent: tuple, child: tuple, size: float) -> tuple[np.ndarray, bool, float] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import json
 from collections.abc import Mapping
 from functools import cached_property
@@ -39,6 +40,24 @@ class Solution:
         self.seconds = seconds
         self.params, self.method, self.backend = params, method, module.backend
         self._inputs = inputs
+
+    def __getitem__(self, name: Any) -> np.ndarray:
+        """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...).
+
+        Raises ArgumentError for an unknown name.
+        """
+        name = str(getattr(name, "name", name))
+        metadata = self.module.metadata
+        if name in metadata["x"]:
+            return self.x[:, metadata["x"].index(name)]
+        if name in metadata["inputs"]:
+            return self.inputs[:, metadata["inputs"].index(name)]
+        if name in self.outputs:
+            return self.outputs[name]
+        known = [*metadata["x"], *metadata["inputs"], *self.outputs]
+        near = difflib.get_close_matches(name, known, 3)
+        raise ArgumentError(f"{self.module.name}: the solution has no {name!r}; "
+                            + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
 
     @property
     def y(self) -> np.ndarray:

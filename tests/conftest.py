@@ -1,0 +1,80 @@
+"""Options, a cache of built libraries for each run, and compiled mechanisms that several tests share."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update", action="store_true", help="rewrite the files under generated/reference")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "slow: takes more than ten seconds")
+    if not hasattr(config, "workerinput"):  # the workers of pytest-xdist inherit the environment
+        folder = tempfile.mkdtemp(prefix="symdyn-tests-")
+        config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+        os.environ["SYMDYN_CACHE_DIR"] = folder
+
+
+@pytest.fixture
+def update(request: pytest.FixtureRequest) -> bool:
+    """Whether reference files are to be rewritten."""
+    return bool(request.config.getoption("--update"))
+
+
+@pytest.fixture(scope="session")
+def derived() -> Callable[..., Any]:
+    """derived(name, **options): equations of a mechanism of tests.mechanisms or of the catalogue, derived once."""
+    known: dict[Any, Any] = {}
+
+    def equations(name: str, **options: Any) -> Any:
+        from symdyn import systems
+        from tests import mechanisms
+
+        key = (name, *options.items())
+        if key not in known:
+            own = getattr(mechanisms, name, None)
+            known[key] = (own(**options) if own else systems.get(name, **options)).embedding()
+        return known[key]
+
+    return equations
+
+
+@pytest.fixture(scope="session")
+def compiled(derived: Callable[..., Any]) -> Callable[..., Any]:
+    """compiled(name, backend, **options): its module, compiled once; skips where there is no C compiler."""
+    known: dict[Any, Any] = {}
+
+    def module(name: str, backend: str, **options: Any) -> Any:
+        from symdyn.runtime.compiler import find_compiler
+
+        if backend == "c" and find_compiler() is None:
+            pytest.skip("no C compiler here")
+        key = (name, backend, *options.items())
+        if key not in known:
+            known[key] = derived(name, **options).compile(backend=backend)
+        return known[key]
+
+    return module
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """write(equations, backend, functions): the folder with the files of a backend."""
+
+    def folder(equations: Any, backend: str, functions: Any = None) -> Path:
+        from symdyn.pipeline import emit, write_source
+
+        source = emit(equations, backend, functions)
+        write_source(source, tmp_path / backend)
+        return tmp_path / backend
+
+    return folder

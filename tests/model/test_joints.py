@@ -1,0 +1,239 @@
+"""Every joint type: where it puts the child, and velocities and accelerations that are the derivatives of that.
+
+Derivatives by time are central differences at 80 digits with steps of 1e-20, so that they are good to more than 30 digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.model.orientation import SEQUENCES
+from tests import helpers
+
+HIGH = 80
+STEP = mpmath.mpf(10) ** -20
+half = sp.Rational(1, 2)
+SKEW = sp.Matrix([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
+QUARTER = sp.Matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+AXES = {"x": [1, 0, 0], "y": [0, 1, 0], "-z": [0, 0, -1], "3-4": [0.6, 0, 0.8],
+        "1-2-2": [sp.Rational(1, 3), sp.Rational(2, 3), sp.Rational(2, 3)], "diagonal": list(np.ones(3) / np.sqrt(3)), "root": [1 / sp.sqrt(2), 0, -1 / sp.sqrt(2)]}
+PLACE: dict[str, Any] = {"parent_point": [0.5, -0.2, 0.3], "child_point": [0.1, 0.4, -0.6], "parent_rotation": SKEW,
+                         "child_rotation": QUARTER}
+a, b, c = sd.coordinates("a b c")
+x, y, z = sd.coordinates("x y z")
+e = sd.coordinates("e0:4")
+
+
+def turn(axis: int, angle: Any) -> sp.Matrix:
+    """The elementary rotation, child to parent components."""
+    matrix = sp.eye(3)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix[i, i] = matrix[j, j] = sp.cos(angle)
+    matrix[j, i], matrix[i, j] = sp.sin(angle), -sp.sin(angle)
+    return matrix
+
+
+def about(axis: list, angle: Any) -> sp.Matrix:
+    """The rotation about any axis as the exponential of its cross-product matrix."""
+    n = sp.Matrix(axis) / sp.Matrix(axis).norm()
+    K = sp.Matrix([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
+    return sp.eye(3) + sp.sin(angle) * K + (1 - sp.cos(angle)) * K**2
+
+
+def quaternion() -> sp.Matrix:
+    return sp.Quaternion(*e).to_rotation_matrix().subs(sum(s**2 for s in e), 1)
+
+
+def sequence(name: str) -> sp.Matrix:
+    return turn("XYZ".index(name[0]), a) * turn("XYZ".index(name[1]), b) * turn("XYZ".index(name[2]), c)
+
+
+Make = Callable[..., Any]
+# name -> (joint from (name, parent, child, place), rotation, displacement)
+JOINTS: dict[str, tuple[Make, Any, Any]] = {
+    "fixed": (lambda *n, **p: sd.Fixed(*n, **p), sp.eye(3), [0, 0, 0]),
+    **{f"revolute {name}": (lambda *n, axis=axis, **p: sd.Revolute(*n, a, axis=axis, **p), about(axis, a), [0, 0, 0])
+       for name, axis in AXES.items()},
+    "revolute z": (lambda *n, **p: sd.Revolute(*n, a, **p), turn(2, a), [0, 0, 0]),
+    **{f"prismatic {name}": (lambda *n, axis=axis, **p: sd.Prismatic(*n, x, axis=axis, **p), sp.eye(3), sp.Matrix(axis) * x)
+       for name, axis in AXES.items()},
+    "cylindrical": (lambda *n, **p: sd.Cylindrical(*n, [a, x], **p), turn(2, a), [0, 0, x]),
+    "cylindrical 3-4": (lambda *n, **p: sd.Cylindrical(*n, [a, x], axis=AXES["3-4"], **p), about(AXES["3-4"], a),
+                        sp.Matrix(AXES["3-4"]) * x),
+    "universal": (lambda *n, **p: sd.Universal(*n, [a, b], **p), turn(0, a) * turn(1, b), [0, 0, 0]),
+    "universal skew": (lambda *n, **p: sd.Universal(*n, [a, b], axes=[AXES["3-4"], AXES["1-2-2"]], **p),
+                       about(AXES["3-4"], a) * about(AXES["1-2-2"], b), [0, 0, 0]),
+    "planar": (lambda *n, **p: sd.Planar(*n, [x, y, a], **p), turn(2, a), [x, y, 0]),
+    "spherical": (lambda *n, **p: sd.Spherical(*n, [a, b, c], **p), sequence("ZYX"), [0, 0, 0]),
+    **{f"spherical {s}": (lambda *n, s=s, **p: sd.Spherical(*n, [a, b, c], sd.EulerAngles(s), **p), sequence(s), [0, 0, 0])
+       for s in SEQUENCES},
+    "spherical parameters": (lambda *n, **p: sd.Spherical(*n, e, sd.EulerParameters(), **p), quaternion(), [0, 0, 0]),
+    "free": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], **p), sequence("ZYX"), [x, y, z]),
+    "free XZX": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], sd.EulerAngles("XZX"), **p), sequence("XZX"), [x, y, z]),
+    "free parameters": (lambda *n, **p: sd.Free(*n, [x, y, z, *e], sd.EulerParameters(), **p), quaternion(), [x, y, z]),
+}
+
+
+def mechanism(name: str, moving: bool = True, place: dict | None = None) -> EmbeddedEquations:
+    """A body on the joint, on a base that slides and turns about a skew axis (or on the ground)."""
+    s = sd.System("mechanism", gravity=[0, 0, -9.81])
+    base = s.add_body("base", mass=2, inertia=[1, 2, 2.5])
+    box = s.add_body("box", mass=3, inertia=[2, 3, 4], com=[0.3, -0.1, 0.2])
+    if moving:
+        s.add_joint(sd.Cylindrical("drive", s.ground, base, sd.coordinates("p s"), axis=AXES["1-2-2"],
+                                   child_point=[0.1, 0, 0.7]))
+    else:
+        s.add_joint(sd.Fixed("drive", s.ground, base))
+        s.add_state(sd.coordinates("w"), 0)  # so that a fixed joint leaves something to compute
+    s.add_joint(JOINTS[name][0]("joint", base, box, **(PLACE if place is None else place)))
+    return s.embedding()
+
+
+def shifted(equations: EmbeddedEquations, values: dict[str, Any], step: Any) -> dict[str, Any]:
+    """The state a moment later, at constant speeds."""
+    (rates,) = helpers.quantities(equations, values, "rates", digits=HIGH)
+    with mpmath.workdps(HIGH):
+        return {**values, **{q.name: _number(values[q.name]) + step * rate
+                             for q, rate in zip(equations.symbols.coordinates, rates, strict=True)}}
+
+
+def _number(value: Any) -> Any:
+    return mpmath.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else mpmath.mpf(value)
+
+
+def by_time(equations: EmbeddedEquations, values: dict[str, Any], name: str) -> np.ndarray:
+    """Derivative of a quantity by time at constant speeds, by a central difference."""
+    later, earlier = (helpers.quantities(equations, shifted(equations, values, h), name, digits=HIGH)[0] for h in (STEP, -STEP))
+    with mpmath.workdps(HIGH):
+        return (later - earlier) / (2 * STEP)
+
+
+def velocities(equations: EmbeddedEquations, values: dict[str, Any]) -> np.ndarray:
+    (J,) = helpers.quantities(equations, values, "J", digits=HIGH)
+    with mpmath.workdps(HIGH):
+        return J @ np.array([_number(values[u.name]) for u in equations.symbols.speeds], dtype=object)
+
+
+@pytest.fixture(params=JOINTS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_velocities_are_derivatives_of_positions(name: str, seed: int) -> None:
+    equations = mechanism(name)
+    values = helpers.state(equations, seed)
+    v = velocities(equations, values).reshape(2, 6)
+    with mpmath.workdps(HIGH):
+        assert helpers.close(v[:, :3], by_time(equations, values, "positions"))
+        (frames,) = helpers.quantities(equations, values, "frames", digits=HIGH)
+        R, R_dot = frames[:, 3:].reshape(2, 3, 3), by_time(equations, values, "frames")[:, 3:].reshape(2, 3, 3)
+        for body in range(2):
+            assert helpers.close(R[body] @ R[body].T, np.eye(3, dtype=int))
+            assert helpers.close(np.cross(R[body][0], R[body][1]), R[body][2])
+            W = R_dot[body] @ R[body].T
+            assert helpers.close(W, -W.T)
+            assert helpers.close(v[body, 3:], np.array([W[2, 1], W[0, 2], W[1, 0]]))
+
+
+@pytest.mark.parametrize("seed", [3])
+def test_accelerations_are_derivatives_of_velocities(name: str, seed: int) -> None:
+    equations = mechanism(name)
+    values = helpers.state(equations, seed)
+    with mpmath.workdps(HIGH):
+        later, earlier = (velocities(equations, shifted(equations, values, h)) for h in (STEP, -STEP))
+        wanted = (later - earlier) / (2 * STEP)
+        assert helpers.close(helpers.quantities(equations, values, "Jd_qd", digits=HIGH)[0], wanted)
+        assert helpers.close(helpers.quantities(equations, values, "Jdot", digits=HIGH)[0], by_time(equations, values, "J"))
+
+
+def test_place_of_the_child(name: str) -> None:
+    """R = R_p P R_joint C^T and p = p_p + R_p (parent_point + P d) - R child_point, with the rotation from SymPy."""
+    _, rotation, displacement = JOINTS[name]
+    equations = mechanism(name)
+    values = helpers.state(equations, 4)
+    (frames,) = helpers.quantities(equations, values, "frames")
+    with mpmath.workdps(40):
+        exact = {s: sp.Float(str(_number(values[s.name])), 40) for s in (a, b, c, x, y, z, *e) if s.name in values}
+
+        def plain(matrix: Any) -> np.ndarray:
+            m = sp.Matrix(matrix).xreplace(exact).evalf(40)
+            return np.array([[mpmath.mpf(str(m[i, j])) for j in range(m.shape[1])] for i in range(m.shape[0])], dtype=object)
+
+        R_p, p_p = frames[0, 3:].reshape(3, 3), frames[0, :3]
+        P, C = plain(SKEW), plain(QUARTER)
+        R = R_p @ P @ plain(rotation) @ C.T
+        at = [plain([sp.Rational(str(v)) for v in PLACE[k]])[:, 0] for k in ("parent_point", "child_point")]
+        p = p_p + R_p @ (at[0] + P @ plain(displacement)[:, 0]) - R @ at[1]
+    tolerance = 1e-14 if name.split()[-1] == "diagonal" else 1e-15  # axes and points given as floats
+    assert helpers.close(frames[1, 3:].reshape(3, 3), R, tolerance)
+    assert helpers.close(frames[1, :3], p, tolerance)
+
+
+def test_unit_speeds(name: str) -> None:
+    """The speeds are the derivatives of the coordinates; with Euler parameters, the angular velocity in child axes."""
+    equations = mechanism(name, moving=False, place={})
+    values = helpers.state(equations, 5)
+    rates, J, frames = helpers.quantities(equations, values, "rates", "J", "frames")
+    speeds = [values[u.name] for u in equations.symbols.speeds]
+    R = frames[1, 3:].reshape(3, 3)
+    omega = R.T @ (J[9:] @ np.array([_number(v) for v in speeds], dtype=object)) if speeds else np.zeros(3)
+    if "parameters" in name:
+        assert helpers.close(omega, np.array([_number(v) for v in speeds[-3:]], dtype=object))
+        with mpmath.workdps(40):
+            along = sum(values[s.name] * rate for s, rate in zip(equations.symbols.coordinates, rates, strict=True) if s in e)
+        assert helpers.close(along, 0)
+        assert [u.name for u in equations.symbols.speeds[-3:]] == [f"omega_{axis}_joint" for axis in "xyz"]
+    else:
+        assert helpers.close(rates, np.array([_number(v) for v in speeds], dtype=object)) if speeds else rates.size == 0
+        assert [u.name for u in equations.symbols.speeds] == [f"{q.name}_dot" for q in equations.symbols.coordinates]
+
+
+@pytest.mark.parametrize("name", ["revolute z", "cylindrical", "planar", "free parameters"])
+def test_speeds_of_ones_own_names(name: str) -> None:
+    s = sd.System("named", gravity=[0, 0, -9.81])
+    box = s.add_body("box", mass=3, inertia=[2, 3, 4], com=[0.3, -0.1, 0.2])
+    n = JOINTS[name][0]("joint", s.ground, box).n_speeds
+    own = sd.speeds(f"v1:{n + 1}")
+    s.add_joint(JOINTS[name][0]("joint", s.ground, box, **({"speed": own[0]} if n == 1 else {"speeds": own})))
+    plain = mechanism_without_names(name)
+    values = helpers.state(plain, 6)
+    named = {**values, **{v.name: values[u.name] for v, u in zip(own, plain.symbols.speeds, strict=True)}}
+    assert s.check().speeds == tuple(own)
+    assert helpers.close(*(helpers.quantities(eq, at, "rhs")[0] for eq, at in ((s.embedding(), named), (plain, values))))
+
+
+def mechanism_without_names(name: str) -> EmbeddedEquations:
+    s = sd.System("plain", gravity=[0, 0, -9.81])
+    box = s.add_body("box", mass=3, inertia=[2, 3, 4], com=[0.3, -0.1, 0.2])
+    s.add_joint(JOINTS[name][0]("joint", s.ground, box))
+    return s.embedding()
+
+
+def test_axes_in_floats_are_unit_vectors_to_any_precision() -> None:
+    axis = sd.Revolute("j", "a", "b", a, axis=AXES["diagonal"]).axis
+    assert abs(sp.N(axis.norm() - 1, 70)) < 1e-55
+    assert list(sd.Revolute("j", "a", "b", a, axis=[0.6, 0, 0.8]).axis) == [sp.Rational(3, 5), 0, sp.Rational(4, 5)]
+
+
+def test_units() -> None:
+    s = sd.System("units", gravity=[0, 0, -9.81])
+    part = s.ground
+    for k, (kind, names) in enumerate([(sd.Cylindrical, "a x"), (sd.Planar, "b y c"), (sd.Prismatic, "z")]):
+        child = s.add_body(f"b{k}", mass=1, inertia=[1, 1, 1])
+        coordinates = sd.coordinates(names)
+        s.add_joint(kind(f"j{k}", part, child, coordinates))
+        part = child
+    s.add_joint(sd.Spherical("ball", part, s.add_body("end", mass=1, inertia=[1, 1, 1]), e, sd.EulerParameters()))
+    units = {symbol.name: unit for symbol, unit in s.check().units.items()}
+    assert [units[n] for n in ("a", "x", "b", "y", "c", "z", "e0", "t")] == ["rad", "m", "m", "m", "rad", "m", "1", "s"]
+    assert [units[n] for n in ("a_dot", "x_dot", "c_dot", "omega_x_ball")] == ["rad/s", "m/s", "rad/s", "rad/s"]
