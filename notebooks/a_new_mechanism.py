@@ -30,7 +30,6 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
-from symdyn.pipeline import emit, write_source
 
 # %% [markdown]
 # ## 1. Description
@@ -116,26 +115,25 @@ assert verification.passed
 # against reference vectors. Here are the beginnings of source and header.
 
 # %%
-code = emit(equations, "c")
-print(", ".join(code.files), end="\n\n")
-print("\n".join(code.files["crane.c"].splitlines()[:60]), end="\n\n...\n")
+folder = tempfile.TemporaryDirectory()
+files = equations.write(folder.name, backend="c")
+print(", ".join(file.name for file in files), end="\n\n")
+print("\n".join(Path(folder.name, "crane.c").read_text().splitlines()[:60]), end="\n\n...\n")
 
 # %%
-header = code.files["crane.h"].splitlines()
+header = Path(folder.name, "crane.h").read_text().splitlines()
 first = next(n for n, line in enumerate(header) if line.startswith("enum"))
 print("\n".join(header[first:first + 20]), end="\n\n...\n")
 
 # %% [markdown]
-# Write it to a folder, build it and let it check itself, if there is a compiler.
+# Build it and let it check itself, if there is a compiler.
 
 # %%
 compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 if compiler:
-    with tempfile.TemporaryDirectory() as folder:
-        write_source(code, Path(folder))
-        build = [compiler, "-std=c99", "-O2", "-Wall", "-Wextra", "-o", "crane_check", "main.c", "crane.c", "-lm"]
-        subprocess.run(build, cwd=folder, check=True)
-        print(subprocess.run([Path(folder) / "crane_check"], check=True, capture_output=True, text=True).stdout)
+    build = [compiler, "-std=c99", "-O2", "-Wall", "-Wextra", "-o", "crane_check", "main.c", "crane.c", "-lm"]
+    subprocess.run(build, cwd=folder.name, check=True)
+    print(subprocess.run([Path(folder.name, "crane_check")], check=True, capture_output=True, text=True).stdout)
 else:
     print("there is no C compiler here")
 

@@ -17,6 +17,9 @@ from symdyn.tape.evaluate import evaluate
 
 DIGITS = 30
 TOLERANCE = mpmath.mpf(10) ** -25
+# For derivatives by central differences: the error is about STEP^2, and HIGH - 20 digits are left.
+HIGH = 80
+STEP = mpmath.mpf(10) ** -20
 
 
 def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:
@@ -82,3 +85,36 @@ def in_sympy(expression: sp.Expr, values: Mapping[str, Fraction], digits: int = 
     value = sp.N(expression.doit().xreplace(at), digits, maxn=200)
     with mpmath.workdps(digits):
         return mpmath.mpf(str(value)) if value.is_real else complex(value)
+
+
+def number(value: Any) -> Any:
+    """A value for the inputs of a tape as mpmath's number."""
+    return mpmath.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else mpmath.mpf(value)
+
+
+def shifted(equations: Equations, values: Mapping[str, Any], step: Any) -> dict[str, Any]:
+    """The state a moment later, at constant speeds."""
+    (rates,) = quantities(equations, values, "rates", digits=HIGH)
+    with mpmath.workdps(HIGH):
+        moved = {q.name: number(values[q.name]) + step * rate
+                 for q, rate in zip(equations.symbols.coordinates, rates, strict=True)}
+        return {**values, **moved, "t": number(values["t"]) + step}
+
+
+def by_time(equations: Equations, values: Mapping[str, Any], name: str) -> np.ndarray:
+    """Derivative of a quantity by time at constant speeds, by a central difference."""
+    later, earlier = (quantities(equations, shifted(equations, values, h), name, digits=HIGH)[0] for h in (STEP, -STEP))
+    with mpmath.workdps(HIGH):
+        return (later - earlier) / (2 * STEP)
+
+
+def twists(equations: Equations, values: Mapping[str, Any]) -> np.ndarray:
+    """[v_G; omega] of every body, n-frame, (n_b, 6), by differentiating positions and rotations."""
+    v, frames_dot = by_time(equations, values, "positions"), by_time(equations, values, "frames")
+    (frames,) = quantities(equations, values, "frames", digits=HIGH)
+    with mpmath.workdps(HIGH):
+        rows = []
+        for k in range(len(v)):
+            W = frames_dot[k, 3:].reshape(3, 3) @ frames[k, 3:].reshape(3, 3).T
+            rows.append([*v[k], W[2, 1], W[0, 2], W[1, 0]])
+        return np.array(rows, dtype=object).reshape(-1, 6)

@@ -7,10 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import mpmath
+
 from symdyn.tape.evaluate import evaluate
-from symdyn.tape.tape import Tape
+from symdyn.tape.tape import Output, Tape
 
 DIGITS = 30
+_ATTEMPTS = 8
 
 
 @dataclass(frozen=True)
@@ -47,23 +50,43 @@ def make_reference(tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]
 
     groups   leaf names in the groups q, u, z, ud, inputs, p
     The tolerance of a result is 1e-12, or twenty times what the same tape loses in double precision, if that is more.
+    States where something is not defined (the root of a negative number, a singular mass matrix) are drawn anew; a
+    function that is defined at none of them is left out.
     """
     stream = random.Random(seed)
+    drawn = []
+    for _ in range(_ATTEMPTS):
+        drawn.append(_draw(stream, tapes, groups, defaults, calls, samples))
+        if all(len(sample.results) == len(tapes) for sample in drawn[-1].samples):
+            break
+    return max(drawn, key=lambda reference: sum(len(sample.results) for sample in reference.samples))
+
+
+def _draw(stream: random.Random, tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]],
+          defaults: Mapping[str, float], calls: Mapping[str, str], samples: int) -> Reference:
     parameters = {name: defaults.get(name, round(stream.uniform(0.5, 1.5), 6)) for name in groups["p"]}
     made = []
     for _ in range(samples):
         values: dict[str, Any] = {"t": round(stream.uniform(0, 1), 6), **parameters}
         for group in ("q", "u", "z", "ud", "inputs"):
             values.update({name: round(stream.uniform(-1, 1), 6) for name in groups[group]})
-        results = []
-        for name, tape in tapes.items():
-            exact = next(iter(evaluate(tape, values, DIGITS).values())).ravel()
-            double = next(iter(evaluate(tape, values, 16).values())).ravel()
-            scale = max((abs(float(e)) for e in exact), default=0.0) or 1.0
-            lost = max((abs(float(a - b)) / scale for a, b in zip(exact, double, strict=True)), default=0.0)
-            results.append(ReferenceResult(name, len(exact), tuple(repr(float(e)) for e in exact),
-                                           f"{max(1e-12, 20 * lost):.3g}", calls[name]))
+        results = [_result(name, tape, values, calls[name]) for name, tape in tapes.items()]
         arrays = tuple((group, tuple(repr(float(values[name])) for name in groups[group]))
                        for group in ("q", "u", "z", "ud", "inputs"))
-        made.append(Sample(repr(values["t"]), arrays, tuple(results)))
+        made.append(Sample(repr(values["t"]), arrays, tuple(r for r in results if r is not None)))
     return Reference(tuple(repr(float(parameters[name])) for name in groups["p"]), tuple(made))
+
+
+def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> ReferenceResult | None:
+    """A function at a state; None where it is not defined."""
+    checked = Tape(tape.recorder, {**tape.outputs, "": Output.of("", [n for n in tape.steps if n in tape.recorder.checks])})
+    try:
+        exact, positive = (r.ravel() for r in evaluate(checked, values, DIGITS).values())
+        double = next(iter(evaluate(tape, values, 16).values())).ravel()
+    except (ArithmeticError, ValueError, TypeError):  # also comparisons of complex numbers
+        return None
+    if not all(mpmath.isfinite(e) and mpmath.im(e) == 0 for e in [*exact, *positive]) or any(e <= 0 for e in positive):
+        return None
+    scale = max((abs(float(e)) for e in exact), default=0.0) or 1.0
+    lost = max((abs(float(a - b)) / scale for a, b in zip(exact, double, strict=True)), default=0.0)
+    return ReferenceResult(name, len(exact), tuple(repr(float(e)) for e in exact), f"{max(1e-12, 20 * lost):.3g}", call)

@@ -407,11 +407,11 @@ def _axes(figure: Figure, place: Any, drawing: Drawing) -> Any:
     if drawing.spatial:
         axes.set_zlim(*limits[2])
         axes.set_zlabel(f"{drawing.labels[2]} [m]")
-        axes.set_box_aspect(np.ptp(limits, axis=1), zoom=0.84)
+        axes.set_box_aspect(np.ptp(limits, axis=1), zoom=0.79)
         axes.view_init(elev=22, azim=-55)
         axes.locator_params(nbins=5)
         axes.tick_params(labelsize=8, pad=0)
-        axes.zaxis.labelpad = -1
+        axes.zaxis.labelpad = -2
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.pane.set_facecolor("0.98")
             axis.line.set_color("0.5")

@@ -29,7 +29,8 @@ runpy.run_path({path!r}, run_name="__main__")
 def run_alone(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a module as a program where nothing but NumPy can be imported."""
     program = ALONE.format(path=str(path), arguments=list(arguments))
-    return subprocess.run([sys.executable, "-W", "error", "-c", program], cwd=path.parent.parent, capture_output=True, text=True)
+    command = [sys.executable, "-W", "error", "-c", program]
+    return subprocess.run(command, cwd=path.parent.parent, capture_output=True, text=True)
 
 
 def load(equations: Any, folder: Path, functions: Any = None) -> ModuleType:

@@ -6,7 +6,6 @@ Derivatives by time are central differences at 80 digits with steps of 1e-20, so
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -19,13 +18,12 @@ from symdyn.formulation.embedding import EmbeddedEquations
 from symdyn.model.orientation import SEQUENCES
 from tests import helpers
 
-HIGH = 80
-STEP = mpmath.mpf(10) ** -20
 half = sp.Rational(1, 2)
 SKEW = sp.Matrix([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
 QUARTER = sp.Matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
 AXES = {"x": [1, 0, 0], "y": [0, 1, 0], "-z": [0, 0, -1], "3-4": [0.6, 0, 0.8],
-        "1-2-2": [sp.Rational(1, 3), sp.Rational(2, 3), sp.Rational(2, 3)], "diagonal": list(np.ones(3) / np.sqrt(3)), "root": [1 / sp.sqrt(2), 0, -1 / sp.sqrt(2)]}
+        "1-2-2": [sp.Rational(1, 3), sp.Rational(2, 3), sp.Rational(2, 3)],
+        "diagonal": list(np.ones(3) / np.sqrt(3)), "root": [1 / sp.sqrt(2), 0, -1 / sp.sqrt(2)]}
 PLACE: dict[str, Any] = {"parent_point": [0.5, -0.2, 0.3], "child_point": [0.1, 0.4, -0.6], "parent_rotation": SKEW,
                          "child_rotation": QUARTER}
 a, b, c = sd.coordinates("a b c")
@@ -98,29 +96,10 @@ def mechanism(name: str, moving: bool = True, place: dict | None = None) -> Embe
     return s.embedding()
 
 
-def shifted(equations: EmbeddedEquations, values: dict[str, Any], step: Any) -> dict[str, Any]:
-    """The state a moment later, at constant speeds."""
-    (rates,) = helpers.quantities(equations, values, "rates", digits=HIGH)
-    with mpmath.workdps(HIGH):
-        return {**values, **{q.name: _number(values[q.name]) + step * rate
-                             for q, rate in zip(equations.symbols.coordinates, rates, strict=True)}}
-
-
-def _number(value: Any) -> Any:
-    return mpmath.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else mpmath.mpf(value)
-
-
-def by_time(equations: EmbeddedEquations, values: dict[str, Any], name: str) -> np.ndarray:
-    """Derivative of a quantity by time at constant speeds, by a central difference."""
-    later, earlier = (helpers.quantities(equations, shifted(equations, values, h), name, digits=HIGH)[0] for h in (STEP, -STEP))
-    with mpmath.workdps(HIGH):
-        return (later - earlier) / (2 * STEP)
-
-
 def velocities(equations: EmbeddedEquations, values: dict[str, Any]) -> np.ndarray:
-    (J,) = helpers.quantities(equations, values, "J", digits=HIGH)
-    with mpmath.workdps(HIGH):
-        return J @ np.array([_number(values[u.name]) for u in equations.symbols.speeds], dtype=object)
+    (J,) = helpers.quantities(equations, values, "J", digits=helpers.HIGH)
+    with mpmath.workdps(helpers.HIGH):
+        return J @ np.array([helpers.number(values[u.name]) for u in equations.symbols.speeds], dtype=object)
 
 
 @pytest.fixture(params=JOINTS)
@@ -133,10 +112,10 @@ def test_velocities_are_derivatives_of_positions(name: str, seed: int) -> None:
     equations = mechanism(name)
     values = helpers.state(equations, seed)
     v = velocities(equations, values).reshape(2, 6)
-    with mpmath.workdps(HIGH):
-        assert helpers.close(v[:, :3], by_time(equations, values, "positions"))
-        (frames,) = helpers.quantities(equations, values, "frames", digits=HIGH)
-        R, R_dot = frames[:, 3:].reshape(2, 3, 3), by_time(equations, values, "frames")[:, 3:].reshape(2, 3, 3)
+    with mpmath.workdps(helpers.HIGH):
+        assert helpers.close(v[:, :3], helpers.by_time(equations, values, "positions"))
+        (frames,) = helpers.quantities(equations, values, "frames", digits=helpers.HIGH)
+        R, R_dot = frames[:, 3:].reshape(2, 3, 3), helpers.by_time(equations, values, "frames")[:, 3:].reshape(2, 3, 3)
         for body in range(2):
             assert helpers.close(R[body] @ R[body].T, np.eye(3, dtype=int))
             assert helpers.close(np.cross(R[body][0], R[body][1]), R[body][2])
@@ -149,11 +128,11 @@ def test_velocities_are_derivatives_of_positions(name: str, seed: int) -> None:
 def test_accelerations_are_derivatives_of_velocities(name: str, seed: int) -> None:
     equations = mechanism(name)
     values = helpers.state(equations, seed)
-    with mpmath.workdps(HIGH):
-        later, earlier = (velocities(equations, shifted(equations, values, h)) for h in (STEP, -STEP))
-        wanted = (later - earlier) / (2 * STEP)
-        assert helpers.close(helpers.quantities(equations, values, "Jd_qd", digits=HIGH)[0], wanted)
-        assert helpers.close(helpers.quantities(equations, values, "Jdot", digits=HIGH)[0], by_time(equations, values, "J"))
+    with mpmath.workdps(helpers.HIGH):
+        later, earlier = (velocities(equations, helpers.shifted(equations, values, h)) for h in (helpers.STEP, -helpers.STEP))
+        wanted = (later - earlier) / (2 * helpers.STEP)
+        assert helpers.close(helpers.quantities(equations, values, "Jd_qd", digits=helpers.HIGH)[0], wanted)
+        assert helpers.close(helpers.quantities(equations, values, "Jdot", digits=helpers.HIGH)[0], helpers.by_time(equations, values, "J"))
 
 
 def test_place_of_the_child(name: str) -> None:
@@ -163,7 +142,7 @@ def test_place_of_the_child(name: str) -> None:
     values = helpers.state(equations, 4)
     (frames,) = helpers.quantities(equations, values, "frames")
     with mpmath.workdps(40):
-        exact = {s: sp.Float(str(_number(values[s.name])), 40) for s in (a, b, c, x, y, z, *e) if s.name in values}
+        exact = {s: sp.Float(str(helpers.number(values[s.name])), 40) for s in (a, b, c, x, y, z, *e) if s.name in values}
 
         def plain(matrix: Any) -> np.ndarray:
             m = sp.Matrix(matrix).xreplace(exact).evalf(40)
@@ -186,15 +165,15 @@ def test_unit_speeds(name: str) -> None:
     rates, J, frames = helpers.quantities(equations, values, "rates", "J", "frames")
     speeds = [values[u.name] for u in equations.symbols.speeds]
     R = frames[1, 3:].reshape(3, 3)
-    omega = R.T @ (J[9:] @ np.array([_number(v) for v in speeds], dtype=object)) if speeds else np.zeros(3)
+    omega = R.T @ (J[9:] @ np.array([helpers.number(v) for v in speeds], dtype=object)) if speeds else np.zeros(3)
     if "parameters" in name:
-        assert helpers.close(omega, np.array([_number(v) for v in speeds[-3:]], dtype=object))
+        assert helpers.close(omega, np.array([helpers.number(v) for v in speeds[-3:]], dtype=object))
         with mpmath.workdps(40):
             along = sum(values[s.name] * rate for s, rate in zip(equations.symbols.coordinates, rates, strict=True) if s in e)
         assert helpers.close(along, 0)
         assert [u.name for u in equations.symbols.speeds[-3:]] == [f"omega_{axis}_joint" for axis in "xyz"]
     else:
-        assert helpers.close(rates, np.array([_number(v) for v in speeds], dtype=object)) if speeds else rates.size == 0
+        assert helpers.close(rates, np.array([helpers.number(v) for v in speeds], dtype=object)) if speeds else rates.size == 0
         assert [u.name for u in equations.symbols.speeds] == [f"{q.name}_dot" for q in equations.symbols.coordinates]
 
 
