@@ -85,7 +85,7 @@ def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> Refe
         double = next(iter(evaluate(tape, values, 16).values())).ravel()
     except (ArithmeticError, ValueError, TypeError):  # also comparisons of complex numbers
         return None
-    if not all(mpmath.isfinite(e) and mpmath.im(e) == 0 for e in [*exact, *positive]) or any(e <= 0 for e in positive):
+    if not all(hasattr(e, "_mpf_") and mpmath.isfinite(e) for e in [*exact, *positive]) or any(e <= 0 for e in positive):
         return None
     scale = max((abs(float(e)) for e in exact), default=0.0) or 1.0
     lost = max((abs(float(a - b)) / scale for a, b in zip(exact, double, strict=True)), default=0.0)

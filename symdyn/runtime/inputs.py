@@ -91,10 +91,13 @@ def _interpolate(times: np.ndarray, column: np.ndarray, t: float, x: np.ndarray)
 
 
 def _table(pair: tuple, n: int, owner: str) -> tuple[np.ndarray, np.ndarray]:
-    times = np.ascontiguousarray(pair[0], dtype=float)
-    values = np.ascontiguousarray(np.asarray(pair[1], dtype=float).reshape(len(times), -1)) if len(times) else np.zeros((0, n))
-    if len(times) == 0 or values.shape[1] != n:
-        raise ArgumentError(f"{owner}: a table of inputs has {len(times)} times and values of shape "
+    try:
+        times, values = (np.ascontiguousarray(part, dtype=float) for part in pair)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{owner}: a table of inputs is a pair of times and values, found {pair!r}") from None
+    values = values[:, None] if values.ndim == n == 1 else values
+    if times.ndim != 1 or len(times) == 0 or values.shape != (len(times), n):
+        raise ArgumentError(f"{owner}: a table of inputs has times of shape {times.shape} and values of shape "
                             f"{np.shape(pair[1])}; give one row of {n} values for each time")
     if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise ArgumentError(f"{owner}: the times of a table of inputs must increase, and all of it be finite")

@@ -170,7 +170,7 @@ class Module:
         for name, shape in self.metadata["outputs"]:
             size = int(np.prod(shape))
             part = rows[..., start:start + size]
-            result[name] = part.reshape(*rows.shape[:-1], *shape)
+            result[name] = part.reshape((*rows.shape[:-1], *shape))
             start += size
         return result
 

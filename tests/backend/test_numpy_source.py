@@ -168,3 +168,16 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
         np.testing.assert_allclose(module.outputs(0.0, [x, 0.0]), wanted, rtol=1e-15)
     with np.errstate(all="ignore"):
         np.testing.assert_allclose(module.outputs(0.0, [[-4.0, 0.0], [0.0, 0.0]])[:, :2], [[4.0, np.sin(4) / 4], [0.0, 1.0]])
+
+
+def test_reference_states_avoid_what_is_undefined(tmp_path: Path) -> None:
+    """A root of a coordinate has references at positive ones; what is never defined is left out; the rest stays checked."""
+    q = sd.coordinates("q")
+    system = sd.System("sometimes", planar=True)
+    body = system.add_body("body", mass=1)
+    rail = system.add_joint(sd.Prismatic("rail", system.ground, body, q, axis=[1, 0]))
+    system.add_joint_force(rail, sp.sqrt(q))
+    system.add_output("never", sp.acosh(sp.sin(q) / 2) + sp.log(-(q**2)))
+    (path,) = write_source(emit(system.embedding(), "numpy"), tmp_path)
+    text = run_alone(path, "--selftest").stdout
+    assert text.endswith("all results agree\n") and text.count("rhs ") == 2 and "outputs" not in text

@@ -1,0 +1,28 @@
+"""Written files that are committed: compared byte by byte, rewritten only with --update."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from symdyn.pipeline import emit, write_source
+
+REFERENCE = Path(__file__).parents[2] / "generated" / "reference"
+FILES = {("pendulum", "c"): {"pendulum.c", "pendulum.h", "main.c"}, ("double_pendulum", "numpy"): {"double_pendulum.py"}}
+
+
+@pytest.mark.parametrize(("name", "backend"), FILES)
+def test_same_bytes(name: str, backend: str, derived: Callable[..., Any], update: bool, tmp_path: Path) -> None:
+    source = emit(derived(name), backend)
+    folder = REFERENCE / name
+    if update:
+        write_source(source, folder)
+    assert {path.name for path in folder.iterdir()} == FILES[name, backend]
+    for made in write_source(source, tmp_path):
+        kept = folder / made.name
+        assert made.read_bytes() == kept.read_bytes(), (
+            f"{kept} is not what is written now; see the difference with `git diff --no-index {kept} {made}`, "
+            "and keep it with `pytest --update`")
