@@ -7,7 +7,6 @@ k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J 
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,14 @@ from symdyn.errors import ModelError
 from symdyn.formulation import composite
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.equations import Equations, Symbols
-from symdyn.formulation.kinematics import Kinematics
-from symdyn.formulation.loads import Loads
-from symdyn.formulation.motion import Motion
-from symdyn.formulation.newton_euler import inverse_dynamics, inward
+from symdyn.formulation.newton_euler import inverse_dynamics
 from symdyn.formulation.rank import first_dependent
-from symdyn.formulation.tree import GROUND, Tree, build
-from symdyn.model.bodies import Point
+from symdyn.formulation.tree import build
+from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.joints import Fixed
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model, joint_speeds
-from symdyn.spatial.vectors import congruence, cross, inner, zeros
-from symdyn.tape.differentiate import forward
+from symdyn.spatial.vectors import congruence, zeros
 from symdyn.tape.node import is_zero
 from symdyn.tape.recorder import Recorder
 
@@ -103,25 +98,11 @@ def embed(model: Model) -> EmbeddedEquations:
                              derivation.quantities(), tuple(_notes(model)), _unit_groups(model))
 
 
-class EmbeddedTree(Motion):
+class EmbeddedTree(TreeQuantities):
     """Records the quantities of the embedded form of a tree."""
 
-    def __init__(self, tree: Tree) -> None:
-        model = tree.model
-        super().__init__(tree.algebra, model.coordinates, model.speeds, tree.rates,
-                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters)
-        self.tree = tree
-        self.model = model
-        self.loads = Loads(tree)
-        self.kinematics = Kinematics(tree)
-
     def quantities(self) -> dict[str, Any]:
-        own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
-               "positions": self.positions, "frames": self.frames, "energy": self.energy, "power": self.power,
-               **{f"output_{o.name}": partial(self.output, o.value) for o in self.model.outputs}}
-        return {**super().quantities(), **own}
-
-    # -- the equations
+        return {**super().quantities(), "k_tilde": self.k_tilde, "F_tilde": self.F_tilde}
 
     def M_tilde(self) -> np.ndarray:
         M = composite.mass_matrix(self.tree)
@@ -133,105 +114,21 @@ class EmbeddedTree(Motion):
     def bias(self) -> np.ndarray:
         """k_tilde - F_tilde in one pass: the weight as acceleration of the base."""
         applied = self.loads.applied()
-        tau = inverse_dynamics(self.tree, self.tree.b, -self._gravity(), applied.wrenches)
-        return self.algebra.name("k_minus_F", self._project(tau - applied.joint))
+        tau = inverse_dynamics(self.tree, self.tree.b, -self.gravity(), applied.wrenches)
+        return self.algebra.name("k_minus_F", self.project(tau - applied.joint))
 
     def inverse_dynamics(self) -> np.ndarray:
         """M_tilde u_dot + k_tilde - F_tilde by one pass, without the mass matrix."""
         applied = self.loads.applied()
         w_dot = self.tree.D @ self.speed_rates + self.tree.b if len(self.tree.w) else self.tree.b
-        tau = inverse_dynamics(self.tree, w_dot, -self._gravity(), applied.wrenches)
-        return self.algebra.name("tau", self._project(tau - applied.joint))
+        tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches)
+        return self.algebra.name("tau", self.project(tau - applied.joint))
 
     def k_tilde(self) -> np.ndarray:
-        return self.algebra.name("k_tilde", self._project(inverse_dynamics(self.tree, self.tree.b, zeros(3))))
+        return self.algebra.name("k_tilde", self.project(inverse_dynamics(self.tree, self.tree.b, zeros(3))))
 
     def F_tilde(self) -> np.ndarray:
-        return self.algebra.name("F_tilde", self._project(self._joint_forces(gravity=True)))
-
-    def _gravity(self) -> np.ndarray:
-        return self.algebra.constants(self.model.gravity)
-
-    def _joint_forces(self, gravity: bool, conservative: bool = True, other: bool = True) -> np.ndarray:
-        """What the loads give along each joint speed, (n_w,)."""
-        applied = self.loads.applied(conservative, other)
-        if gravity:
-            g = self._gravity()
-            turned: list[np.ndarray] = []
-            for k, link in enumerate(self.tree.links):
-                with self.algebra.section(f"link {link.name}: weight"):
-                    turned.append(link.R.T @ (g if link.parent == GROUND else turned[link.parent]))
-                    f = link.inertia.m * turned[k]
-                    force, moment = applied.wrenches[k]
-                    applied.wrenches[k] = (force + f, moment + cross(link.inertia.h, turned[k]))
-        return inward(self.tree, applied.wrenches) + applied.joint
-
-    def _project(self, tau: np.ndarray) -> np.ndarray:
-        """D^T tau: from the joints' speeds to the generalized ones."""
-        return tau if self.tree.plain else self.tree.D.T @ tau if len(tau) else zeros(len(self.speeds))
-
-    # -- what else follows
-
-    def J(self) -> np.ndarray:
-        rows = []
-        for pose, body in zip(self.tree.poses, self.model.bodies, strict=True):
-            with self.algebra.section(f"body {body.name}: velocity transformation J"):
-                J = self.kinematics.jacobian(pose, self.algebra.constants(body.com))
-                J = J @ self.tree.D if J.shape[1] else zeros(6, len(self.speeds))
-                rows.append(J[[0, 1, 5]] if self.model.planar else J)
-        return np.vstack(rows) if rows else zeros(0, len(self.speeds))
-
-    def Jdot(self) -> np.ndarray:
-        J = self.J()
-        return np.array(forward(self.algebra.recorder, J.ravel().tolist(), self.by_time()), dtype=object).reshape(J.shape)
-
-    def Jd_qd(self) -> np.ndarray:
-        rows = [r[[0, 1, 5]] if self.model.planar else r for r in self.kinematics.bias()]
-        return np.concatenate(rows) if rows else zeros(0)
-
-    def positions(self) -> np.ndarray:
-        """Centres of mass of the bodies, n-frame, (n_b, 3)."""
-        return np.array([self.kinematics.position(pose, self.algebra.constants(body.com))
-                         for pose, body in zip(self.tree.poses, self.model.bodies, strict=True)],
-                        dtype=object).reshape(-1, 3)
-
-    def frames(self) -> np.ndarray:
-        """Origin and rotation (row by row) of every body's frame, n-frame, (n_b, 12)."""
-        rows = []
-        for pose in self.tree.poses:
-            rows.append([*self.kinematics.position(pose, zeros(3)), *self.kinematics.rotation(pose).ravel()])
-        return np.array(rows, dtype=object).reshape(-1, 12)
-
-    def energy(self) -> np.ndarray:
-        """Kinetic energy; potential energy of gravity and springs, J."""
-        with self.algebra.section("energy"):
-            potential = self.kinematics.gravity_potential() + self.loads.potential()
-            return np.array([self.kinematics.kinetic_energy(), potential], dtype=object)
-
-    def power(self) -> Any:
-        """Power of all loads but gravity and springs, and of the drives that force prescribed motions, W."""
-        with self.algebra.section("power"):
-            total: Any = 0
-            if any(not is_zero(v) for v in self._joint_forces(False, conservative=False)):
-                total = inner(self._joint_forces(False, conservative=False), self.tree.w)
-            if any(not is_zero(v) for v in self.tree.w_t):
-                applied = self.loads.applied()
-                w_dot = self.tree.D @ self.accelerations() + self.tree.b
-                tau = inverse_dynamics(self.tree, w_dot, -self._gravity(), applied.wrenches) - applied.joint
-                total = total + inner(tau, self.tree.w_t)
-            return total
-
-    def output(self, value: Any) -> Any:
-        """A named output of the user."""
-        if isinstance(value, Point):
-            pose = self.loads.pose(value.body)
-            at = self.algebra.constants(value.at)
-            result = (self.kinematics.position(pose, at) if value.quantity == "position"
-                      else self.kinematics.velocity(pose, at))
-            return result[:2] if self.model.planar else result
-        if isinstance(value, tuple):
-            return self.algebra.constants(value)
-        return self.algebra.expression(value)
+        return self.algebra.name("F_tilde", self.project(self.joint_forces(gravity=True)))
 
     def demand_inertia(self) -> None:
         """Raise ModelError for speeds that move nothing: the mass matrix has a zero on its diagonal."""

@@ -22,7 +22,7 @@ from symdyn.model.faults import Faults
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_coordinate, time
 from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape import node as kinds
-from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.differentiate import jacobian
 from symdyn.tape.recorder import Recorder
 
 
@@ -89,13 +89,12 @@ class _PositionMap(Motion):
             return jacobian(self.algebra.recorder, self.r.tolist(), self._leaves(self.coordinates), "forward")
 
     def Jdot(self) -> np.ndarray:
-        J = self.J()
-        return self._rate(J.ravel()).reshape(J.shape)
+        return self.rate(self.J())
 
     def Jd_qd(self) -> np.ndarray:
         """d r_dot / dt at constant q_dot."""
         with self.algebra.section("accelerations with q_ddot = 0"):
-            return self._rate(self._rate(self.r))
+            return self.rate(self.rate(self.r))
 
     def M_tilde(self) -> np.ndarray:
         J = self.J()
@@ -120,15 +119,12 @@ class _PositionMap(Motion):
 
     def kinetic_energy(self) -> Any:
         """r_dot^T M r_dot / 2, J."""
-        velocity = self._rate(self.r)
+        velocity = self.rate(self.r)
         return inner(velocity, self.M @ velocity) / 2
 
     def _onto_columns(self, values: np.ndarray) -> np.ndarray:
         J = self.J()
         return vector(*[inner(J[:, j], values) for j in range(J.shape[1])])
-
-    def _rate(self, values: np.ndarray) -> np.ndarray:
-        return vector(*forward(self.algebra.recorder, values.tolist(), self.by_time()))
 
 
 def _column(faults: Faults, values: Any, what: str) -> list[sp.Expr]:

@@ -90,6 +90,11 @@ class Motion:
         leaves = self.algebra.leaves
         return {**{leaves[q]: rate for q, rate in zip(self.coordinates, self.rates, strict=True)}, leaves[time]: 1}
 
+    def rate(self, values: np.ndarray) -> np.ndarray:
+        """Derivative by time at constant speeds, entry by entry."""
+        rates = forward(self.algebra.recorder, values.ravel().tolist(), self.by_time())
+        return vector(*rates).reshape(values.shape)
+
     def jacobian(self, by: Sequence[Any]) -> np.ndarray:
         """d x_dot / d by, exact.
 
