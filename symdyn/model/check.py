@@ -66,6 +66,7 @@ class _Checker:
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
         initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states],
                                                        *self.inputs], "coordinate, speed, state or input")
+        self.units = self._unit_names()
         duration = self._number(s.duration, "duration")
         if duration is not None and duration <= 0:
             self.faults.append(f"duration is {s.duration} s; pass a positive number")
@@ -419,6 +420,22 @@ class _Checker:
                 result[symbols[name]] = number
         return result
 
+    def _unit_names(self) -> dict[sp.Symbol, str]:
+        """The units that were given, by symbol."""
+        symbols = {a.name: a for a in [*self.coordinates, *self.speeds, *[z.symbol for z in self.system.states],
+                                       *self.parameters, *self.inputs]}
+        units = {}
+        for key, unit in dict(self.system.units).items():
+            name = str(getattr(key, "name", key))
+            if name not in symbols:
+                self.faults.append(f"units has one for {name!r}, which is no symbol of the system"
+                                   f"{self._nearest(name, symbols)}")
+            elif not isinstance(unit, str) or not _NAME.fullmatch(unit):
+                self.faults.append(f"units: that of {name} is {unit!r}; pass text such as 'N m'")
+            else:
+                units[symbols[name]] = unit
+        return units
+
     def _number(self, value: Any, what: str) -> float | None:
         """A finite real number."""
         try:
@@ -473,7 +490,7 @@ class _Checker:
         for output in s.outputs:
             if isinstance(output.value, Point):
                 note(output.value.at, "m")
-        return {**units, **s.units}
+        return {**units, **self.units}
 
 
 def _symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:

@@ -114,15 +114,16 @@ class Joint:
 
     def _axis(self, value: Any, what: str = "axis") -> sp.ImmutableMatrix:
         before = len(self.faults)
+        harmless = sp.ImmutableMatrix(getattr(self, "default_axis", (0, 0, 1)))
         axis = self.faults.vector(value, f"joint {self.name!r}: {what}", planar=True)
         if len(self.faults) > before:
-            return sp.ImmutableMatrix([0, 0, 1])
+            return harmless
         length = numeric(sp.sqrt(axis.dot(axis)))
         if abs(length - 1) > 1e-9:
             found = f"has length {length:.6g}"
             cure = "pass a direction that is not zero" if length < 1e-12 else "divide it by its length"
             self.faults.append(f"joint {self.name!r}: {what} {list(axis)} {found}, not 1; {cure}")
-            return sp.ImmutableMatrix([0, 0, 1])
+            return harmless
         return _exactly_unit(axis)
 
     def __repr__(self) -> str:

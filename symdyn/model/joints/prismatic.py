@@ -5,27 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
+from symdyn.model.joints.axis import AxisJoint
+from symdyn.model.joints.base import JointMotion
+from symdyn.spatial.vectors import identity, zeros
 
-from symdyn.model.joints.base import IDENTITY, Joint, JointMotion
-from symdyn.spatial.vectors import zeros
 
-
-class Prismatic(Joint):
-    """Translation by `coordinate` (m) along `axis`, a unit vector in the joint frame; see Joint for the frames."""
+class Prismatic(AxisJoint):
+    """Translation by `coordinate` (m) along `axis`, a unit vector in the joint frame, default x; see Joint for the frames."""
 
     kind = "prismatic"
     coordinate_units = ("m",)
-
-    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any, axis: Any = (1, 0, 0), speed: Any = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
-        super().__init__(name, parent, child, (coordinate,), None if speed is None else (speed,), parent_point,
-                         child_point, parent_rotation, child_rotation)
-        self.axis = self._axis(axis)
+    default_axis = (1, 0, 0)
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
         axis = algebra.constants(self.axis)
         S = zeros(6, 1)
         S[3:, 0] = axis
-        return JointMotion(np.array(IDENTITY, dtype=object), axis * s[0], S, zeros(6))
+        return JointMotion(identity(), axis * s[0], S, zeros(6))

@@ -1,0 +1,20 @@
+"""What joints of one degree of freedom along or about an axis share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from symdyn.model.joints.base import Joint
+
+
+class AxisJoint(Joint):
+    """A joint with one coordinate and `axis`, a unit vector in the joint frame; see Joint for the frames."""
+
+    default_axis: tuple[int, int, int] = (0, 0, 1)
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any, axis: Any = ..., speed: Any = None,
+                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
+                 child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, (coordinate,), None if speed is None else (speed,), parent_point,
+                         child_point, parent_rotation, child_rotation)
+        self.axis = self._axis(self.default_axis if axis is ... else axis)
