@@ -79,8 +79,9 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     whole = Tape(next(iter(tapes.values())).recorder,
                  {name: next(iter(tape.outputs.values())) for name, tape in tapes.items()})
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
-        [*reasons, *[whole.recorder.checks[n] for n in whole.steps if n in whole.recorder.checks]]))}
-    constants = {node: k for k, node in enumerate(whole.hoisted)}
+        [*reasons, *_checks(whole, whole.steps).values()]))}
+    used = set(_cores([a for n in whole.running for a in n.args] + [e for o in whole.outputs.values() for e in o.entries]))
+    constants = {node: k for k, node in enumerate(n for n in whole.hoisted if n in used)}
     functions = tuple(_Writer(dialect, tape, places, constants, codes).function(name, titles[name])
                       for name, tape in tapes.items())
     prologue = _Writer(dialect, whole, places, {}, codes).prologue(constants)
@@ -98,7 +99,7 @@ class _Writer:
         self.constants = constants
         self.codes = codes
         self.names = tape.recorder.names
-        self.checks = tape.recorder.checks
+        self.checks: Mapping[Node, str] = {}
         self.taken: set[str] = set()
         self.text: dict[Node, str] = {}
         self.printer = Printer(dialect, self.text)
@@ -109,6 +110,7 @@ class _Writer:
     def function(self, name: str, title: str) -> Function:
         output = next(iter(self.tape.outputs.values()))
         body = [n for n in self.tape.running if n not in self.constants]
+        self.checks = _checks(self.tape, body)
         self._load_leaves(body, output.entries)
         self._load_constants(body, output.entries)
         sections = self._statements(body, output.entries)
@@ -121,6 +123,7 @@ class _Writer:
     def prologue(self, constants: Mapping[Node, int]) -> Function:
         """The function that computes the constants c from the parameters p."""
         body = list(self.tape.prologue)
+        self.checks = _checks(self.tape, body)
         for node in body:
             self._use_leaves(node.args)
         sections = self._statements(body, tuple(constants))
@@ -157,6 +160,11 @@ class _Writer:
         self.text[leaf] = identifier(leaf.args[1], self.taken)
         value = self.dialect.load[group].format(k=place + self.dialect.first)
         self.loads.append(self.dialect.assign.format(name=self.text[leaf], value=value))
+        self._check(leaf, self.loads)
+
+    def _check(self, node: Node, lines: list[str]) -> None:
+        if node in self.checks:
+            lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
 
     def _load_constants(self, body: Sequence[Node], entries: Sequence[Any]) -> None:
         used: dict[Node, None] = {}
@@ -193,8 +201,7 @@ class _Writer:
             lines = sections[-1][1]
             lines.append(self.dialect.assign.format(name=variable, value=value))
             self.text[node] = variable
-            if node in self.checks:
-                lines.append(self.dialect.check.format(name=variable, code=self.codes[self.checks[node]]))
+            self._check(node, lines)
         return tuple(Section(title, tuple(lines)) for title, lines in sections)
 
     def _name(self, node: Node) -> str:
@@ -206,6 +213,12 @@ class _Writer:
             return f"{node.op}_{first.args[1]}"
         self.n_unnamed += 1
         return f"x{self.n_unnamed}"
+
+
+def _checks(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
+    """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
+    divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
+    return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
 
 
 def _cores(values: Sequence[Any]) -> list[Node]:

@@ -102,7 +102,13 @@ class System:
     def add_coordinate(self, *coordinates: Any) -> None:
         """Coordinates that no joint has for its own, to be used in the expressions of joints: with an absolute angle phi,
         the joint after one with angle q takes coordinate=phi - q."""
-        self.extra_coordinates += [as_coordinate(c) for c in coordinates]
+        for given in coordinates:
+            taken = as_coordinate(given)
+            if isinstance(taken, Coordinate):
+                self.extra_coordinates.append(taken)
+            else:
+                self._faults.append(f"add_coordinate was given {given!r}; make coordinates with sd.coordinates and pass them "
+                                    "one by one")
 
     def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
         """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t and parameters."""

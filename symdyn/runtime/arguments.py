@@ -42,7 +42,7 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
     for key, value in values.items():
         name = str(getattr(key, "name", key))
         if name not in names:
-            near = difflib.get_close_matches(name, names, 3)
+            near = difflib.get_close_matches(name, names, 3, cutoff=0.5)
             hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(names) or 'none'}"
             faults.append(f"there is no {name!r}{hint}")
             continue

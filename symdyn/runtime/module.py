@@ -293,4 +293,6 @@ def _mark(params: Any) -> Any:
         return None
     if isinstance(params, np.ndarray):
         return params.tobytes()
-    return tuple(params.items()) if isinstance(params, Mapping) else tuple(params)
+    if isinstance(params, Mapping):
+        return tuple(params.items())
+    return tuple(params) if isinstance(params, Sequence) else params

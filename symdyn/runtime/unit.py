@@ -190,7 +190,10 @@ class PythonEvaluator:
         sizes = self.unit.metadata["sizes"]
         inputs = [0.0] * sizes["inputs"] if inputs is None else inputs
         ud = [0.0] * sizes["u"] if ud is None else ud
-        return self._evaluate(float(t), np.asarray(x, dtype=float), inputs, ud)
+        state = np.asarray(x, dtype=float)
+        if state.ndim != 1:
+            raise ValueError(f"one state has one dimension, found the shape {state.shape}")
+        return self._evaluate(float(t), state, inputs, ud)
 
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
         n = _rows((t, x, inputs, ud))

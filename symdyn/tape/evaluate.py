@@ -9,6 +9,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from symdyn.errors import UnsupportedExpression
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape, reachable
@@ -49,7 +50,10 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
 
 
 def constant(value: Any) -> float:
-    """The nearest float of a number or of a node without inputs, such as cos(1) or pi/6."""
+    """The nearest float of a number or of a node without inputs, such as cos(1) or pi/6.
+
+    Raises UnsupportedExpression if it is complex, as acos(3) is.
+    """
     if not isinstance(value, Node):
         return float(value)
     context = mpmath.mp.clone()
@@ -59,6 +63,9 @@ def constant(value: Any) -> float:
     for node in reachable([value]):
         done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else context.mpf(Fraction(a).numerator)
                                           / Fraction(a).denominator for a in node.args])
+    if isinstance(done[value], context.mpc):
+        raise UnsupportedExpression(f"a constant of the equations is the complex number {context.nstr(done[value], 6)}; "
+                                    "look for the root, logarithm or arc function of a number outside its range")
     return float(done[value])
 
 

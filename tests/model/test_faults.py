@@ -185,6 +185,9 @@ SPATIAL: dict[str, Case] = {
                           "orientation is <class|sd.EulerParameters()"),
     "nothing with inertia": (lambda s: s.add_joint(sd.Revolute("wrist", "lower", s.add_body("extra"), q3)),
                              "joint 'wrist': what it moves has no mass or inertia along q3_dot|give body 'extra'"),
+    "added coordinate of a joint": (lambda s: s.add_coordinate(q1), "q1 was given to add_coordinate, but joint 'shoulder'"),
+    "added coordinates in a list": (lambda s: s.add_coordinate([q3, q4]), "add_coordinate was given [q3, q4]|one by one"),
+    "added coordinate text": (lambda s: s.add_coordinate("q3"), "add_coordinate was given 'q3'|sd.coordinates"),
     # loads
     "force on nobody": (lambda s: s.add_force("uper", [1, 0, 0]),
                         "force_1: body is 'uper', which is no body|did you mean 'upper'"),
@@ -281,6 +284,9 @@ SPATIAL: dict[str, Case] = {
                         "there are q1, q2, q1_dot, q2_dot|did you mean 'q1_dot'"),
     "initial for a parameter": (lambda s: s.initial.update({m: 1}), "initial has a number for 'm'"),
     "initial text": (lambda s: s.initial.update({q1: "0"}), "initial: the value of q1 is '0'"),
+    "unit of nothing": (lambda s: s.units.update({"mm": "kg"}), "units has one for 'mm', which is no symbol|did you mean 'm'"),
+    "unit a number": (lambda s: s.units.update({m: 1}), "units: that of m is 1|pass text such as 'N m'"),
+    "unit of several lines": (lambda s: s.units.update({m: "k\n\"\"\"g"}), "units: that of m is|pass text such as 'N m'"),
     "duration text": (lambda s: setattr(s, "duration", "long"), "duration is 'long'|pass a finite number"),
     "duration negative": (lambda s: setattr(s, "duration", -1), "duration is -1 s|pass a positive number"),
 }
@@ -505,6 +511,8 @@ def test_numbers_by_name_or_symbol() -> None:
     assert model.defaults == {m: 1.0, l: 0.5, g: 9.81}
     assert model.initial == {q1: 0.1, q1.dot: 2.0, q2: pytest.approx(math.pi / 2)}
     assert all(type(v) is float for v in [*model.defaults.values(), *model.initial.values()])
+    s.units = {"l": "cm", m: "kg m"}
+    assert {a.name: unit for a, unit in s.check().units.items() if a.name in "lmg"} == {"l": "cm", "m": "kg m", "g": "m/s^2"}
 
 
 def test_force_at_the_centre_of_mass_of_a_body_that_comes_later() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import symdyn as sd
-from symdyn.errors import SymdynError
+from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.tape import Node, Recorder, Tape
 from symdyn.tape.evaluate import constant, evaluate
 from symdyn.tape.node import COORDINATE, PARAMETER
@@ -177,6 +177,11 @@ def test_constant(r: Recorder) -> None:
     assert constant(r.pi()) == 3.141592653589793 and constant(Fraction(1, 3)) == 1 / 3
     value = constant(r.sqrt(2) * r.sin(Fraction(1, 2)) - r.pi() / 6)
     assert value == pytest.approx(math.sqrt(2) * math.sin(0.5) - math.pi / 6, rel=1e-15)
+
+
+def test_constants_that_are_not_real(r: Recorder) -> None:
+    with pytest.raises(UnsupportedExpression, match=r"complex number \(0.0 \+ 1.76275j\)"):
+        constant(r.apply("acos", 3))
 
 
 def test_outputs_keep_their_shape(r: Recorder, abxy: Sequence[Node]) -> None:

@@ -1,0 +1,82 @@
+"""`symdyn derive`: prints the equations."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from typing import TYPE_CHECKING, Any
+
+from symdyn.cli.find import find_equations
+
+if TYPE_CHECKING:
+    from symdyn.formulation.embedding import EmbeddedEquations
+
+# Quantities with more operations than this, written out, are counted and not printed: nobody reads them.
+READABLE = 1000
+_LATEX = {"M_tilde": r"\tilde{M}", "k_tilde": r"\tilde{k}", "F_tilde": r"\tilde{F}", "Jdot": r"\dot{J}",
+          "Jd_qd": r"\dot{J} \dot{q}"}
+
+
+def derive(arguments: argparse.Namespace) -> int:
+    """Print the symbols, and every quantity that was asked for."""
+    equations = find_equations(arguments)
+    for name in arguments.quantity:
+        equations.quantity(name)
+    s = equations.symbols
+    if not arguments.latex:
+        print(f"{equations.name}: M_tilde u_dot + k_tilde = F_tilde")
+        for what, symbols in (("coordinates q", s.coordinates), ("speeds u", s.speeds), ("inputs", s.inputs),
+                              ("parameters", s.parameters)):
+            if symbols:
+                print(f"  {what}: " + ", ".join(f"{x.name} [{s.units[x]}]" if s.units.get(x) else x.name for x in symbols))
+    for name in arguments.quantity:
+        count, shape = _written_out(equations, name), equations.quantity(name).shape
+        if count > READABLE and not arguments.force:
+            size = " x ".join(map(str, shape)) or "a number"
+            steps = equations.tape(name).operations
+            note = f"{name} ({size}): {count} operations written out, {steps} in generated code; --force prints it"
+            print(f"% {note}" if arguments.latex else f"\n{note}")
+            continue
+        value = equations.explicit(name, simplify=not arguments.no_simplify)
+        print(_latex(name, value) if arguments.latex else f"\n{name} =\n{_pretty(value)}")
+    return 0
+
+
+def _written_out(equations: EmbeddedEquations, name: str) -> int:
+    """Operations of the quantity as explicit expressions, where nothing is shared."""
+    from symdyn.tape.node import Node
+
+    tape = equations.tape(name)
+    counts: dict[Node, int] = {}
+    for node in tape.steps:
+        below = sum(counts[a] for a in node.args if isinstance(a, Node)) if node.op != "leaf" else -1
+        counts[node] = 1 + below
+    return sum(counts[e] for e in tape.outputs[name].entries if isinstance(e, Node))
+
+
+def _pretty(value: Any) -> str:
+    """As a drawing of characters, as wide as the terminal."""
+    import shutil
+
+    import sympy as sp
+
+    wide = (sys.stdout.encoding or "").lower().startswith("utf")
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    if wide:
+        value = value.xreplace({x: _dotted(x.name) for x in value.free_symbols if x.name.endswith("_dot")})
+    return str(sp.pretty(value, use_unicode=wide, wrap_line=columns is not None, num_columns=columns))
+
+
+def _dotted(name: str) -> Any:
+    """The symbol that SymPy prints with a dot: qdot_1 for q1_dot."""
+    import sympy as sp
+
+    letters, index = re.fullmatch(r"(.*?)(_?\d*)", name.removesuffix("_dot")).groups()  # type: ignore[union-attr]
+    return sp.Symbol(f"{letters}dot{index}")
+
+
+def _latex(name: str, value: Any) -> str:
+    import sympy as sp
+
+    return f"{_LATEX.get(name, sp.latex(sp.Symbol(name)))} = {sp.latex(value)}"

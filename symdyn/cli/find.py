@@ -1,0 +1,52 @@
+"""What a command is about: a system, its equations or its module."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symdyn.cli.messages import Stop
+from symdyn.cli.options import check_options, options_of
+from symdyn.cli.userfile import from_file
+from symdyn.errors import SymdynError
+
+if TYPE_CHECKING:
+    from symdyn.formulation.embedding import EmbeddedEquations
+    from symdyn.model.system import System
+    from symdyn.runtime.module import Module
+
+
+def find_system(name: str, options: Mapping[str, Any]) -> System:
+    """The system of the catalogue, or of a Python file."""
+    from symdyn import systems
+
+    if name in systems.names():
+        check_options(name, getattr(systems, name), options)
+        return systems.get(name, **options)
+    if name.endswith(".py") or Path(name).is_file():
+        return from_file(Path(name), options)
+    try:
+        return systems.get(name)
+    except SymdynError as error:
+        raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
+
+
+def find_equations(arguments: argparse.Namespace) -> EmbeddedEquations:
+    """The equations of the system with its options."""
+    return find_system(arguments.system, options_of(arguments)).embedding()
+
+
+def find_module(arguments: argparse.Namespace) -> Module:
+    """The numeric module; one of the catalogue is remembered from run to run."""
+    from symdyn import systems
+
+    if arguments.system not in systems.names():
+        return find_equations(arguments).compile(arguments.backend)  # type: ignore[no-any-return]
+    from symdyn.runtime.recall import recall
+
+    options = options_of(arguments)
+    if options:
+        check_options(arguments.system, getattr(systems, arguments.system), options)
+    return recall(arguments.system, options, arguments.backend)

@@ -1,0 +1,80 @@
+"""What can be written after `symdyn`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from symdyn.cli.demo import demo
+from symdyn.cli.derive import READABLE, derive
+from symdyn.cli.generate import generate
+from symdyn.cli.list import list_systems
+from symdyn.cli.report import report
+from symdyn.cli.simulate import simulate
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser; what it returns holds the function of the command as `run`."""
+    parser = argparse.ArgumentParser(prog="symdyn", description="Equations of motion of multibody systems: derived "
+                                     "symbolically, generated as C and NumPy, simulated fast.")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def command(name: str, run: Callable[[argparse.Namespace], int], text: str, system: bool = True) -> Any:
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(run=run)
+        if system:
+            sub.add_argument("system", metavar="NAME", help="a system of the catalogue (see symdyn list), or a Python "
+                             "file that defines system()")
+            sub.add_argument("--option", metavar="KEY=VALUE", nargs="+", action="extend", default=[],
+                             help="options of the system, such as n=5")
+        return sub
+
+    command("list", list_systems, "list the systems of the catalogue", system=False)
+
+    _add_derive(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde"))
+    _add_generate(command("generate", generate, "write source files; no compiler is needed"))
+    _add_simulate(command("simulate", simulate, "simulate, and save data and a picture"))
+    proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
+                    "identities at random states")
+    proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
+    _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
+                        system=False))
+    return parser
+
+
+def _add_derive(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quantity", metavar="NAME", nargs="+", default=["M_tilde", "k_tilde", "F_tilde"],
+                        help="what to print (default: M_tilde k_tilde F_tilde)")
+    parser.add_argument("--latex", action="store_true", help="print LaTeX")
+    parser.add_argument("--no-simplify", action="store_true", help="print as derived")
+    parser.add_argument("--force", action="store_true", help=f"print also what has more than {READABLE} operations")
+
+
+def _add_generate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--backend", metavar="NAME", action="append", help="c, numpy or a folder of --templates; may be "
+                        "repeated (default: c and numpy)")
+    parser.add_argument("--templates", metavar="DIR", help="folder whose templates take precedence")
+    parser.add_argument("--functions", metavar="NAME", nargs="+", help="what to generate (default: rhs, mass_matrix, ...)")
+    _add_output(parser)
+
+
+def _add_simulate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="END or START END, s (default: the system's)")
+    parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance of a step (default: 1e-8)")
+    parser.add_argument("--atol", type=float, help="absolute tolerance of a step (default: as rtol)")
+    parser.add_argument("--method", help="dop853 (compiled), or RK23, RK45, DOP853, Radau, BDF, LSODA of SciPy")
+    parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
+    for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1"),
+                       ("--u", "initial speeds, such as q1_dot=1"), ("--z", "initial extra states"),
+                       ("--input", "constant inputs, such as F=1")):
+        parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
+    parser.add_argument("--no-picture", action="store_true", help="save data only")
+    parser.add_argument("--gif", action="store_true", help="save an animation too")
+    parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
+    _add_output(parser)
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the files (default: generated/NAME)")

@@ -1,0 +1,41 @@
+"""A computed motion in a few lines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solution import Solution
+
+# States beyond these are not told.
+SHOWN = 12
+
+
+def summarize(solution: Solution) -> None:
+    """Print how it was computed, whether energy is kept, and where it ends."""
+    module, metadata = solution.module, solution.module.metadata
+    where = {"c": "compiled C", "numpy": "NumPy"}.get(solution.backend, solution.backend)
+    end = f"{solution.t[-1]:.6g}" if len(solution.t) else "nothing"
+    print(f"{module.name}: {solution.method} on {where} to t = {end} s" + ("" if solution.success else ", stopped early"))
+    if module.fallback:
+        print(f"  {module.fallback}")
+    inside = solution.integrator_seconds
+    time = f"{1e3 * solution.seconds:.3g} ms" if inside is None else f"{1e3 * inside:.3g} ms inside the integrator"
+    print(f"  {solution.n_steps} steps, {solution.nfev} evaluations, {time}")
+    if "energy" in module.functions and len(solution.t):
+        print(f"  {_energy(solution)}")
+    if len(solution.t):
+        names = metadata["x"]
+        state = ", ".join(f"{n} = {v:.6g}" for n, v in list(zip(names, solution.x[-1]))[:SHOWN])
+        more = f", and {len(names) - SHOWN} more in the files" if len(names) > SHOWN else ""
+        print(f"  at the end: {state}{more}")
+
+
+def _energy(solution: Solution) -> str:
+    """The energy error where energy is kept, else how it changed."""
+    module = solution.module
+    kept = "power" in module.functions and not module.evaluate("power", solution.t, solution.x, solution.params,
+                                                               solution.inputs).any()
+    if kept:
+        return f"energy is kept to {solution.energy_error():.2g} of its largest part"
+    return f"energy goes from {solution.energy[0]:.6g} J to {solution.energy[-1]:.6g} J by loads and drives"

@@ -1,0 +1,53 @@
+"""A system described in a Python file of the user."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symdyn.cli.messages import Stop
+from symdyn.cli.options import check_options
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+
+def from_file(path: Path, options: Mapping[str, Any]) -> System:
+    """What system() of a user's file returns. The file is a program, and is run."""
+    import importlib.util
+
+    if not path.is_file():
+        raise Stop(f"there is no file {path}")
+    spec = importlib.util.spec_from_file_location(f"symdyn_user_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise Stop(f"{path} is not a Python file; its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+        make = getattr(module, "system", None)
+        if not callable(make):
+            raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
+        check_options(f"system() of {path}", make, options)
+        result = make(**options)
+    except Stop:
+        raise
+    except (Exception, SystemExit) as error:  # whatever the user's program raises is told as its own
+        raise Stop(_users_fault(error, path)) from None
+    from symdyn.model.system import System
+
+    if not isinstance(result, System):
+        raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
+    return result
+
+
+def _users_fault(error: BaseException, path: Path) -> str:
+    """The sentence, and the lines of the user's file that led there."""
+    import traceback
+
+    here = path.resolve()
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).resolve() == here]
+    lines = "".join([*traceback.format_list(frames), *traceback.format_exception_only(error)]).rstrip()
+    return f"{path} ended with {type(error).__name__}:\n{lines}"

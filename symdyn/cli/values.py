@@ -1,0 +1,43 @@
+"""Arguments of the form name=value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from symdyn.cli.messages import Stop
+
+
+def pairs(items: Iterable[str], what: str) -> dict[str, str]:
+    """name -> text from name=text."""
+    found: dict[str, str] = {}
+    for item in items:
+        name, sign, text = item.partition("=")
+        if not (name and sign and text):
+            raise Stop(f"{what} {item!r}: write name=value")
+        if name in found:
+            raise Stop(f"{what} {name} is given twice: {found[name]} and {text}")
+        found[name] = text
+    return found
+
+
+def numbers(items: Iterable[str], what: str) -> dict[str, float] | None:
+    """name -> number from name=number; None if there are none."""
+    found = {}
+    for name, text in pairs(items, what).items():
+        try:
+            found[name] = float(text)
+        except ValueError:
+            raise Stop(f"{what} {name}={text}: {text!r} is not a number") from None
+    return found or None
+
+
+def value_of(text: str) -> bool | int | float | str:
+    """What an option's text stands for."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    if re.fullmatch(r"[+-]?\d+", text):
+        return int(text)
+    if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text):
+        return float(text)
+    return text

@@ -1,0 +1,18 @@
+"""Pictures of a motion: curves over time, and the moving bodies. No display is needed; pyplot's state is not touched.
+
+Bodies are drawn as lines: from the point they share with the body that carries them, over their frame's origin, to
+the points that carry others or are outputs. These points are found in the motion itself, so that every mechanism can
+be drawn whose module gives frames or centres of mass.
+"""
+
+from __future__ import annotations
+
+from symdyn.errors import MissingExtra
+
+try:
+    from symdyn.runtime.pictures.animation import animate
+    from symdyn.runtime.pictures.plotting import plot
+except ImportError as error:
+    raise MissingExtra(f"pictures need matplotlib: pip install 'symdyn[plot]' ({error})") from None
+
+__all__ = ["animate", "plot"]

@@ -1,0 +1,74 @@
+"""The film of a motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.animation import FuncAnimation
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.pictures.bodies import make_artists, make_axes, move, points_at
+from symdyn.runtime.pictures.drawing import Drawing
+from symdyn.runtime.pictures.figure import Picture
+from symdyn.runtime.pictures.film import Film
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solution import Solution
+
+MAX_FRAMES = 3000
+
+
+def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 1.0) -> FuncAnimation:
+    """The moving bodies, with the way of the last centre of mass.
+
+    fps     pictures a second; speed: seconds of motion in one second of film
+    path    where to save the film; a GIF, which needs Pillow and nothing else
+
+    Returns the animation; a notebook shows it with buttons. Raises ArgumentError if the module gives no positions, if
+    nothing can be drawn, or for another ending than .gif.
+    """
+    if path is not None and Path(path).suffix.lower() != ".gif":
+        raise ArgumentError(f"cannot save the animation to {Path(path).name}: the ending must be .gif")
+    if not (fps > 0 and speed > 0):
+        raise ArgumentError(f"fps and speed must be positive, found fps = {fps}, speed = {speed}")
+    whole = Drawing.of(solution) if len(solution.t) > 1 else None
+    if whole is None:
+        raise ArgumentError(f"{solution.module.name}: there is nothing to animate: at least two times and the function "
+                            "'positions' are needed, and bodies that extend or move")
+    t = solution.t
+    count = int(abs(t[-1] - t[0]) / speed * fps) + 1
+    if count > MAX_FRAMES:
+        raise ArgumentError(f"{solution.module.name}: the film would have {count} pictures; raise speed above "
+                            f"{speed * count / MAX_FRAMES:.3g}, or lower fps")
+    times = t[0] + np.sign(t[-1] - t[0]) * np.arange(count) * speed / fps
+    drawing = whole.at(t, times)
+    spans = np.ptp(whole.limits(), axis=1)
+    height = 5.0 if drawing.spatial else 6.0 * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.6
+    figure = Picture(figsize=(6, height), layout="constrained", dpi=80)
+    axes = make_axes(figure, 111, whole)
+    trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8)[0]
+    artists = make_artists(axes, drawing)
+    axes.set_title(solution.module.name, fontsize=11)
+    clock = figure.text(0.02, 1 - 0.2 / height, "", family="monospace")
+
+    def draw(k: int) -> list[Any]:
+        move(trace, whole.centres[: _passed(t, times[k]), -1])
+        for artist, points in zip(artists, points_at(drawing, k), strict=True):
+            move(artist, points)
+        clock.set_text(f"t = {times[k]:.2f} s")
+        return [trace, *artists, clock]
+
+    # The layout is found once: it is the slowest part of drawing.
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
+    film = Film(figure, draw, count, fps)
+    if path is not None:
+        Path(path).write_bytes(film.gif())
+    return film
+
+
+def _passed(t: np.ndarray, now: float) -> int:
+    """How many of the times are over."""
+    return int(np.searchsorted(t, now, "right") if t[-1] > t[0] else np.searchsorted(-t, -now, "right"))

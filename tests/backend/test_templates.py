@@ -1,0 +1,232 @@
+"""Templates of the user's own: another language, one file replaced, and what is said when one is broken."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symdyn.backend.dialect import identifier
+from symdyn.backend.source import backends, template_folders
+from symdyn.errors import SymdynError
+from symdyn.pipeline import FUNCTIONS, emit, has_function, write_source
+
+HERE = Path(__file__).parent
+SHIPPED = template_folders()[0]
+NODE = pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A template folder of the user's with the JavaScript example."""
+    shutil.copytree(HERE / "javascript", tmp_path / "templates" / "javascript")
+    return tmp_path / "templates"
+
+
+def node(path: Path, program: str) -> str:
+    done = subprocess.run(["node", "-e", f"const m = require({json.dumps(str(path))});\n{program}"], capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+# -- another language
+
+
+def test_example_is_small() -> None:
+    lines = [line for path in (HERE / "javascript").iterdir() for line in path.read_text().splitlines()]
+    assert len(lines) < 60
+
+
+@NODE
+@pytest.mark.parametrize("name", ["pendulum", "three_link_arm", "prismatic_chain", "awkward_names"])
+def test_javascript_checks_itself(name: str, derived: Callable[..., Any], folder: Path, tmp_path: Path) -> None:
+    equations = derived(name)
+    functions = [f for f in FUNCTIONS if has_function(equations, f)]
+    (path,) = write_source(emit(equations, "javascript", functions, folder), tmp_path)
+    assert path.name == f"{equations.name}.js"
+    done = subprocess.run(["node", path], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "all results agree\n"), done.stdout + done.stderr
+    path.write_text(path.read_text().replace("out[0] = ", "out[0] = 0.001 + "))
+    assert subprocess.run(["node", path], capture_output=True, text=True).returncode == 1
+
+
+@NODE
+def test_javascript_gives_the_numbers_of_the_module(derived: Callable[..., Any], compiled: Callable[..., Any], folder: Path,
+                                                    tmp_path: Path) -> None:
+    (path,) = write_source(emit(derived("double_pendulum"), "javascript", templates=folder), tmp_path)
+    module = compiled("double_pendulum", "numpy")
+    q, u, p = [0.3, -0.8], [1.5, 0.4], module.parameters().tolist()
+    printed = node(path, f"const p = {p}, q = {q}, u = {u}, c = m.prologue({{ p }});\n"
+                         "console.log(JSON.stringify([m.rhs({ q, u, p, c }), m.mass_matrix({ q, p, c })]));")
+    rhs, mass_matrix = json.loads(printed)
+    np.testing.assert_allclose(rhs, module.rhs(0.0, [*q, *u]), rtol=1e-13)
+    np.testing.assert_allclose(np.reshape(mass_matrix, (2, 2)), module.mass_matrix(q), rtol=1e-13)
+
+
+@NODE
+def test_javascript_refuses_a_singular_mass_matrix(derived: Callable[..., Any], folder: Path, tmp_path: Path) -> None:
+    (path,) = write_source(emit(derived("pendulum"), "javascript", templates=folder), tmp_path)
+    printed = node(path, "try { m.prologue({ p: [9.81, 1, 0] }); } catch (e) { console.log(e.name, e.message); }")
+    assert printed == "RangeError the mass matrix is not positive definite at q1_dot\n"
+
+
+def test_arrays_that_start_at_one(derived: Callable[..., Any], folder: Path) -> None:
+    dialect = folder / "javascript" / "dialect.toml"
+    dialect.write_text("first = 1\n" + dialect.read_text())
+    text = emit(derived("double_pendulum"), "javascript", templates=folder).files["double_pendulum.js"]
+    assert "q[1]" in text and "q[2]" in text and "q[0]" not in text and "out[4] = " in text and "out[0]" not in text
+
+
+def test_literals_of_another_kind(derived: Callable[..., Any], folder: Path) -> None:
+    dialect = folder / "javascript" / "dialect.toml"
+    dialect.write_text('literal = "{value!r}_real"\n' + dialect.read_text())
+    text = emit(derived("pendulum"), "javascript", ["energy"], folder).files["pendulum.js"]
+    assert "0.5_real*" in text
+
+
+@NODE
+def test_command_line(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("symdyn.cli")
+    command = [sys.executable, "-m", "symdyn", "generate", "pendulum", "--templates", str(folder), "--backend", "javascript",
+               "--output", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=HERE.parents[1])
+    assert done.returncode == 0, done.stderr
+    assert subprocess.run(["node", tmp_path / "out" / "pendulum.js"]).returncode == 0
+
+
+# -- one file replaced
+
+
+def test_one_file_of_a_shipped_backend(derived: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "main.c.jinja").write_text("// {{ name }} has {{ n_q }} coordinates\nint main(void) { return 0; }\n")
+    mine, usual = (emit(derived("pendulum"), "c", templates=t).files for t in (tmp_path, None))
+    assert mine["main.c"] == "// pendulum has 1 coordinates\nint main(void) { return 0; }\n"
+    assert {n: t for n, t in mine.items() if n != "main.c"} == {n: t for n, t in usual.items() if n != "main.c"}
+    assert backends(tmp_path) == ["c", "numpy"]
+
+
+def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
+    """What a shipped template includes is looked for in the user's folder first, too."""
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "simulate.c.jinja").write_text("// no integrator for {{ name }}\n")
+    text = emit(derived("pendulum"), "c", templates=tmp_path).files["pendulum.c"]
+    assert "// no integrator for pendulum\n" in text and "dop853" not in text
+
+
+def test_a_module_from_own_templates(derived: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "numpy").mkdir()
+    text = (SHIPPED / "numpy" / "model.py.jinja").read_text()
+    (tmp_path / "numpy" / "model.py.jinja").write_text(text + "\nMINE = True\n")
+    module = derived("pendulum").compile(backend="numpy", templates=tmp_path)
+    assert module.unit("rhs").module.MINE and module.rhs(0.0, [0.0, 1.0]).tolist() == [1.0, 0.0]
+
+
+# -- what is said when something is wrong
+
+
+def failure(equations: Any, backend: str, templates: Any) -> str:
+    with pytest.raises(SymdynError) as caught:
+        emit(equations, backend, templates=templates)
+    return str(caught.value)
+
+
+def test_missing_folder_dialect_or_backend(derived: Callable[..., Any], folder: Path) -> None:
+    equations = derived("pendulum")
+    assert "/no/such/folder does not exist" in failure(equations, "c", "/no/such/folder")
+    assert "no backend 'fortran'; there are c, javascript, numpy; a folder with a dialect.toml" in failure(
+        equations, "fortran", folder)
+    (folder / "javascript" / "dialect.toml").unlink()
+    assert "no backend 'javascript'; there are c, numpy" in failure(equations, "javascript", folder)
+
+
+@pytest.mark.parametrize(("line", "broken", "message"), [
+    (2, "{% for line in header %}\n{{ lin }}\n{% endfor %}\n", "'lin' is undefined"),
+    (3, "a\nb\n{% for line in header %}\n", "Unexpected end of template"),
+    (2, "a\n{{ name | upcase }}\n", "No filter named 'upcase'"),
+    (2, "a\n{{ program.functoins }}\n", "no attribute 'functoins'"),
+    (3, "a\n\n{{ 1 + name }}\n", "unsupported operand"),
+    (1, "{{ signature() }}\n", "missing 1 required positional argument"),
+])
+def test_broken_template(line: int, broken: str, message: str, derived: Callable[..., Any], folder: Path) -> None:
+    path = folder / "javascript" / "model.js.jinja"
+    path.write_text(broken)
+    said = failure(derived("pendulum"), "javascript", folder)
+    assert said.startswith(f"template {path}, line {line}: ") and message in said
+
+
+def test_fault_in_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "c").mkdir()
+    path = tmp_path / "c" / "dop853.c.jinja"
+    path.write_text("\n\n\n{{ nothing }}")
+    assert failure(derived("pendulum"), "c", tmp_path) == f"template {path}, line 4: 'nothing' is undefined"
+    path.write_text("{% include 'c/absent.jinja' %}")
+    assert "needs c/absent.jinja, which is in none of the template folders" in failure(derived("pendulum"), "c", tmp_path)
+
+
+def test_file_that_the_dialect_names_is_missing(derived: Callable[..., Any], folder: Path) -> None:
+    (folder / "javascript" / "model.js.jinja").unlink()
+    assert "javascript/model.js.jinja" in failure(derived("pendulum"), "javascript", folder)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('and = "', 'sinus = "', "unknown operations: sinus"),
+    ("assign = ", "asign = ", "missing: assign"),
+    ("[files]", "[fils]", "missing: files"),
+    ("store = ", "store ", "not valid TOML"),
+    ('z = "z[{k}]", ', "", "load.z is missing"),
+    ('q = "q[{k}]"', 'q = "q[{n}]"', "load.q = 'q[{n}]' cannot be filled in ('n'); it may use {k}"),
+    ("{name} = {value};", "{name} = {values};", "assign = 'const {name} = {values};' cannot be filled in"),
+    ("({0} && {1})", "({0} && {3})", "operations.and = '({0} && {3})' cannot be filled in"),
+    ("({0} && {1})", "{ {0} && {1} }", "braces are doubled"),
+])
+def test_broken_dialect(old: str, new: str, message: str, derived: Callable[..., Any], folder: Path) -> None:
+    path = folder / "javascript" / "dialect.toml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    said = failure(derived("pendulum"), "javascript", folder)
+    assert str(path) in said and message in said
+
+
+# -- what the README says
+
+
+def test_readme_lists_what_templates_get(derived: Callable[..., Any], tmp_path: Path) -> None:
+    """Every name in the table is there, and every name that is there is in the table."""
+    from symdyn.backend import source
+
+    seen: list[set[str]] = []
+    original = source._context
+
+    def spy(*arguments: Any) -> dict[str, Any]:
+        context = original(*arguments)
+        seen.append(set(context))
+        return context
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(source, "_context", spy)
+        emit(derived("pendulum"), "numpy")
+    text = (SHIPPED / "README.md").read_text(encoding="utf-8")
+    table = text.split("## What a template gets")[1].split("`program.functions`, and")[0]
+    listed = set(re.findall(r"`(\w+)(?:\([^)]*\))?`", "\n".join(
+        line.split("|")[1] for line in table.splitlines() if line.startswith("| `"))))
+    assert listed == seen[0]
+
+
+def test_identifiers() -> None:
+    taken: set[str] = set()
+    names = ["q1", "q1", "lambda", "θ", "2x", "_m", "m 1", "x", "let", "main", "q1_2"]
+    written = [identifier(name, taken) for name in names]
+    assert written[0] == "q1" and len(set(written)) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) for name in written)
+    assert not {"lambda", "x", "let", "main"} & set(written)
