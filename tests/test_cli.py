@@ -71,8 +71,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) 
 
 def test_help_and_list_come_without_sympy() -> None:
     after = "print([m for m in ('sympy', 'numpy', 'scipy', 'matplotlib') if m in sys.modules])"
-    helped = subprocess.run([sys.executable, "-c", "import sys, atexit; atexit.register(lambda: print([m for m in ('sympy', "
-                             "'numpy', 'scipy', 'matplotlib') if m in sys.modules]))\nfrom symdyn.cli import main; main(['--help'])"],
+    helped = subprocess.run([sys.executable, "-c", f"import sys, atexit; atexit.register(lambda: {after})\n"
+                             "from symdyn.cli import main; main(['--help'])"],
                             capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ROOT})
     assert helped.returncode == 0 and helped.stdout.splitlines()[-1] == "[]"
     assert all(f" {c} " in helped.stdout for c in ("list", "derive", "generate", "simulate", "report", "demo"))
@@ -209,6 +209,12 @@ def test_simulate_saves_data_and_picture(here: Path, capsys: pytest.CaptureFixtu
 def test_simulate_tells_energy_changes_and_takes_inputs(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "cart_pole", "--t", "1", "--input", "F=3", "--no-picture"]) == 0
     assert re.search(r"energy goes from 0\.48\S* J to \S+ J by loads", capsys.readouterr().out)
+
+
+def test_motors_that_are_off_keep_the_energy(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "two_link_arm", "--t", "1", "--no-picture", "--output", "out"]) == 0
+    assert float(re.search(r"energy is kept to (\S+) ", capsys.readouterr().out)[1]) < 1e-6  # type: ignore[index]
+    assert (here / "out" / "two_link_arm.npz").is_file()
 
 
 def test_the_second_run_needs_no_sympy_and_gives_the_same(here: Path) -> None:

@@ -88,7 +88,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     known = backends(templates)
     if backend not in known:
         raise SymdynError(f"there is no backend {backend!r}; there are {', '.join(known)}; "
-                          "a folder with a dialect.toml and templates, passed as templates=, adds one")
+                          "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
     dialect = next(read_dialect(f / backend) for f in folders if (f / backend / "dialect.toml").is_file())
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
                                      trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)

@@ -295,4 +295,4 @@ def _mark(params: Any) -> Any:
         return params.tobytes()
     if isinstance(params, Mapping):
         return tuple(params.items())
-    return tuple(params) if isinstance(params, Sequence) else params
+    return tuple(params) if hasattr(params, "__iter__") else params

@@ -24,7 +24,9 @@ from symdyn.runtime.solution import Solution
 pytest.importorskip("matplotlib")
 image = pytest.importorskip("PIL.Image")
 
-from symdyn.runtime.pictures import Drawing, animate, plot  # noqa: E402
+from symdyn.runtime.pictures import animate, plot  # noqa: E402
+from symdyn.runtime.pictures.drawing import Drawing  # noqa: E402
+from symdyn.runtime.pictures.points import points_of  # noqa: E402
 
 ROOT = str(Path(symdyn.__file__).parents[1])
 OPTIONS: dict[str, dict[str, Any]] = {"n_link_pendulum": {"n": 3}, "spatial_chain": {"n": 4}, "prismatic_chain": {"n": 3}}
@@ -59,22 +61,27 @@ def test_curves_have_names_and_units(tmp_path: Path) -> None:
     figure = plot(motion("double_pendulum"), path)
     assert labels(figure) == ["coordinates [rad]", "speeds [rad/s]", "energy [J]", "y [m]"]
     shown = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes[:3]]
-    assert shown == [["q1", "q2"], ["q1_dot", "q2_dot"], ["kinetic", "potential", "total"]]
+    assert shown == [["q1", "q2"], ["q1_dot", "q2_dot"], ["kinetic", "potential\n(0 at start)", "total"]]
     assert "double_pendulum" in figure.get_suptitle()
     with image.open(path) as picture:
         assert picture.width > 800 and len(picture.convert("RGB").getcolors(1 << 24)) > 100
 
 
 def test_each_unit_has_its_axes_and_inputs_are_shown() -> None:
-    figure = plot(motion("cart_pole"))
+    module = motion("cart_pole").module
+    figure = plot(module.simulate((0.0, 1.0), inputs={"F": 2.0}))
     assert labels(figure)[:6] == ["q1 [m]", "q2 [rad]", "q1_dot [m/s]", "q2_dot [rad/s]", "F [N]", "energy [J]"]
+    assert labels(plot(module.simulate((0.0, 1.0))))[4] == "energy [J]"
 
 
 def test_curves_are_the_solution() -> None:
     solution = motion("double_pendulum")
     coordinates, speeds, energy, _ = plot(solution).axes
+    start = solution.energies[0, 1]
+    kinetic, potential = solution.energies[:, 0], solution.energies[:, 1] - start
+    assert start != 0 and potential[0] == 0 and np.allclose(kinetic + potential, solution.energy - start)
     for axes, values in ((coordinates, solution.q), (speeds, solution.u), (energy, np.column_stack(
-            [solution.energies, solution.energy]))):
+            [kinetic, potential, kinetic + potential]))):
         for line, column in zip(axes.lines, values.T, strict=True):
             assert np.array_equal(line.get_xdata(), solution.t) and np.array_equal(line.get_ydata(), column)
 
@@ -103,7 +110,64 @@ def test_states_and_outputs_have_axes() -> None:
     solution = system.embedding().compile("numpy").simulate((0.0, 0.2))
     figure = plot(solution)
     assert {"z", "height", "output"} <= {re.sub(r" \[.*", "", label) for label in labels(figure)}
-    assert len(next(axes for axes in figure.axes if axes.get_ylabel() == "output").lines) == 2
+    pair = next(axes for axes in figure.axes if axes.get_ylabel() == "output")
+    assert [line.get_label() for line in pair.lines] == ["pair[0]", "pair[1]"]
+
+
+def test_equations_without_bodies_have_curves_alone() -> None:
+    x = symdyn.coordinates("x")
+    m, g = symdyn.parameters("m g")
+    solution = symdyn.embedding([x], [x], [m], [-m * g], defaults={m: 1, g: 9.81}).compile("numpy").simulate((0, 1))
+    assert labels(plot(solution)) == ["x", "x_dot"]
+    with pytest.raises(ArgumentError, match="nothing to animate"):
+        animate(solution)
+
+
+# -- outputs that are points
+
+
+@pytest.mark.parametrize("rest", [False, True])
+def test_points_are_told_from_other_outputs(rest: bool) -> None:
+    system = systems.double_pendulum()
+    q1, q2 = symdyn.coordinates("q1:3")
+    system.add_output("tip", symdyn.position(system.bodies[1], [1.0, 0.2]))
+    system.add_output("elbow", symdyn.position(system.bodies[0], [1.0, 0.0]))
+    system.add_output("fast", symdyn.velocity(system.bodies[1], [1.0, 0.2]))
+    system.add_output("angles", [q1, q2])
+    system.add_output("rates", [q1.dot, q2.dot])
+    system.add_output("squares", [q1**2, q2 * q1, q2])
+    module = system.embedding().compile("numpy")
+    start: dict[str, Any] = {"q": [-np.pi / 2, 0.0], "u": [0.0, 0.0]} if rest else {}
+    solution = module.simulate((0.0, 0.5), **start)
+    found = points_of(solution)
+    assert {name: (point.quantity, point.unit) for name, point in found.items()} == {
+        "tip": ("position", "m"), "elbow": ("position", "m"), "fast": ("velocity", "m/s")}
+    assert found["tip"].body == found["fast"].body == 1
+    figure = plot(solution)
+    shown = {axes.get_ylabel(): [line.get_label() for line in axes.lines] for axes in figure.axes if axes.lines}
+    assert shown["velocity [m/s]"] == ["fast x", "fast y"] and shown["output"] == ["squares[0]", "squares[1]", "squares[2]"]
+
+
+def test_points_in_space_are_found_on_bodies_with_euler_parameters_and_moving_ground() -> None:
+    system = symdyn.System("free", gravity=[0, 0, -9.81])
+    body = system.add_body("b", mass=1, inertia=[1, 2, 3])
+    system.add_joint(symdyn.Free("j", system.ground, body, symdyn.coordinates("x y z e0 e1 e2 e3"),
+                                 orientation=symdyn.EulerParameters()))
+    system.move_ground(position=[symdyn.t**2, 0, 0])
+    system.add_output("corner", symdyn.position(body, [0.1, 0.2, 0.3]))
+    system.add_output("fast", symdyn.velocity(body, [0.1, 0.2, 0.3]))
+    solution = system.embedding().compile("numpy").simulate((0.0, 0.5), q={"e0": 1.0}, u=[0, 0, 0, 1, 2, 3])
+    assert {name: (p.body, p.quantity) for name, p in points_of(solution).items()} == {
+        "corner": (0, "position"), "fast": (0, "velocity")}
+
+
+def test_bodies_reach_to_their_points() -> None:
+    for name in ("two_link_arm", "three_link_arm"):
+        solution = motion(name)
+        drawing = Drawing.of(solution)
+        assert drawing is not None
+        missed = np.abs(drawing.lines[-1] - solution.outputs["tip"][:, None]).max(axis=(0, 2))
+        assert missed.min() < 1e-12
 
 
 def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:

@@ -32,6 +32,7 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing) -> Any:
             axis._axinfo["grid"].update(color="0.88", linewidth=0.7)
     else:
         axes.set_aspect("equal")
+        axes.locator_params(axis="x", nbins=6)
         axes.grid(True, color="0.92", linewidth=0.7)
         axes.set_axisbelow(True)
     return axes
