@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from symdyn.errors import UnsupportedExpression
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
 from symdyn.spatial.vectors import vector
@@ -31,8 +32,12 @@ class TapeAlgebra:
         self.positive = recorder.positive
 
     def expression(self, e: Any) -> Any:
-        """A SymPy expression on the tape."""
-        return record_expression(self.recorder, e, self.leaves, self._memory)
+        """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""
+        try:
+            return record_expression(self.recorder, e, self.leaves, self._memory)
+        except (UnsupportedExpression, ZeroDivisionError) as error:
+            where = f"{self.recorder.heading}: " if self.recorder.heading else ""
+            raise UnsupportedExpression(f"{where}{error}") from None
 
     def constants(self, values: Iterable[Any]) -> np.ndarray:
         """A vector of expressions on the tape."""

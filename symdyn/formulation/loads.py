@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.errors import ModelError
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
@@ -123,6 +124,9 @@ class Loads:
                 ((self.pose(load.body_a), load.point_a), (self.pose(load.body_b), load.point_b))]
         common, (a, b) = self._common(ends)
         d = b - a
+        if all(is_zero(e) for e in d):
+            raise ModelError([f"{load.label}: its two ends are the same point at every position; give them a distance, or "
+                              "leave it out"], self.model.name)
         return d, self.algebra.name(f"length_{load.label}", self.algebra.sqrt(dot(d, d))), common
 
     def _rate(self, value: Any) -> Any:

@@ -33,7 +33,7 @@ class TreeQuantities(Motion):
         """name -> function that records it."""
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
                "energy": self.energy, "power": self.power,
-               **{f"output_{o.name}": partial(self.output, o.value) for o in self.model.outputs}}
+               **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         return {**super().quantities(), **own}
 
     # -- kinematics
@@ -86,8 +86,12 @@ class TreeQuantities(Motion):
                 total = total + inner(tau, self.tree.w_t)
             return total
 
-    def output(self, value: Any) -> Any:
+    def output(self, name: str, value: Any) -> Any:
         """A named output of the user."""
+        with self.algebra.section(f"output {name}"):
+            return self._output(value)
+
+    def _output(self, value: Any) -> Any:
         if isinstance(value, Point):
             pose = self.loads.pose(value.body)
             at = self.algebra.constants(value.at)

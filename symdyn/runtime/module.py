@@ -118,7 +118,10 @@ class Module:
 
     def jacobian(self, t: float, x: Any, params: Any = None, inputs: Any = (),
                  wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
-        """Exact derivatives of x_dot by state, inputs and parameters; `wrt` leaves out what is not needed."""
+        """Exact derivatives of x_dot by state, inputs and parameters; `wrt` leaves out what is not needed.
+
+        With Euler parameters the derivatives by the state hold along changes that keep their norm.
+        """
         unknown = [w for w in wrt if w not in Jacobian._fields]
         if unknown:
             raise ArgumentError(f"{self.name}: jacobian by {', '.join(unknown)} asked for; there are x, inputs and params")

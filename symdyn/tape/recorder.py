@@ -67,8 +67,15 @@ class Recorder:
     def section(self, title: str) -> Iterator[None]:
         """What is recorded inside stands under this heading in the emitted code."""
         outer, self._section = self._section, title
-        yield
-        self._section = outer
+        try:
+            yield
+        finally:
+            self._section = outer
+
+    @property
+    def heading(self) -> str:
+        """The section under which is recorded now."""
+        return self._section
 
     def positive(self, node: Any, reason: str) -> Any:
         """Demand that a value is positive when it is computed; reason tells what it means if not."""

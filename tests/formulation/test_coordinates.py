@@ -72,3 +72,28 @@ def test_unused_coordinate():
     system.add_coordinate(phi)
     with pytest.raises(sd.ModelError, match="no joint with mass or inertia moves with phi_dot"):
         system.embedding()
+
+
+def test_spring_between_coinciding_points():
+    system = double(q2)
+    system.add_spring_damper("first", "last", [1, 0], [0, 0], stiffness=1.0, length=0.1, name="clip")
+    with pytest.raises(sd.ModelError, match="clip: its two ends are the same point at every position"):
+        system.embedding().tape("rhs")
+
+
+@pytest.mark.parametrize(("expression", "message"), [
+    (sp.gamma(q1), "load drive: gamma.q1. .* has no counterpart in generated code"),
+    (sp.Piecewise((1, q1 > 0)), "load drive: .* not defined everywhere"),
+])
+def test_unsupported_expressions_tell_where(expression, message):
+    system = double(q2)
+    system.add_joint_force("a", expression, name="drive")
+    with pytest.raises(sd.UnsupportedExpression, match=message):
+        system.embedding().tape("rhs")
+
+
+def test_unsupported_output_tells_where():
+    system = double(q2)
+    system.add_output("odd", sp.gamma(q1))
+    with pytest.raises(sd.UnsupportedExpression, match="output odd: gamma"):
+        system.embedding().tape("output_odd")

@@ -26,7 +26,7 @@ def rotating_track():
 
 def test_straight_track(straight_track):
     eq = straight_track
-    assert eq.J == sp.Matrix([sp.cos(theta), -sp.sin(theta)])
+    assert sp.Matrix([sp.cos(theta), -sp.sin(theta)]) == eq.J
     assert eq.M_tilde == sp.Matrix([m]) and eq.k_tilde == sp.Matrix([0])
     assert equal(eq.explicit("accelerations"), [g * sp.sin(theta)])
 
@@ -64,7 +64,7 @@ def test_prismatic_joints():
     assert eq.M_tilde == sp.Matrix([[m1 + m2, m2], [m2, m2]])
     eq = sd.embedding([q1, q2, q3], [q1, q1 + q2, q1 + q2 + q3], [m1, m2, m3])
     assert eq.M_tilde == sp.Matrix([[m1 + m2 + m3, m2 + m3, m3], [m2 + m3, m2 + m3, m3], [m3, m3, m3]])
-    assert eq.J == sp.Matrix([[1, 0, 0], [1, 1, 0], [1, 1, 1]])
+    assert sp.Matrix([[1, 0, 0], [1, 1, 0], [1, 1, 1]]) == eq.J
 
 
 def test_given_motion_of_the_track():
