@@ -175,8 +175,9 @@ def _run_scipy(module: Module, request: Request, method: Any, bar: Any, field_na
             raise
 
     def field(s: float, x: np.ndarray) -> np.ndarray:
+        inputs = given(s, x[:n_state]) if n_in else None
         try:
-            return evaluator.one(s, x, given(s, x[:n_state]) if n_in else None)
+            return evaluator.one(s, x, inputs)
         except EvaluationError as error:
             if np.isfinite(x).all():
                 trouble.append(str(error).removeprefix(f"{module.name}: "))

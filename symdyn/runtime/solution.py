@@ -172,7 +172,7 @@ class Solution:
         elif path.suffix == ".csv":
             names, columns = ["t", *self.module.metadata["x"]], [self.t, *self.x.T]
             for name, rows in self.outputs.items():
-                flat = rows.reshape(len(self.t), -1)
+                flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
                 names += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
                 columns += list(flat.T)
             with path.open("w", newline="", encoding="utf-8") as file:

@@ -1,0 +1,77 @@
+"""The wheel, installed where there is no checkout: finds its templates, generates, compiles, simulates."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.slow
+
+PROGRAM = """
+import sys
+from pathlib import Path
+import symdyn as sd
+assert not Path(sd.__file__).is_relative_to(sys.argv[1]), sd.__file__
+from symdyn.backend.source import backends, template_folders
+assert template_folders() == [Path(sd.__file__).parent / "templates"] and backends() == ["c", "numpy"]
+assert (template_folders()[0] / "README.md").is_file()
+equations = sd.systems.pendulum().embedding()
+for backend in sys.argv[2:]:
+    module = equations.compile(backend=backend)
+    solution = module.simulate((0, 2), rtol=1e-10)
+    assert solution.success and solution.energy_error() < 1e-8, solution
+    print(*[path.name for path in module.write(Path("out") / backend)])
+"""
+
+
+def run(*command: object, cwd: Path, seconds: float = 300) -> str:
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
+    environment["SYMDYN_CACHE_DIR"] = str(cwd / "cache")
+    done = subprocess.run([str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True, timeout=seconds)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The wheel of this checkout; with the build tools of this environment if they are here, else fetched ones."""
+    folder = tmp_path_factory.mktemp("wheel")
+    try:
+        import hatchling  # noqa: F401
+
+        isolation = ["--no-build-isolation"]
+    except ImportError:
+        isolation = []
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", *isolation, "-w", folder, ROOT, cwd=folder)
+    (path,) = folder.glob("symdyn-*.whl")
+    yield path
+
+
+def test_wheel_holds_templates_and_code_only(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    shipped = {str(p.relative_to(ROOT)) for p in (ROOT / "templates").rglob("*") if p.is_file()}
+    assert {f"symdyn/{name}" for name in shipped} <= names
+    code = {str(p.relative_to(ROOT)) for p in (ROOT / "symdyn").rglob("*.py")}
+    assert code <= names
+    assert all(name.startswith(("symdyn/", "symdyn-")) for name in names) and not any("__pycache__" in n for n in names)
+
+
+def test_installed_elsewhere(wheel: Path, tmp_path: Path) -> None:
+    base = Path(sys.base_prefix) / ("python.exe" if sys.platform == "win32" else f"bin/python{sys.version_info[0]}")
+    run(base, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
+    python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel, cwd=tmp_path)
+    from symdyn.runtime.compiler import find_compiler
+
+    backends = ["numpy", "c"] if find_compiler() is not None else ["numpy"]
+    printed = run(python, "-c", PROGRAM, ROOT, *backends, cwd=tmp_path).splitlines()
+    assert printed == ["pendulum.py", "pendulum.c pendulum.h main.c"][:len(backends)]
+    assert run(python, tmp_path / "out" / "numpy" / "pendulum.py", "--selftest", cwd=tmp_path).endswith("all results agree\n")
+    assert "pendulum" in run(tmp_path / "venv" / python.parent.name / "symdyn", "list", cwd=tmp_path)
