@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import EvaluationError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.model.symbols import time
 from symdyn.tape.differentiate import forward
@@ -105,13 +105,15 @@ class _Values:
 
 
 def symmetric(s: Sample) -> float | None:
+    if not s.has("M_tilde"):
+        return None
     M = s["M_tilde"]
     return _relative(M - M.T, M)
 
 
 def positive_definite(s: Sample) -> float | None:
     """Zero if it is; else how far the smallest eigenvalue is below zero, relative to the largest, but at least 1e-20."""
-    if not s.numbers:
+    if not s.numbers or not s.has("M_tilde"):
         return None
     values = mpmath.eigsy(mpmath.matrix(s["M_tilde"].tolist()), eigvals_only=True)
     smallest, largest = min(values), max(values)
@@ -121,6 +123,8 @@ def positive_definite(s: Sample) -> float | None:
 
 
 def equations_hold(s: Sample) -> float | None:
+    if not s.has("M_tilde", "k_tilde", "F_tilde"):
+        return None
     inertial = s["M_tilde"] @ s["accelerations"]
     k, F = s["k_tilde"], s["F_tilde"]
     return _relative(inertial + k - F, np.concatenate([inertial, k, F]))
@@ -146,40 +150,49 @@ def energy_balance(s: Sample) -> float | None:
 
 def kinetic_energy_quadratic(s: Sample) -> float | None:
     """T(u) + T(-u) - 2 T(0) = u^T M_tilde u"""
-    if not s.has("energy"):
+    quantity = "energy" if s.has("energy") else "kinetic_energy"
+    if not s.has(quantity, "M_tilde"):
         return None
     names = [u.name for u in s.equations.symbols.speeds]
-    T = [s.at({n: sign * s.values[n] for n in names})["energy"][0] for sign in (1, -1, 0)]
+    T = [s.at({n: sign * s.values[n] for n in names})[quantity].ravel()[0] for sign in (1, -1, 0)]
     wanted = s.u @ s["M_tilde"] @ s.u
     return _relative(np.array([T[0] + T[1] - 2 * T[2] - wanted]), np.array([wanted]))
 
 
 def jacobian_of_positions(s: Sample) -> float | None:
-    """J u against central differences of the positions of the centres of mass along the motion."""
-    positions = "positions" if s.has("positions") else "r"
-    if not s.has(positions, "J", "rates"):
-        return None
-    step = mpmath.mpf(10) ** (-s.digits // 3)
-
-    def difference(values: Mapping[str, Any]) -> np.ndarray:
-        rates = s.at(values)["rates"]
-        ends = []
-        for sign in (1, -1):
-            moved = {q.name: mpmath.mpf(s.values[q.name]) + sign * step * rate
-                     for q, rate in zip(s.equations.symbols.coordinates, rates, strict=True)}
-            ends.append(s.at({**values, **moved, "t": mpmath.mpf(s.values["t"]) + sign * step})[positions])
-        return (ends[0] - ends[1]) / (2 * step)
-
+    """J u against central differences of positions and rotations along the motion, less what moves without u."""
     at_rest = {u.name: 0 for u in s.equations.symbols.speeds}
-    velocities = difference({}) - difference(at_rest)
-    J = s["J"]
-    if velocities.ndim == 1:
-        found = J @ s.u
-    else:
-        rows = 3 if s.equations.planar else 6
-        picked = [rows * b + k for b in range(len(velocities)) for k in range(2 if s.equations.planar else 3)]
-        found, velocities = (J @ s.u)[picked], velocities[:, :2 if s.equations.planar else 3].ravel()
-    return _relative(found - velocities, velocities)
+    wanted = s["J"] @ s.u if s.has("J", "rates") else None
+    if wanted is None or not (s.has("r") or s.has("positions", "frames")):
+        return None
+    if s.has("r"):
+        found = _difference(s, "r", {}) - _difference(s, "r", at_rest)
+        return _relative(found - wanted, wanted)
+    v = _difference(s, "positions", {}) - _difference(s, "positions", at_rest)
+    omega = _angular(s, {}) - _angular(s, at_rest)
+    rows = np.concatenate([v, omega], axis=1)
+    found = (rows[:, [0, 1, 5]] if s.equations.planar else rows).ravel()
+    return _relative(found - wanted, wanted)
+
+
+def _angular(s: Sample, changes: Mapping[str, Any]) -> np.ndarray:
+    """Angular velocity of every body, n-frame, from the difference of its rotation: R_dot R^T = [omega x]."""
+    R = s.at(changes)["frames"][:, 3:].reshape(-1, 3, 3)
+    R_dot = _difference(s, "frames", changes)[:, 3:].reshape(-1, 3, 3)
+    skew = [a @ b.T for a, b in zip(R_dot, R, strict=True)]
+    return np.array([[w[2, 1], w[0, 2], w[1, 0]] for w in skew], dtype=object).reshape(-1, 3)
+
+
+def _difference(s: Sample, quantity: str, values: Mapping[str, Any]) -> np.ndarray:
+    """Central difference of a quantity by time along the motion with some values changed."""
+    step = mpmath.mpf(10) ** (-s.digits // 3)
+    rates = s.at(values)["rates"]
+    ends = []
+    for sign in (1, -1):
+        moved = {q.name: mpmath.mpf(s.values[q.name]) + sign * step * rate
+                 for q, rate in zip(s.equations.symbols.coordinates, rates, strict=True)}
+        ends.append(s.at({**values, **moved, "t": mpmath.mpf(s.values["t"]) + sign * step})[quantity])
+    return (ends[0] - ends[1]) / (2 * step)
 
 
 def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
@@ -192,7 +205,7 @@ def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
             found = module.rhs(s.values["t"], x, [s.values[p.name] for p in eq.symbols.parameters],
                                [s.values[i.name] for i in eq.symbols.inputs])
         except EvaluationError:
-            return float("inf")
+            return float("inf") if s.numbers else None  # arbitrary parameters need not make a definite mass matrix
         M = s["M_tilde"].astype(float)
         condition = np.linalg.cond(M) if len(M) else 1.0
         exact = s["rhs"]
@@ -207,7 +220,7 @@ CHECKS: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
     ("inverse dynamics of the accelerations gives zero", inverse_of_forward, 1e-20),
     ("rate of energy equals power of the loads", energy_balance, 1e-20),
     ("kinetic energy is quadratic in u with M_tilde", kinetic_energy_quadratic, 1e-20),
-    ("J u is the rate of the positions", jacobian_of_positions, 1e-15),
+    ("J u is the rate of the positions and rotations", jacobian_of_positions, 1e-15),
 )
 
 
@@ -241,15 +254,29 @@ def _samples(equations: Equations, states: int, digits: int, params: Mapping[Any
     given = {str(getattr(k, "name", k)): float(v) for k, v in {**symbols.defaults, **(params or {})}.items()}
     numbers = all(p.name in given for p in symbols.parameters)
     parameters = {p.name: given.get(p.name, stream.uniform(0.5, 1.5)) for p in symbols.parameters}
-    samples = []
-    for _ in range(states):
+    samples: list[Sample] = []
+    for _ in range(40 * states):
+        if len(samples) == states:
+            return samples
         values = {"t": stream.uniform(0, 1), **parameters}
         for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
             values.update({s.name: stream.uniform(-1, 1) for s in group})
         values.update({f"{u.name}_dot": 0.0 for u in symbols.speeds})
         _on_unit_sphere(equations, values)
-        samples.append(Sample(equations, values, digits, numbers))
-    return samples
+        sample = Sample(equations, values, digits, numbers)
+        if _defined(sample):
+            samples.append(sample)
+    raise SymdynError(f"{equations.name}: the right-hand side is defined at {len(samples)} of {40 * states} random states only "
+                      "(coordinates and speeds in [-1, 1]); check where its loads leave their domain, such as log, sqrt or a "
+                      "division")
+
+
+def _defined(sample: Sample) -> bool:
+    """Whether the right-hand side is a finite real number at the state."""
+    try:
+        return all(np.isfinite(float(v)) for v in sample["rhs"].ravel())
+    except (TypeError, ValueError, ArithmeticError):
+        return False
 
 
 def _on_unit_sphere(equations: Equations, values: dict[str, Any]) -> None:

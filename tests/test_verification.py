@@ -3,6 +3,7 @@
 import dataclasses
 
 import pytest
+import sympy as sp
 
 import symdyn as sd
 
@@ -27,6 +28,40 @@ def test_sound_equations_pass(equations):
     assert result.passed
     assert all(check.residual is not None for check in result.checks)
     assert "M_tilde is symmetric" in str(result) and "FAIL" not in str(result)
+
+
+@pytest.mark.parametrize("row", range(18))
+def test_every_row_of_the_jacobian_is_proved(row):
+    equations = sd.systems.get("three_link_arm").embedding()
+    wrong = equations.quantity("J") * 1
+    wrong[row] = wrong[row] + 1e-9
+    spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, "J": wrong}, _printed={})
+    failed = [check.name for check in spoilt.verify(states=1).checks if check.passed is False]
+    assert failed == ["J u is the rate of the positions and rotations"]
+
+
+def test_loads_that_leave_their_domain():
+    q = sd.coordinates("q")
+    system = sd.System("slider")
+    body = system.add_body("body", mass=1)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, q))
+    system.add_joint_force(joint, sp.log(q))
+    assert system.embedding().verify(states=2).passed
+    system.add_joint_force(joint, sp.sqrt(-2 - q**2))
+    with pytest.raises(sd.SymdynError, match="is defined at 0 of 80 random states only"):
+        system.embedding().verify(states=2)
+
+
+def test_arbitrary_inertias_are_no_failure():
+    system = sd.System("chain", gravity=[0, 0, -9.81])
+    parent = system.ground
+    for k in range(3):
+        xx, yy, zz, xy, xz, yz, m = sd.parameters(f"xx{k} yy{k} zz{k} xy{k} xz{k} yz{k} m{k}")
+        body = system.add_body(f"b{k}", mass=m, inertia=[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], com=[0.3, 0.1, 0])
+        system.add_joint(sd.Revolute(f"j{k}", parent, body, sd.coordinates(f"q{k}"), axis=[(0, 0, 1), (0, 1, 0)][k % 2]))
+        parent = body
+    result = system.embedding().verify(states=4)
+    assert result.passed, str(result)
 
 
 @pytest.mark.parametrize("quantity", PRINTED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +19,13 @@ _FUNCTIONS: dict[type, str] = {getattr(sp, row.sympy): op for op, row in OPERATI
                                if op not in ("add", "sub", "mul", "div", "neg", "pow", "sqrt", "pi", "select",
                                              "min", "max", "and", "or")}
 _FOLDED = {sp.Min: "min", sp.Max: "max", sp.And: "and", sp.Or: "or"}
+# Elementary functions in terms of others that generated code has.
+_REWRITTEN: dict[type, Callable[..., sp.Expr]] = {
+    sp.acot: lambda x: sp.atan(1 / x), sp.asec: lambda x: sp.acos(1 / x), sp.acsc: lambda x: sp.asin(1 / x),
+    sp.acoth: lambda x: sp.atanh(1 / x), sp.asech: lambda x: sp.acosh(1 / x), sp.acsch: lambda x: sp.asinh(1 / x),
+    sp.Mod: lambda a, b: a - b * sp.floor(a / b), sp.sinc: lambda x: sp.Piecewise((sp.sin(x) / x, sp.Ne(x, 0)), (1, True)),
+    sp.frac: lambda x: x - sp.floor(x), sp.erfc: lambda x: 1 - sp.erf(x),
+}
 _RECIPROCAL = {sp.sec: "cos", sp.csc: "sin", sp.cot: "tan", sp.sech: "cosh", sp.csch: "sinh", sp.coth: "tanh"}
 
 
@@ -98,6 +105,9 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
             half = take(e.args[1]) if len(e.args) > 1 else Fraction(1, 2)
             return recorder.apply("select", recorder.apply("gt", x, 0), 1,
                                   recorder.apply("select", recorder.apply("eq", x, 0), half, 0))
+        rewritten = _REWRITTEN.get(type(e))
+        if rewritten is not None:
+            return take(rewritten(*e.args))
         operation = _FUNCTIONS.get(type(e))
         if operation is None:
             raise UnsupportedExpression(
