@@ -39,6 +39,7 @@ FUNCTIONS = {
     "inverse_dynamics": ("inverse_dynamics", "tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud"),
     "outputs": ("outputs", "the named outputs, one after the other"),
     "power": ("power", "power of all loads but gravity and springs, and of prescribed motions, W"),
+    "power_x": ("power_x", "derivative of the power by x"),
     "Jd_qd": ("Jd_qd", "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame"),
     "frames": ("frames", "origin and rotation (row by row) of every body's frame, n-frame"),
     "positions": ("positions", "centres of mass, n-frame, m"),

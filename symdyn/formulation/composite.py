@@ -6,6 +6,7 @@ and 6.5 (L^T D L, which keeps the zeros that branches of the tree leave in the m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,10 +78,10 @@ class Factors:
         return x
 
 
-def factorize(algebra: Any, M: np.ndarray, speeds: tuple) -> Factors:
+def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str]) -> Factors:
     """L^T D L of a symmetric positive definite matrix, from the last row to the first.
 
-    A pivot that is not positive when the code runs is reported with its speed.
+    reasons   what it means if the pivot of a row is not positive when the code runs
     """
     n = len(M)
     A = np.array(M, dtype=object)
@@ -88,7 +89,7 @@ def factorize(algebra: Any, M: np.ndarray, speeds: tuple) -> Factors:
     inverse: list[Any] = [0] * n
     for k in reversed(range(n)):
         algebra.name(f"D{k + 1}", A[k, k])
-        algebra.positive(A[k, k], f"the mass matrix is not positive definite at {speeds[k]}")
+        algebra.positive(A[k, k], reasons[k])
         inverse[k] = algebra.name(f"iD{k + 1}", 1 / A[k, k])
         for i in range(k):
             L[k, i] = algebra.name(f"L{k + 1}_{i + 1}", A[k, i] * inverse[k])

@@ -7,7 +7,8 @@ Source: lecture, chapters 3.2 and 3.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.embedding import EmbeddedEquations
 from symdyn.formulation.equations import Symbols
 from symdyn.formulation.motion import Motion
+from symdyn.formulation.rank import first_dependent
 from symdyn.model.faults import Faults
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_coordinate, time
 from symdyn.spatial.vectors import congruence, inner, vector
@@ -40,12 +42,16 @@ def embedding(coordinates: Sequence[Any], position: Any, mass: Any, force: Any =
     equations of a System. Raises ModelError with every fault: shapes, coordinates that nothing depends on, symbols.
     """
     faults = Faults()
-    q = [as_coordinate(c) for c in coordinates]
+    given = list(coordinates) if hasattr(coordinates, "__iter__") else [coordinates]
+    q = [as_coordinate(c) for c in given]
     for c in q:
         if not isinstance(c, Coordinate):
             faults.append(f"coordinate {c} is no symbol; make it with sd.coordinates")
-    r = _column(faults, position, "position")
-    F = _column(faults, force if force is not None else [0] * len(r), "force")
+    faults += [f"coordinate {c} is given {count} times" for c, count in Counter(q).items() if count > 1]
+    # A plain symbol that is given as a coordinate is one in the expressions, too.
+    same = {old: new for old, new in zip(given, q, strict=True) if isinstance(new, Coordinate) and old is not new}
+    r = [e.xreplace(same) for e in _column(faults, position, "position")]
+    F = [e.xreplace(same) for e in _column(faults, force if force is not None else [0] * len(r), "force")]
     M = _mass(faults, mass, len(r))
     if len(F) != len(r):
         faults.append(f"force has {len(F)} entries, position {len(r)}; give one force for each coordinate of position")
@@ -54,10 +60,15 @@ def embedding(coordinates: Sequence[Any], position: Any, mass: Any, force: Any =
         unused = [c for c in q if not any(e.has(c) for e in r)]
         if unused:
             faults.append(f"position does not depend on {', '.join(map(str, unused))}; the mass matrix would be singular")
+    numbers = _numbers(faults, defaults or {}, parameters)
     if faults:
         raise ModelError(faults, name)
-    symbols = Symbols(tuple(q), tuple(c.dot for c in q), (), tuple(inputs), tuple(parameters), dict(defaults or {}))
+    symbols = Symbols(tuple(q), tuple(c.dot for c in q), (), tuple(inputs), tuple(parameters), numbers)
     derivation = _PositionMap(q, r, M, F, symbols)
+    dependent = first_dependent(derivation.algebra.recorder, derivation.recall("M_tilde"))
+    if dependent is not None:
+        raise ModelError([f"the mass matrix is singular at every state: {q[dependent]} moves nothing that the coordinates after "
+                          "it do not move already; leave one out, or let position depend on them separately"], name)
     return EmbeddedEquations(name, "embedding", True, symbols, derivation.algebra.recorder, derivation.algebra.leaves,
                              derivation.quantities())
 
@@ -152,7 +163,25 @@ def _mass(faults: Faults, mass: Any, n: int) -> sp.Matrix:
         return sp.eye(n)
     if M != M.T:
         faults.append("mass is not symmetric; pass a symmetric matrix")
+    for k in range(n):
+        if M[k, k].is_number and M[k, k] < 0:
+            faults.append(f"mass[{k + 1}, {k + 1}] is {M[k, k]}; pass zero or a positive number")
     return M
+
+
+def _numbers(faults: Faults, defaults: Mapping[Any, Any], parameters: list[sp.Symbol]) -> dict[sp.Symbol, float]:
+    """Numbers for parameters, given by symbol or name."""
+    names = {p.name: p for p in parameters}
+    numbers = {}
+    for key, value in defaults.items():
+        name = str(getattr(key, "name", key))
+        if name not in names:
+            faults.append(f"defaults has a number for {name!r}, which is no parameter; there are {', '.join(names) or 'none'}")
+        elif not isinstance(value, (int, float, sp.Number)):
+            faults.append(f"defaults: the value of {name} is {value!r}; pass a number")
+        else:
+            numbers[names[name]] = float(value)
+    return numbers
 
 
 def _symbols(faults: Faults, q: list[Any], r: list[sp.Expr], M: sp.Matrix, F: list[sp.Expr]) -> tuple[list, list]:
@@ -163,7 +192,9 @@ def _symbols(faults: Faults, q: list[Any], r: list[sp.Expr], M: sp.Matrix, F: li
     for what, expressions, rates_allowed in (("mass", list(M), False), ("position", r, False), ("force", F, True)):
         for e in expressions:
             for s in sorted(e.free_symbols, key=lambda a: a.name):
-                if isinstance(s, Acceleration) or (isinstance(s, Rate) and not rates_allowed):
+                if s.name == "t" and s != time:
+                    faults.append(f"{what} uses a symbol t with assumptions, which is not the time; use symdyn.t")
+                elif isinstance(s, Acceleration) or (isinstance(s, Rate) and not rates_allowed):
                     faults.append(f"{what} uses {s}; it may use coordinates and t" + (", and speeds" if rates_allowed else ""))
                 elif s in moving:
                     if what == "mass":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -22,14 +22,16 @@ class Motion:
     """What every formulation that ends in a mass matrix shares.
 
     A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`.
+    remarks   speed -> what else to say where the mass matrix is singular along it
     """
 
     def __init__(self, algebra: TapeAlgebra, coordinates: Sequence[sp.Symbol], speeds: Sequence[sp.Symbol],
                  rates: Sequence[Any], states: Sequence[tuple[sp.Symbol, sp.Expr]], inputs: Sequence[sp.Symbol],
-                 parameters: Sequence[sp.Symbol]) -> None:
+                 parameters: Sequence[sp.Symbol], remarks: Mapping[sp.Symbol, str] | None = None) -> None:
         self.algebra = algebra
         self.coordinates, self.speeds, self.inputs, self.parameters = coordinates, speeds, inputs, parameters
         self.states = states
+        self.remarks = remarks or {}
         self.rates = list(rates)
         self.speed_rates = vector(*[algebra.recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds])
         self._memory: dict[str, Any] = {}
@@ -64,7 +66,8 @@ class Motion:
         """The mass matrix, factorized."""
         M = self.recall("M_tilde")
         with self.algebra.section("factors of the mass matrix, L^T D L"):
-            return factorize(self.algebra, M, tuple(self.speeds))
+            reasons = [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
+            return factorize(self.algebra, M, reasons)
 
     def accelerations(self) -> np.ndarray:
         """u_dot, (n_u,)."""

@@ -13,7 +13,10 @@ from symdyn.formulation.motion import Motion
 from symdyn.formulation.newton_euler import inverse_dynamics, inward
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.model.bodies import Point
-from symdyn.spatial.vectors import cross, inner, zeros
+from symdyn.model.orientation import EulerAngles
+from symdyn.model.record import Model, joint_speeds
+from symdyn.spatial.vectors import cross, inner, vector, zeros
+from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import is_zero
 
 
@@ -23,7 +26,7 @@ class TreeQuantities(Motion):
     def __init__(self, tree: Tree) -> None:
         model = tree.model
         super().__init__(tree.algebra, model.coordinates, model.speeds, tree.rates,
-                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters)
+                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters, _gimbal_remarks(model))
         self.tree = tree
         self.model = model
         self.loads = Loads(tree)
@@ -32,7 +35,7 @@ class TreeQuantities(Motion):
     def quantities(self) -> dict[str, Any]:
         """name -> function that records it."""
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
-               "energy": self.energy, "power": self.power,
+               "energy": self.energy, "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         return {**super().quantities(), **own}
 
@@ -86,6 +89,10 @@ class TreeQuantities(Motion):
                 total = total + inner(tau, self.tree.w_t)
             return total
 
+    def power_x(self) -> np.ndarray:
+        """Derivative of the power by the state, (n_x,)."""
+        return vector(*reverse(self.algebra.recorder, self.power(), self.x()))
+
     def output(self, name: str, value: Any) -> Any:
         """A named output of the user."""
         with self.algebra.section(f"output {name}"):
@@ -125,3 +132,15 @@ class TreeQuantities(Motion):
     def project(self, tau: np.ndarray) -> np.ndarray:
         """D^T tau: from the joints' speeds to the generalized ones."""
         return tau if self.tree.plain else self.tree.D.T @ tau if len(tau) else zeros(len(self.speeds))
+
+
+def _gimbal_remarks(model: Model) -> dict[Any, str]:
+    """For the speeds of Euler angles: that the sequence may be at gimbal lock, and what to do."""
+    remarks: dict[Any, str] = {}
+    for joint in model.joints:
+        orientation = getattr(joint, "orientation", None)
+        if isinstance(orientation, EulerAngles):
+            remark = (f": the {orientation.sequence} angles of joint {joint.name} are at gimbal lock or very near it "
+                      "(take another sequence, or EulerParameters)")
+            remarks.update(dict.fromkeys(joint_speeds(joint)[-3:], remark))
+    return remarks

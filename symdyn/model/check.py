@@ -21,6 +21,7 @@ from symdyn.model.faults import Faults
 from symdyn.model.joints import Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, take_over, time
 
@@ -78,7 +79,7 @@ class _Checker:
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
-            defaults, initial, float(s.duration), self._units())
+            defaults, {**self._upright(), **initial}, float(s.duration), self._units())
 
     # -- names
 
@@ -229,9 +230,11 @@ class _Checker:
             elif isinstance(joint, Prismatic) and abs(numeric(joint.axis[2])) > 1e-9:
                 self.faults.append(f"{where}: axis {list(joint.axis)} is not in the x-y plane, but the system is planar; "
                                    "pass an axis without a z component, or make the system spatial: planar=False")
-        if self.system.ground_motion is not None and any(e != 0 for e in self.system.ground_motion.coordinates[4:]):
+        moving: Any = self.system.ground_motion
+        if moving is not None and any(angle != 0 and letter != "Z" for angle, letter in zip(
+                moving.coordinates[3:], getattr(moving.orientation, "sequence", ""), strict=False)):
             self.faults.append("move_ground: angles turn the ground out of the x-y plane, but the system is planar; "
-                               "pass [angle about z, 0, 0], or make the system spatial: planar=False")
+                               "give only angles about Z, or make the system spatial: planar=False")
 
     # -- coordinates and speeds
 
@@ -417,6 +420,10 @@ class _Checker:
             elif number is not None:
                 result[symbols[name]] = number
         return result
+
+    def _upright(self) -> dict[sp.Symbol, float]:
+        """Euler parameters start at no rotation, unless they are given."""
+        return {j.coordinates[-4]: 1.0 for j in self.joints if isinstance(getattr(j, "orientation", None), EulerParameters)}
 
     def _unit_names(self) -> dict[sp.Symbol, str]:
         """The units that were given, by symbol."""

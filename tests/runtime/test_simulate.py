@@ -137,6 +137,7 @@ def test_longest_and_first_step(oscillator: Any) -> None:
     assert oscillator.simulate((0, 1), max_step=float("inf")).success
 
 
+@pytest.mark.filterwarnings("ignore:At least one element of .rtol. is too small")
 def test_tolerance_for_each_state(oscillator: Any) -> None:
     """The filter state may be coarse where nothing depends on it."""
     fine = oscillator.simulate((0, 5), rtol=1e-11)
