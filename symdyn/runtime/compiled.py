@@ -11,6 +11,7 @@ import numpy as np
 
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.stops import describe_stop, nearly_singular, with_last
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -148,12 +149,12 @@ def run_compiled(module: Module, request: Request, bar: Any = None, field: str =
     report = run.report()
     success = status == _DONE and not interrupted and not stopped
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
+    if not success:
+        t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
     return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds)
 
 
 def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
-    from symdyn.runtime.simulate import describe_stop, nearly_singular
-
     n, metadata = run.n_x, run.unit.metadata
     t, x = report[0], report[8:8 + n]
     if interrupted:

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import time as clock
 import warnings
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EvaluationError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.errors import ArgumentError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.arguments import take
 from symdyn.runtime.compiled import run_compiled
-from symdyn.runtime.inputs import Inputs, take_inputs
-from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.inputs import take_inputs
+from symdyn.runtime.outcome import Request
+from symdyn.runtime.scipy_run import run_scipy
 from symdyn.runtime.solution import Solution
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 N_POINTS = 1001
-_SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+# What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
+SMALLEST_RTOL = 1e-15
 
 
 def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
@@ -34,7 +35,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
     params      as everywhere in Module
     inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
-    rtol, atol  relative and absolute tolerance of a step; atol a number or (n_x,), default rtol
+    rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 on; atol a number or (n_x,), default rtol
     method      "dop853" compiled (default with the C backend), or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or
                 an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
@@ -70,7 +71,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                                     f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
             outcome = run_compiled(module, request, bar, field)
         else:
-            outcome = _run_scipy(module, request, method, bar, field)
+            outcome = run_scipy(module, request, method, bar, field)
     finally:
         if bar is not None:
             bar.close()
@@ -120,7 +121,10 @@ def _tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray
                             f"atol = {atol!r}") from None
     if not (0 <= relative < 1 and (vector >= 0).all() and np.isfinite(vector).all() and (relative > 0 or (vector > 0).all())):
         raise ArgumentError(f"{module.name}: tolerances must be positive (rtol below 1), found rtol = {rtol}, atol = {atol}")
-    return relative, vector
+    if 0 < relative < SMALLEST_RTOL:
+        raise ArgumentError(f"{module.name}: rtol = {rtol} is finer than double precision can resolve; the smallest is "
+                            f"{SMALLEST_RTOL}")
+    return max(relative, SMALLEST_RTOL), vector
 
 
 def _positive(module: Module, value: Any, what: str) -> float:
@@ -136,120 +140,3 @@ def _bar(module: Module, span: tuple[float, float]) -> Any:
         raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
     return tqdm(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s",
                 bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
-
-
-def _run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
-    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
-    from scipy import integrate
-
-    if isinstance(method, str):
-        if method not in _SCIPY:
-            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
-                                f"{', '.join(_SCIPY)}, or pass an OdeSolver class")
-        solver_class = getattr(integrate, method)
-    elif isinstance(method, type) and issubclass(method, integrate.OdeSolver):
-        solver_class = method
-    else:
-        raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
-    bound = module.bind(request.p)
-    evaluator = module.unit(field_name).evaluator("rhs")
-    evaluator.set_params(request.p)
-    n_state = request.n_state
-    free: Inputs = request.inputs
-    n_in = len(free.constant)
-    options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
-    if request.max_step:
-        options["max_step"] = request.max_step
-    if request.first_step:
-        options["first_step"] = request.first_step
-    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and len(request.x0) == n_state:
-        options["jac"] = lambda s, x: bound.jacobian_x(s, x, given(s, x)) if n_in else bound.jacobian_x(s, x)
-    trouble: list[str] = []  # why the step under way could not be evaluated
-    raised: list[Exception] = []
-
-    def given(s: float, x: np.ndarray) -> np.ndarray:
-        try:
-            return free.at(s, x)
-        except Exception as error:
-            raised.append(error)
-            raise
-
-    def field(s: float, x: np.ndarray) -> np.ndarray:
-        inputs = given(s, x[:n_state]) if n_in else None
-        try:
-            return evaluator.one(s, x, inputs)
-        except EvaluationError as error:
-            if np.isfinite(x).all():
-                trouble.append(str(error).removeprefix(f"{module.name}: "))
-            return np.full(len(x), np.nan)
-
-    t0, t_end = request.span
-    ts, xs = [t0], [request.x0]
-    pending = list(request.times[1:]) if request.times is not None else []
-    accepted, message, interrupted = 0, "", False
-    here, state = t0, request.x0
-    solver: Any = None
-    try:
-        with np.errstate(all="ignore"):
-            if not np.isfinite(field(t0, request.x0)).all():  # SciPy would look for a first step for ever
-                raise EvaluationError(trouble[-1])
-            solver = solver_class(field, t0, request.x0, t_end, **options)
-            while solver.status == "running":
-                before = solver.t
-                note = solver.step()
-                if solver.status == "failed" or not np.isfinite(solver.y).all():
-                    message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
-                        module, here, state[:n_state], request.p) if note else "the state is not finite"
-                    break
-                accepted += 1
-                here, state = float(solver.t), solver.y.copy()
-                trouble.clear()
-                if request.times is None:
-                    ts.append(solver.t)
-                    xs.append(state)
-                else:
-                    dense = None
-                    while pending and (pending[0] - solver.t) * solver.direction <= 0:
-                        dense = dense or solver.dense_output()
-                        xs.append(state if pending[0] == solver.t else dense(pending[0]))
-                        ts.append(pending.pop(0))
-                if bar is not None:
-                    bar.update(abs(solver.t - before))
-                if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
-                    message = f"stopped after {accepted} steps, as asked"
-                    break
-    except KeyboardInterrupt:
-        interrupted, message = True, "interrupted"
-    except (ValueError, ArithmeticError) as error:
-        if error in raised:
-            raise
-        message = trouble[-1] if trouble else str(error)
-    done = not message
-    n = min(len(ts), len(xs))  # an interrupt may come between the two
-    if not done:
-        message = describe_stop(module.unit(field_name).metadata, here, state, message)
-    return Outcome(np.array(ts[:n]), np.array(xs[:n]), done, message or "reached the end", interrupted, accepted, 0,
-                   int(solver.nfev) if solver is not None else 0)
-
-
-def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
-    """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
-    if "mass_matrix" not in module.functions or not module.metadata["u"]:
-        return ""
-    try:
-        M = module.evaluate("mass_matrix", t, x, p)
-    except EvaluationError:
-        return ""
-    scale = np.sqrt(np.maximum(np.diagonal(M), 1e-300))
-    values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
-    if values[0] > 1e-8 * values[-1]:
-        return ""
-    share = np.abs(vectors[:, 0])
-    names = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
-    return f"; the mass matrix is nearly singular there, along {', '.join(names)}"
-
-
-def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:
-    """When, where and why a run stopped."""
-    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=True))
-    return f"{metadata['name']}: stopped at t = {t:.9g}: {reason}; the state there: {state}"

@@ -1,0 +1,126 @@
+"""Integration by SciPy's solvers, step by step, so that nothing is lost when a step fails."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.stops import describe_stop, nearly_singular, with_last
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+_SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+
+
+def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
+    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
+    from scipy import integrate
+
+    if isinstance(method, str):
+        if method not in _SCIPY:
+            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
+                                f"{', '.join(_SCIPY)}, or pass an OdeSolver class")
+        solver_class = getattr(integrate, method)
+    elif isinstance(method, type) and issubclass(method, integrate.OdeSolver):
+        solver_class = method
+    else:
+        raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
+    bound = module.bind(request.p)
+    evaluator = module.unit(field_name).evaluator("rhs")
+    evaluator.set_params(request.p)
+    n_state = request.n_state
+    free: Inputs = request.inputs
+    n_in = len(free.constant)
+    options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
+    if request.max_step:
+        options["max_step"] = request.max_step
+    if request.first_step:
+        options["first_step"] = request.first_step
+    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
+        options["jac"] = lambda s, x: jacobian(s, x)
+    trouble: list[str] = []  # why the step under way could not be evaluated
+    raised: list[Exception] = []
+
+    def given(s: float, x: np.ndarray) -> np.ndarray:
+        try:
+            return free.at(s, x)
+        except Exception as error:
+            raised.append(error)
+            raise
+
+    def jacobian(s: float, x: np.ndarray) -> np.ndarray:
+        """Exact; the work, if it is integrated too, is one more row, and nothing depends on it."""
+        state = x[:n_state]
+        inputs = given(s, state) if n_in else ()
+        J = bound.jacobian_x(s, state, inputs)
+        if len(x) == n_state:
+            return J
+        bordered = np.zeros((len(x), len(x)))
+        bordered[:n_state, :n_state] = J
+        bordered[n_state, :n_state] = module.evaluate("power_x", s, state, request.p, inputs)
+        return bordered
+
+    def field(s: float, x: np.ndarray) -> np.ndarray:
+        inputs = given(s, x[:n_state]) if n_in else None
+        try:
+            return evaluator.one(s, x, inputs)
+        except EvaluationError as error:
+            if np.isfinite(x).all():
+                trouble.append(str(error).removeprefix(f"{module.name}: "))
+            return np.full(len(x), np.nan)
+
+    t0, t_end = request.span
+    ts, xs = [t0], [request.x0]
+    pending = list(request.times[1:]) if request.times is not None else []
+    accepted, message, interrupted = 0, "", False
+    here, state = t0, request.x0
+    solver: Any = None
+    try:
+        with np.errstate(all="ignore"):
+            if not np.isfinite(field(t0, request.x0)).all():  # SciPy would look for a first step for ever
+                raise EvaluationError(trouble[-1])
+            solver = solver_class(field, t0, request.x0, t_end, **options)
+            while solver.status == "running":
+                before = solver.t
+                note = solver.step()
+                if solver.status == "failed" or not np.isfinite(solver.y).all():
+                    message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
+                        module, here, state[:n_state], request.p) if note else "the state is not finite"
+                    break
+                accepted += 1
+                here, state = float(solver.t), solver.y.copy()
+                trouble.clear()
+                if request.times is None:
+                    ts.append(solver.t)
+                    xs.append(state)
+                else:
+                    dense = None
+                    while pending and (pending[0] - solver.t) * solver.direction <= 0:
+                        dense = dense or solver.dense_output()
+                        xs.append(state if pending[0] == solver.t else dense(pending[0]))
+                        ts.append(pending.pop(0))
+                if bar is not None:
+                    bar.update(abs(solver.t - before))
+                if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
+                    message = f"stopped after {accepted} steps, as asked"
+                    break
+    except KeyboardInterrupt:
+        interrupted, message = True, "interrupted"
+    except (ValueError, ArithmeticError) as error:
+        if error in raised:
+            raise
+        message = trouble[-1] if trouble else str(error)
+    done = not message
+    n = min(len(ts), len(xs))  # an interrupt may come between the two
+    if not done:
+        message = describe_stop(module.unit(field_name).metadata, here, state, message)
+    t, x = np.array(ts[:n]), np.array(xs[:n])
+    if not done:
+        t, x = with_last(t, x, here, state)
+    return Outcome(t, x, done, message or "reached the end", interrupted, accepted, 0,
+                   int(solver.nfev) if solver is not None else 0)

@@ -1,0 +1,43 @@
+"""Why a run stopped early, in a sentence: when, where, and what is to blame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+
+def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
+    """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
+    if "mass_matrix" not in module.functions or not module.metadata["u"]:
+        return ""
+    try:
+        M = module.evaluate("mass_matrix", t, x, p)
+    except EvaluationError:
+        return ""
+    scale = np.sqrt(np.maximum(np.diagonal(M), 1e-300))
+    values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+    if values[0] > 1e-8 * values[-1]:
+        return ""
+    share = np.abs(vectors[:, 0])
+    names = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
+    return f"; the mass matrix is nearly singular there, along {', '.join(names)}"
+
+
+def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:
+    """When, where and why a run stopped."""
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=True))
+    return f"{metadata['name']}: stopped at t = {t:.9g}: {reason}; the state there: {state}"
+
+
+def with_last(t: np.ndarray, x: np.ndarray, t_here: float, x_here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rows stored so far, and the state where the run stopped, if it is further."""
+    if not np.isfinite(x_here).all() or (len(t) and t[-1] == t_here):
+        return t, x
+    return np.append(t, t_here), np.vstack([x, x_here]) if len(x) else x_here[None, :].copy()
