@@ -130,6 +130,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
     metadata = emit(equations, "numpy", ("rhs",), standalone=False, specialize=specialize).metadata
     metadata = {**metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
+                "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
     return Module(metadata, provide, backend, fallback, write, report)

@@ -33,4 +33,7 @@ class EulerAngles:
 
 @dataclass(frozen=True)
 class EulerParameters:
-    """Four Euler parameters (theta0 first) as coordinates, the angular velocity in body axes as speeds."""
+    """Four Euler parameters (theta0 first) as coordinates; speeds: angular velocity in the axes of the child's joint frame.
+
+    They start at (1, 0, 0, 0) unless given otherwise, and must be a unit vector.
+    """

@@ -90,7 +90,15 @@ def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
     for what, values in (("q", q), ("u", u), ("z", z)):
         names = module.metadata[what]
         parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
-    return np.concatenate(parts)
+    start = np.concatenate(parts)
+    for group in module.metadata["unit_groups"]:
+        places = [module.metadata["x"].index(name) for name in group]
+        norm = float(np.linalg.norm(start[places]))
+        if abs(norm - 1) > 1e-6:
+            raise ArgumentError(f"{module.name}: initial q: {', '.join(group)} have the norm {norm:.6g}, not 1; Euler parameters "
+                                "are a unit vector: divide them by their norm")
+        start[places] /= norm
+    return start
 
 
 def _times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:

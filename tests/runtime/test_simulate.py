@@ -321,8 +321,8 @@ def test_nan_from_an_input(oscillator: Any, method: str | None) -> None:
     assert 0.3 < solution.t[-1] <= 0.5
     for words in ("driven_oscillator: stopped at t = 0.", "not finite", "the state there: q = 0.9", "q_dot = -0.2", "z = 0.3"):
         assert words in solution.message
-    whole = oscillator.simulate((0, 1), inputs=[0.0, 1.0], rtol=1e-10)
-    np.testing.assert_allclose(solution.x, whole.x[:len(solution.x)], atol=1e-5)
+    whole = oscillator.simulate(solution.t, inputs=[0.0, 1.0], rtol=1e-10)
+    np.testing.assert_allclose(solution.x, whole.x, atol=1e-5)
     assert solution.energies.shape == (len(solution.t), 2)
 
 
@@ -539,3 +539,49 @@ def test_arguments_that_do_not_fit(oscillator: Any, options: dict[str, Any], mes
         with pytest.raises(ArgumentError, match=message) as caught:
             oscillator.simulate(**{"t": (0.0, 1.0), **options})
     assert str(caught.value).startswith("driven_oscillator: ")
+
+
+# -- what was found once and must not come back
+
+
+@pytest.fixture(scope="module")
+def rubbed() -> Any:
+    """A pendulum with dry friction, whose work the implicit methods once got wrong."""
+    q = sd.coordinates("q")
+    system = sd.System("rubbed", gravity=[0, -9.81])
+    bob = system.add_body("bob", mass=1, com=[0, -1])
+    system.add_joint(sd.Revolute("pin", system.ground, bob, q))
+    system.add_joint_force("pin", -0.5 * sp.sign(q.dot))
+    return system.embedding().compile(backend="numpy")
+
+
+@pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
+def test_work_with_implicit_methods(rubbed: Any, method: str) -> None:
+    plain = rubbed.simulate((0, 5), q=[1.0], method=method)
+    worked = rubbed.simulate((0, 5), q=[1.0], method=method, work=True)
+    np.testing.assert_allclose(worked.x, plain.x, atol=2e-5)
+    assert worked.energy_error() < 1e-5 and worked.work[-1] < -1
+
+
+def test_tolerance_below_double_precision(compiled: Any) -> None:
+    with pytest.raises(ArgumentError, match="rtol = 1e-30 is finer than double precision can resolve; the smallest is 1e-15"):
+        compiled("double_pendulum", "numpy").simulate((0, 1), rtol=1e-30)
+
+
+def test_last_state_of_a_stopped_run_is_kept(oscillator: Any) -> None:
+    solution = stopped(lambda: oscillator.simulate(np.array([0.0, 5.0, 10.0]), max_steps=3))
+    assert len(solution.t) == 2 and 0 < solution.t[1] < 5
+
+
+def test_euler_parameters_start_upright(compiled: Any) -> None:
+    p = sd.coordinates("p0:4")
+    system = sd.System("top", gravity=[0, 0, -9.81])
+    body = system.add_body("body", mass=2, inertia=[1, 2, 2.5], com=[0.1, 0.2, 0.3])
+    system.add_joint(sd.Spherical("joint", system.ground, body, p, sd.EulerParameters()))
+    module = system.embedding().compile()
+    solution = module.simulate((0, 2), rtol=1e-10)
+    assert solution.q[0].tolist() == [1, 0, 0, 0]
+    assert solution.energy_error() < 1e-8
+    np.testing.assert_allclose((solution.q**2).sum(axis=1), 1, atol=1e-8)
+    with pytest.raises(ArgumentError, match=r"initial q: p0, p1, p2, p3 have the norm 1.41421, not 1"):
+        module.simulate((0, 2), q=[1, 1, 0, 0])

@@ -19,7 +19,7 @@ class Spherical(Joint):
     """coordinates = the three Euler angles (rad) in the order of the sequence, or the four Euler parameters.
 
     orientation   EulerAngles(sequence), whose speeds are the angles' derivatives, or EulerParameters(), whose
-                  speeds are the angular velocity in child axes, rad/s
+                  speeds are the angular velocity, rad/s, in the axes of the child's joint frame
     See Joint for the frames.
     """
 
