@@ -65,8 +65,13 @@ class Module:
         if params is not seen or _mark(params) != mark:
             evaluator, seen, mark = self._ready("rhs", params)
         try:
-            if self._n_in == 0 == len(inputs) and len(x) == self._n_x != 1:
-                return evaluator.one(t, x)
+            if len(x) == self._n_x != 1 and len(inputs) == self._n_in:
+                if self._n_in == 0:
+                    return evaluator.one(t, x)
+                if self._n_in > 1:
+                    return evaluator.one(t, x, inputs)
+                if isinstance(inputs, (list, tuple)) or inputs.ndim == 1:  # one number, not one row
+                    return evaluator.one(t, x, inputs)
         except (TypeError, ValueError):  # rows of states or of times, or no numbers at all
             return self.evaluate("rhs", t, x, params, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
@@ -77,7 +82,12 @@ class Module:
         state = self._rows(x, "x", "x")
         free = self._rows(inputs, "inputs", "inputs")
         acceleration = self._rows(ud, "ud", "u")
-        times = np.asarray(t, dtype=float)
+        try:
+            times = np.asarray(t, dtype=float)
+        except (TypeError, ValueError):
+            times = np.array(np.nan)
+        if not np.isfinite(times).all():
+            raise ArgumentError(f"{self.name}: t must be a finite time, or one for each state, found {t!r}")
         if max(state.ndim, free.ndim, acceleration.ndim, times.ndim + 1) == 1:
             return evaluator.one(float(times), state, free, acceleration)
         rows = [np.atleast_1d(times), *[np.atleast_2d(a) for a in (state, free, acceleration)]]
@@ -231,7 +241,7 @@ class Module:
             names = self.metadata["u" if what == "ud" else group]
             return take(values, names, what, dict.fromkeys(names, 0.0), self.name)
         try:
-            array = np.asarray(values, dtype=float)
+            array = np.asarray(values if values is not None else "", dtype=float)
         except (TypeError, ValueError):
             raise ArgumentError(f"{self.name}: {what} must be numbers, found {values!r}") from None
         if array.ndim == 0 and wanted == 1:

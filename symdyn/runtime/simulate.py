@@ -91,7 +91,7 @@ def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
         names = module.metadata[what]
         parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
     start = np.concatenate(parts)
-    for group in module.metadata["unit_groups"]:
+    for group in module.metadata.get("unit_groups", ()):
         places = [module.metadata["x"].index(name) for name in group]
         norm = float(np.linalg.norm(start[places]))
         if abs(norm - 1) > 1e-6:

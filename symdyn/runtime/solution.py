@@ -155,11 +155,13 @@ class Solution:
         return animate(self, path, fps, speed)
 
     def save(self, path: Any) -> Path:
-        """Save to .npz (arrays, names, parameters, message) or .csv (t, x and outputs in columns).
+        """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs and outputs in columns).
 
         Raises ArgumentError for another ending.
         """
         path = Path(path)
+        if path.suffix in (".npz", ".csv"):
+            path.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix == ".npz":
             about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
                      "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
@@ -167,10 +169,13 @@ class Solution:
             arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
             if "energy" in self.module.functions:
                 arrays["energy"] = self.energy
+            if self.module.metadata["inputs"]:
+                arrays["inputs"] = self.inputs
             np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
                      about=np.array(json.dumps(about)), **arrays)
         elif path.suffix == ".csv":
-            names, columns = ["t", *self.module.metadata["x"]], [self.t, *self.x.T]
+            names = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
+            columns = [self.t, *self.x.T, *self.inputs.T]
             for name, rows in self.outputs.items():
                 flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
                 names += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]

@@ -61,7 +61,7 @@ def test_round_trip_npz(solution: Any, tmp_path: Path) -> None:
     path = solution.save(tmp_path / "run.npz")
     assert path == tmp_path / "run.npz"
     with np.load(path, allow_pickle=False) as kept:
-        for name in ("t", "x", "q", "u", "z", "params", "energy"):
+        for name in ("t", "x", "q", "u", "z", "params", "inputs", "energy"):
             np.testing.assert_array_equal(kept[name], getattr(solution, name))
         for name, value in solution.outputs.items():
             np.testing.assert_array_equal(kept[f"output_{name}"], value)
@@ -74,12 +74,14 @@ def test_round_trip_csv(solution: Any, tmp_path: Path) -> None:
     solution.save(str(tmp_path / "run.csv"))
     with (tmp_path / "run.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["t", *solution.module.metadata["x"], "tip_1", "tip_2", "tip_3", "tip_velocity_1", "tip_velocity_2",
-                       "tip_velocity_3", "smooth", "pair_1", "pair_2"]
+    inputs = solution.module.metadata["inputs"]
+    assert rows[0] == ["t", *solution.module.metadata["x"], *inputs, "tip_1", "tip_2", "tip_3", "tip_velocity_1",
+                       "tip_velocity_2", "tip_velocity_3", "smooth", "pair_1", "pair_2"]
     numbers = np.array(rows[1:], dtype=float)  # the digits read back as the same doubles
     np.testing.assert_array_equal(numbers[:, 0], solution.t)
     np.testing.assert_array_equal(numbers[:, 1:9], solution.x)
-    np.testing.assert_array_equal(numbers[:, 9:12], solution.outputs["tip"])
+    np.testing.assert_array_equal(numbers[:, 9:9 + len(inputs)], solution.inputs)
+    np.testing.assert_array_equal(numbers[:, 9 + len(inputs):12 + len(inputs)], solution.outputs["tip"])
     np.testing.assert_array_equal(numbers[:, -2:], solution.outputs["pair"])
 
 

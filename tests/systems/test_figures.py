@@ -1,0 +1,31 @@
+"""Figures that are the same on every machine: operation counts, and errors of long runs."""
+
+import pytest
+
+import symdyn as sd
+
+
+@pytest.mark.parametrize(("name", "options", "most"), [
+    ("spatial_chain", {"n": 7}, 1364), ("spatial_chain", {"n": 4}, 506), ("n_link_pendulum", {"n": 5}, 294),
+    ("double_pendulum", {}, 47), ("puma560", {}, 759),
+])
+def test_operations_of_the_right_hand_side(name, options, most):
+    """A change that needs more operations than before must say so here."""
+    tape = sd.systems.get(name, **options).embedding().tape("rhs")
+    assert tape.operations <= most
+
+
+def test_spatial_chain_is_the_published_benchmark():
+    """Seven links: the parameters are those of the benchmark, each symbolic and run-time."""
+    system = sd.systems.get("spatial_chain", n=7)
+    values = {str(k): v for k, v in system.defaults.items()}
+    assert len(values) == 7 * 10 + 6 + 1
+    for i in range(7):
+        assert values[f"m{i + 1}"] == pytest.approx(1 + 0.1 * i)
+    assert sorted({round(v, 12) for v in values.values()}) == pytest.approx(
+        [0.001, 0.0015, 0.002, 0.01, 0.02, 0.03, 0.04, 0.05, 0.25, 0.5, 1, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 9.81])
+
+
+def test_puma_keeps_its_energy():
+    module = sd.systems.get("puma560").embedding().compile()
+    assert module.simulate((0, 10), rtol=1e-11).energy_error() <= 1e-10
