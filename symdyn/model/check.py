@@ -12,18 +12,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body, Point
 from symdyn.model.faults import Faults
-from symdyn.model.joints import Fixed, Joint, Planar, Prismatic, Revolute
-from symdyn.model.joints.base import numeric
-from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.joints import Joint
+from symdyn.model.loads import Force, JointForce
 from symdyn.model.orientation import EulerParameters
+from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, take_over, time
+from symdyn.model.uses import units_of, uses
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -55,12 +55,14 @@ class _Checker:
         s = self.system
         self._names()
         for body in s.bodies:
-            self._inertia(body)
+            faults, doubts = inertia_faults(body, s.planar)
+            self.faults += faults
+            self.doubts += doubts
         for joint in [*self.joints, *s.loops]:
             self.faults.extend(joint.faults)
         order = self._tree()
         if s.planar:
-            self._plane()
+            self.faults += plane_faults([*self.joints, *s.loops], s.ground_motion)
         self._coordinates()
         self._symbols()
         self._loads()
@@ -79,7 +81,7 @@ class _Checker:
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
-            defaults, {**self._upright(), **initial}, float(s.duration), self._units())
+            defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units})
 
     # -- names
 
@@ -112,30 +114,6 @@ class _Checker:
                                    "_ . , : + - * / ^ ' # % and brackets")
 
     # -- bodies
-
-    def _inertia(self, body: Body) -> None:
-        where = f"body {body.name!r}"
-        if body.mass.is_number and body.mass < 0:
-            self.faults.append(f"{where} has the mass {body.mass} kg; pass zero or a positive mass")
-        I = body.inertia
-        difference = I - I.T
-        if any(e != 0 and abs(numeric(e)) > 1e-12 * max(abs(numeric(a)) for a in I) for e in difference):
-            i, j = next((i, j) for i in range(3) for j in range(3) if difference[i, j] != 0)
-            self.faults.append(f"{where}: inertia is not symmetric: I[{i + 1}, {j + 1}] = {I[i, j]}, "
-                               f"I[{j + 1}, {i + 1}] = {I[j, i]}; pass a symmetric matrix")
-        elif all(e.is_number for e in I) and any(e != 0 for e in I):
-            values = np.linalg.eigvalsh(np.array(I.tolist(), dtype=float))
-            scale = np.abs(values).max()
-            if values[0] < -1e-12 * scale:
-                self.faults.append(f"{where}: inertia has the principal moments {_list(values)} kg m^2, one is negative; "
-                                   "it must be about the centre of mass")
-            elif self.system.planar:
-                return
-            elif values[0] + values[1] < values[2] * (1 - 1e-9):
-                self.doubts.append(f"{where}: principal moments {_list(values)} kg m^2 violate the triangle inequality; "
-                                   "no real body has them")
-            elif values[0] <= 1e-12 * scale:
-                self.doubts.append(f"{where}: inertia is semidefinite, principal moments {_list(values)} kg m^2")
 
     # -- tree
 
@@ -212,30 +190,6 @@ class _Checker:
                 self.faults.append(f"body {body.name!r} has no joint; join it to a parent (a body that moves freely: Free)")
         return sorted(order, key=lambda e: self.joints.index(e[0])) if _sorted_is_tree(order, self.joints) else order
 
-    def _plane(self) -> None:
-        """In a planar system every joint keeps its bodies in the x-y plane."""
-        for joint in [*self.joints, *self.system.loops]:
-            where = f"joint {joint.name!r}"
-            for what in ("parent_rotation", "child_rotation"):
-                R = getattr(joint, what)
-                if any(abs(numeric(R[k])) > 1e-9 for k in (2, 5)):
-                    self.faults.append(f"{where}: {what} turns out of the x-y plane, but the system is planar; "
-                                       "turn about z only, or make the system spatial: planar=False")
-            if not isinstance(joint, (Revolute, Prismatic, Planar, Fixed)):
-                self.faults.append(f"{where} is {joint.kind}, but the system is planar; use Revolute, Prismatic, Planar or "
-                                   "Fixed, or make the system spatial: planar=False")
-            elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in joint.axis[:2]):
-                self.faults.append(f"{where}: axis {list(joint.axis)} is not along z, but the system is planar; "
-                                   "pass [0, 0, 1] or [0, 0, -1], or make the system spatial: planar=False")
-            elif isinstance(joint, Prismatic) and abs(numeric(joint.axis[2])) > 1e-9:
-                self.faults.append(f"{where}: axis {list(joint.axis)} is not in the x-y plane, but the system is planar; "
-                                   "pass an axis without a z component, or make the system spatial: planar=False")
-        moving: Any = self.system.ground_motion
-        if moving is not None and any(angle != 0 and letter != "Z" for angle, letter in zip(
-                moving.coordinates[3:], getattr(moving.orientation, "sequence", ""), strict=False)):
-            self.faults.append("move_ground: angles turn the ground out of the x-y plane, but the system is planar; "
-                               "give only angles about Z, or make the system spatial: planar=False")
-
     # -- coordinates and speeds
 
     def _coordinates(self) -> None:
@@ -286,48 +240,13 @@ class _Checker:
 
     # -- symbols and where they are used
 
-    def _uses(self) -> Iterable[tuple[str, Iterable[sp.Expr], bool]]:
-        """(where, expressions, whether only parameters may occur), in the order of description."""
-        s = self.system
-        yield "gravity", s.gravity, True
-        for body in s.bodies:
-            yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
-        for joint in [*self.joints, *s.loops]:
-            constants = [*joint.parent_point, *joint.child_point, *joint.parent_rotation, *joint.child_rotation,
-                         *getattr(joint, "axis", []), *[e for axis in getattr(joint, "axes", []) for e in axis]]
-            yield f"joint {joint.name!r}", constants, True
-            yield (f"joint {joint.name!r}: coordinates",
-                   [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
-        if s.ground_motion is not None:
-            yield "move_ground", s.ground_motion.coordinates, False
-        for load in self.loads:
-            if isinstance(load, Force):
-                yield load.label, load.force, False
-                yield f"{load.label}: point", load.point, True
-            elif isinstance(load, Torque):
-                yield load.label, load.torque, False
-            elif isinstance(load, JointForce):
-                yield load.label, load.values, False
-            elif isinstance(load, SpringDamper):
-                yield load.label, [*load.point_a, *load.point_b, load.stiffness, load.damping, load.length], True
-        for output in s.outputs:
-            if isinstance(output.value, Point):
-                yield f"output {output.name!r}: point", output.value.at, True
-            else:
-                value = output.value
-                yield f"output {output.name!r}", value if isinstance(value, tuple) else [value], False
-        for state in s.states:
-            yield f"rate of state {state.symbol}", [state.rate], False
-        for k, constraint in enumerate(s.constraints):
-            yield f"constraint {k + 1}", [constraint], False
-
     def _symbols(self) -> None:
         s = self.system
         moving = {time, *self.coordinates, *[q.dot for q in self.coordinates], *self.speeds,
                   *[z.symbol for z in s.states]}
         parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
         inputs: dict[sp.Symbol, None] = {}
-        for where, expressions, constant in self._uses():
+        for where, expressions, constant in uses(s, self.joints, self.loads):
             for symbol in _symbols_in(expressions):
                 if isinstance(symbol, Acceleration):
                     self.faults.append(f"{where} uses the acceleration {symbol}; loads and rates may use coordinates, "
@@ -452,50 +371,6 @@ class _Checker:
             return None
         return number
 
-    def _units(self) -> dict[sp.Symbol, str]:
-        units: dict[sp.Symbol, str] = {time: "s"}
-
-        def note(expressions: Iterable[sp.Expr], unit: str) -> None:
-            for e in expressions:
-                core = -e if e.could_extract_minus_sign() else e
-                if isinstance(core, sp.Symbol):
-                    units.setdefault(core, unit)
-
-        s = self.system
-        for joint in self.joints:
-            for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True):
-                if isinstance(q, Coordinate):
-                    units[q] = unit
-            same = joint.n_speeds == len(joint.coordinates)
-            speed_units = [f"{u}/s" for u in joint.coordinate_units] if same else [
-                *["m/s"] * (joint.n_speeds - 3), *["rad/s"] * 3]
-            for speed, unit in zip(joint_speeds(joint), speed_units, strict=True):
-                if speed is not None:
-                    units[speed] = unit
-        note(s.gravity, "m/s^2")
-        for body in s.bodies:
-            note([body.mass], "kg")
-            note(body.com, "m")
-            note(body.inertia, "kg m^2")
-        for joint in self.joints:
-            note([*joint.parent_point, *joint.child_point], "m")
-        for load in self.loads:
-            if isinstance(load, Force):
-                note(load.force, "N")
-                note(load.point, "m")
-            elif isinstance(load, Torque):
-                note(load.torque, "N m")
-            elif isinstance(load, JointForce):
-                driven = next((j for j in self.joints if load.joint in (j, j.name)), None)
-                note(load.values, "N m" if isinstance(driven, Revolute) else "N")
-            elif isinstance(load, SpringDamper):
-                note([load.stiffness], "N/m")
-                note([load.damping], "N s/m")
-                note([load.length, *load.point_a, *load.point_b], "m")
-        for output in s.outputs:
-            if isinstance(output.value, Point):
-                note(output.value.at, "m")
-        return {**units, **self.units}
 
 
 def _symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
@@ -531,7 +406,3 @@ def _sorted_is_tree(order: list[tuple[Joint, int, int]], joints: list[Joint]) ->
             return False
         placed.add(child)
     return True
-
-
-def _list(values: np.ndarray) -> str:
-    return "[" + ", ".join(f"{v:.4g}" for v in values) + "]"

@@ -1,0 +1,100 @@
+"""Where expressions stand in a description, and which unit a symbol therefore has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.bodies import Point
+from symdyn.model.joints import Joint, Revolute
+from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.record import joint_speeds
+from symdyn.model.symbols import Coordinate, time
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+
+def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], bool]]:
+    """(where, expressions, whether only parameters may occur), in the order of description."""
+    s = system
+    yield "gravity", s.gravity, True
+    for body in s.bodies:
+        yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
+    for joint in [*joints, *s.loops]:
+        constants = [*joint.parent_point, *joint.child_point, *joint.parent_rotation, *joint.child_rotation,
+                     *getattr(joint, "axis", []), *[e for axis in getattr(joint, "axes", []) for e in axis]]
+        yield f"joint {joint.name!r}", constants, True
+        yield (f"joint {joint.name!r}: coordinates",
+               [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
+    if s.ground_motion is not None:
+        yield "move_ground", s.ground_motion.coordinates, False
+    for load in loads:
+        if isinstance(load, Force):
+            yield load.label, load.force, False
+            yield f"{load.label}: point", load.point, True
+        elif isinstance(load, Torque):
+            yield load.label, load.torque, False
+        elif isinstance(load, JointForce):
+            yield load.label, load.values, False
+        elif isinstance(load, SpringDamper):
+            yield load.label, [*load.point_a, *load.point_b, load.stiffness, load.damping, load.length], True
+    for output in s.outputs:
+        if isinstance(output.value, Point):
+            yield f"output {output.name!r}: point", output.value.at, True
+        else:
+            value = output.value
+            yield f"output {output.name!r}", value if isinstance(value, tuple) else [value], False
+    for state in s.states:
+        yield f"rate of state {state.symbol}", [state.rate], False
+    for k, constraint in enumerate(s.constraints):
+        yield f"constraint {k + 1}", [constraint], False
+
+
+def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> dict[sp.Symbol, str]:
+    """The unit of every symbol that stands alone where its unit is known."""
+    units: dict[sp.Symbol, str] = {time: "s"}
+
+    def note(expressions: Iterable[sp.Expr], unit: str) -> None:
+        for e in expressions:
+            core = -e if e.could_extract_minus_sign() else e
+            if isinstance(core, sp.Symbol):
+                units.setdefault(core, unit)
+
+    s = system
+    for joint in joints:
+        for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True):
+            if isinstance(q, Coordinate):
+                units[q] = unit
+        same = joint.n_speeds == len(joint.coordinates)
+        speed_units = [f"{u}/s" for u in joint.coordinate_units] if same else [
+            *["m/s"] * (joint.n_speeds - 3), *["rad/s"] * 3]
+        for speed, unit in zip(joint_speeds(joint), speed_units, strict=True):
+            if speed is not None:
+                units[speed] = unit
+    note(s.gravity, "m/s^2")
+    for body in s.bodies:
+        note([body.mass], "kg")
+        note(body.com, "m")
+        note(body.inertia, "kg m^2")
+    for joint in joints:
+        note([*joint.parent_point, *joint.child_point], "m")
+    for load in loads:
+        if isinstance(load, Force):
+            note(load.force, "N")
+            note(load.point, "m")
+        elif isinstance(load, Torque):
+            note(load.torque, "N m")
+        elif isinstance(load, JointForce):
+            driven = next((j for j in joints if load.joint in (j, j.name)), None)
+            note(load.values, "N m" if isinstance(driven, Revolute) else "N")
+        elif isinstance(load, SpringDamper):
+            note([load.stiffness], "N/m")
+            note([load.damping], "N s/m")
+            note([load.length, *load.point_a, *load.point_b], "m")
+    for output in s.outputs:
+        if isinstance(output.value, Point):
+            note(output.value.at, "m")
+    return units
