@@ -6,11 +6,13 @@ import random
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import pytest
 import sympy as sp
 
 from symdyn.errors import UnsupportedExpression
 from symdyn.tape import Node, Recorder, Tape
+from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import COORDINATE
 from symdyn.tape.sympy_bridge import expand, number, record_expression
 from tests import helpers
@@ -102,7 +104,7 @@ def test_common_parts_are_recorded_once() -> None:
 
 
 @pytest.mark.parametrize("expression", [sp.gamma(x), sp.I * x, sp.Symbol("unknown"), sp.Integral(sp.sin(x), x),
-                                        sp.Function("f")(x), sp.oo, sp.zeta(x), sp.Mod(x, 2), sp.besselj(0, x)])
+                                        sp.Function("f")(x), sp.oo, sp.zeta(x), sp.LambertW(x), sp.besselj(0, x)])
 def test_what_has_no_counterpart_is_named(expression: sp.Expr) -> None:
     with pytest.raises(UnsupportedExpression) as caught:
         _record(1 + expression if expression is not sp.oo else expression)
@@ -136,3 +138,16 @@ def test_expand_gives_the_shape_of_the_output() -> None:
 def test_numbers_print_as_people_write_them() -> None:
     assert number(Fraction(1, 3)) == sp.Rational(1, 3) and number(2) == 2 and number(True) is sp.true
     assert number(Fraction(0.1)) == sp.Float("0.1") and number(0.5) == half
+
+
+@pytest.mark.parametrize(("expression", "point"), [
+    (sp.acot(x), "0.7"), (sp.asec(x), "1.7"), (sp.acsc(x), "-1.7"), (sp.acoth(x), "2.5"), (sp.asech(x), "0.4"),
+    (sp.acsch(x), "-0.4"), (sp.Mod(x, 2), "-3.7"), (sp.sinc(x), "0.3"), (sp.sinc(x), "0"), (sp.frac(x), "-1.2"),
+    (sp.erfc(x), "0.3"),
+])
+def test_functions_written_by_others(expression: sp.Expr, point: str) -> None:
+    recorder = Recorder()
+    tape = Tape.of(recorder, y=record_expression(recorder, expression, {x: recorder.leaf("x", COORDINATE)}))
+    found = evaluate(tape, {"x": mpmath.mpf(point)}, 30)["y"].item()
+    wanted = expression.subs(x, sp.Float(point, 40)).evalf(30)
+    assert abs(sp.Float(str(found), 35) - wanted) < 1e-15
