@@ -63,6 +63,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
 
     Raises SymdynError for an unknown function, parameter, backend or a broken template.
     """
+    if standalone and equations.again is not None:
+        equations = equations.again()
     names = tuple(functions) if functions is not None else tuple(n for n in STANDARD if has_function(equations, n))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:

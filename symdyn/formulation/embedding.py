@@ -7,6 +7,7 @@ k_tilde and F_tilde by the recursion of velocities, accelerations and forces. J 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ def embed(model: Model) -> EmbeddedEquations:
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
                       model.parameters, model.defaults, model.initial, model.units, model.duration)
     return EmbeddedEquations(model.name, "embedding", model.planar, symbols, recorder, algebra.leaves,
-                             derivation.quantities(), tuple(_notes(model)), _unit_groups(model))
+                             derivation.quantities(), tuple(_notes(model)), _unit_groups(model), partial(embed, model))
 
 
 class EmbeddedTree(TreeQuantities):

@@ -41,6 +41,7 @@ class Equations:
     quantities   name -> function that records it; planar: 3 rows a body instead of 6
     notes        what the formulation left out, and why
     unit_groups  coordinates that form a unit vector (Euler parameters)
+    again        derives the same equations on a new tape, so that files do not depend on what was recorded before
     """
 
     name: str
@@ -52,6 +53,7 @@ class Equations:
     quantities: Mapping[str, Callable[[], Any]]
     notes: tuple[str, ...] = ()
     unit_groups: tuple[tuple[sp.Symbol, ...], ...] = ()
+    again: Callable[[], Equations] | None = None
     simplify_seconds: float = 10.0
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[str, Any] = field(default_factory=dict)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,8 @@ def embedding(coordinates: Sequence[Any], position: Any, mass: Any, force: Any =
         raise ModelError([f"the mass matrix is singular at every state: {q[dependent]} moves nothing that the coordinates after "
                           "it do not move already; leave one out, or let position depend on them separately"], name)
     return EmbeddedEquations(name, "embedding", True, symbols, derivation.algebra.recorder, derivation.algebra.leaves,
-                             derivation.quantities())
+                             derivation.quantities(),
+                             again=partial(embedding, coordinates, position, mass, force, name, defaults))
 
 
 class _PositionMap(Motion):

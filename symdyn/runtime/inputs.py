@@ -25,7 +25,12 @@ class Inputs:
     def at(self, t: float, x: np.ndarray) -> np.ndarray:
         """The inputs at a time and state."""
         if self.function is not None:
-            values = np.asarray(self.function(t, x), dtype=float).reshape(-1)
+            given = self.function(t, x)
+            try:
+                values = np.asarray(given, dtype=float).reshape(-1)
+            except (TypeError, ValueError):
+                raise ArgumentError(f"the input function returned {given!r} at t = {t:.6g}; needed are {len(self.constant)} "
+                                    "numbers") from None
             if len(values) != len(self.constant):
                 raise ArgumentError(f"the input function returned {len(values)} values at t = {t:.6g}, needed are "
                                     f"{len(self.constant)}")

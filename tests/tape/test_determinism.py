@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+import symdyn as sd
+from symdyn.pipeline import emit
+
 SCRIPT = """
 import symdyn as sd
 from symdyn.pipeline import emit
@@ -45,3 +48,13 @@ def test_both_backends_were_emitted(texts: list[str]) -> None:
     for system in ("double_pendulum", "spatial_chain_3", "kitchen_sink"):
         for ending in (".c", ".py"):
             assert any(line.startswith(f"===== {system}") and line.endswith(ending) for line in texts[0].splitlines())
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_files_do_not_depend_on_what_was_recorded_before(backend: str) -> None:
+    fresh = sd.systems.get("double_pendulum").embedding()
+    used = sd.systems.get("double_pendulum").embedding()
+    for name in ("J", "rhs", "energy", "jacobian_x"):
+        used.quantity(name)
+    assert dict(emit(used, backend, ["k_tilde"]).files) == dict(emit(fresh, backend, ["k_tilde"]).files)
+    assert dict(emit(used, backend).files) == dict(emit(fresh, backend).files)
