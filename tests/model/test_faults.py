@@ -127,7 +127,7 @@ SPATIAL: dict[str, Case] = {
                               "joints 'shoulder' and 'wrist' both drive the coordinate q1|"
                               "gear: 2*q1|mimic: sympy.UnevaluatedExpr(q1)"),
     "coordinate text": (lambda s: joined(s, sd.Revolute, "q3"), "joint 'wrist': coordinate 1 is the text 'q3'|never evaluated"),
-    "coordinate None": (lambda s: joined(s, sd.Revolute, None), "joint 'wrist': coordinate 1 is None"),
+    "coordinates None": (lambda s: joined(s, sd.Cylindrical, [q3, None]), "joint 'wrist': coordinate 2 is None"),
     "coordinate list": (lambda s: joined(s, sd.Revolute, [q3]), "joint 'wrist': coordinate 1 is [q3] of type list"),
     "coordinates text": (lambda s: joined(s, sd.Cylindrical, "q3 q4"),
                          "joint 'wrist': coordinates is 'q3 q4'|pass a list of 2"),

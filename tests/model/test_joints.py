@@ -217,3 +217,13 @@ def test_units() -> None:
     units = {symbol.name: unit for symbol, unit in s.check().units.items()}
     assert [units[n] for n in ("a", "x", "b", "y", "c", "z", "e0", "t")] == ["rad", "m", "m", "m", "rad", "m", "1", "s"]
     assert [units[n] for n in ("a_dot", "x_dot", "c_dot", "omega_x_ball")] == ["rad/s", "m/s", "rad/s", "rad/s"]
+
+
+def test_coordinates_are_named_after_the_joint_unless_given() -> None:
+    system = sd.System("plain", gravity=[0, 0, -9.81])
+    arm = system.add_body("arm", mass=1, inertia=[1, 1, 1], com=[0.5, 0, 0])
+    ball = system.add_body("ball", mass=1, inertia=[1, 2, 2.5], com=[0.1, 0.2, 0])
+    system.add_joint(sd.Revolute("pin", system.ground, arm))
+    system.add_joint(sd.Spherical("socket", arm, ball, parent_point=[1, 0, 0]))
+    names = [q.name for q in system.embedding().symbols.coordinates]
+    assert names == ["q_pin", "q_socket_1", "q_socket_2", "q_socket_3"]

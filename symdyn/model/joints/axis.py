@@ -12,9 +12,10 @@ class AxisJoint(Joint):
 
     default_axis: tuple[int, int, int] = (0, 0, 1)
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any, axis: Any = ..., speed: Any = None,
+    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any = None, axis: Any = ..., speed: Any = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None) -> None:
-        super().__init__(name, parent, child, (coordinate,), None if speed is None else (speed,), parent_point,
-                         child_point, parent_rotation, child_rotation)
+        coordinates, speeds = (None if value is None else (value,) for value in (coordinate, speed))
+        super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
+                         child_rotation)
         self.axis = self._axis(self.default_axis if axis is ... else axis)

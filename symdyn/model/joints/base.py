@@ -41,14 +41,15 @@ class Joint:
     child_point         (3,) the same on the child
     parent_rotation     (3, 3) joint components to parent components; default: identity
     child_rotation      (3, 3) joint components to child components
-    coordinates         one per degree of freedom; a coordinate may be an expression of others and of t
+    coordinates         one per degree of freedom; a coordinate may be an expression of others and of t; default: named
+                        after the joint, q_NAME, or q_NAME_1, ...
     speeds              names for the generalized speeds; default: the derivatives of the coordinates
     """
 
     kind = ""
     coordinate_units: tuple[str, ...] = ()
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any], speeds: Sequence[Any] | None,
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None, speeds: Sequence[Any] | None,
                  parent_point: Any, child_point: Any, parent_rotation: Any, child_rotation: Any) -> None:
         self.name = name
         self.parent = parent
@@ -79,8 +80,11 @@ class Joint:
 
     # -- shared checks
 
-    def _coordinates(self, given: Sequence[Any]) -> tuple[sp.Expr, ...]:
+    def _coordinates(self, given: Sequence[Any] | None) -> tuple[sp.Expr, ...]:
         wanted = len(self.coordinate_units)
+        if given is None:
+            ends = [""] if wanted == 1 else [f"_{k + 1}" for k in range(wanted)]
+            given = [Coordinate(f"q_{self.name}{end}") for end in ends]
         if not _listed(given):
             self.faults.append(f"joint {self.name!r}: coordinates is {given!r}; pass a list of {wanted}")
             given = [sp.S.Zero] * wanted

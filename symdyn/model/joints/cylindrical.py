@@ -15,7 +15,7 @@ class Cylindrical(Joint):
     kind = "cylindrical"
     coordinate_units = ("rad", "m")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any], axis: Any = (0, 0, 1),
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None, axis: Any = (0, 0, 1),
                  speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
                  parent_rotation: Any = None, child_rotation: Any = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,

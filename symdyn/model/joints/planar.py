@@ -20,7 +20,7 @@ class Planar(Joint):
     kind = "planar"
     coordinate_units = ("m", "m", "rad")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any],
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
                  speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
                  parent_rotation: Any = None, child_rotation: Any = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,

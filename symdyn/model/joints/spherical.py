@@ -25,7 +25,7 @@ class Spherical(Joint):
 
     kind = "spherical"
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any],
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
                  orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None) -> None:

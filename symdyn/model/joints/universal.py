@@ -18,7 +18,7 @@ class Universal(Joint):
     kind = "universal"
     coordinate_units = ("rad", "rad")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any],
+    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
                  axes: Sequence[Any] = ((1, 0, 0), (0, 1, 0)), speeds: Sequence[Any] | None = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None) -> None:
