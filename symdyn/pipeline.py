@@ -21,7 +21,7 @@ from symdyn.backend.source import Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.skipped import skipped
-from symdyn.runtime.compiler import find_compiler, no_compiler_reason
+from symdyn.runtime.compiler import find_compiler, no_compiler_reason, require_compiler
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 from symdyn.tape.node import Node
@@ -98,24 +98,23 @@ def compile_equations(equations: Equations, backend: str | None = None, template
     Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
     """
     fallback = ""
-    compiler = None
-    if backend in (None, "c"):
-        compiler = find_compiler()
-        if compiler is None and backend is None:
-            backend, fallback = "numpy", no_compiler_reason()
-        elif compiler is None:
-            from symdyn.runtime.compiler import require_compiler
-
-            compiler = require_compiler()
-        backend = backend or "c"
+    compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
+    if backend is None:
+        backend = "c" if compiler is not None else "numpy"
+        fallback = "" if compiler is not None else no_compiler_reason()
     if backend not in ("c", "numpy"):
         raise SymdynError(f"backend {backend!r} asked for; modules can be loaded from 'c' and 'numpy'; "
                           "emit() writes source for others")
 
-    def provide(name: str) -> Unit:
+    def source_of(name: str) -> Source:
         work = name == "rhs_work"
-        source = emit(equations, backend, ("rhs",) if work else (name,), templates, standalone=False,
-                      specialize=specialize, work=work)
+        return emit(equations, backend, ("rhs",) if work else (name,), templates, standalone=False, specialize=specialize,
+                    work=work)
+
+    rhs = source_of("rhs")
+
+    def provide(name: str) -> Unit:
+        source = rhs if name == "rhs" else source_of(name)
         text = next(iter(source.files.values()))
         if backend == "c":
             assert compiler is not None
@@ -130,8 +129,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
         return make(equations, backend, fallback)
 
-    metadata = emit(equations, "numpy", ("rhs",), standalone=False, specialize=specialize).metadata
-    metadata = {**metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
+    metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}

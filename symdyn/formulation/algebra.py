@@ -47,6 +47,10 @@ class TapeAlgebra:
         """A matrix of expressions on the tape."""
         return self.constants(values).reshape(values.shape)
 
+    def by_time(self, coordinates: Iterable[sp.Symbol], rates: Iterable[Any]) -> dict[Any, Any]:
+        """Seeds of the derivative by time at constant speeds: q -> q_dot, t -> 1."""
+        return {**dict(zip([self.leaves[q] for q in coordinates], rates, strict=True)), self.leaves[time]: 1}
+
     def name(self, name: str, value: Any) -> Any:
         """Name the entries of a quantity by number."""
         return self.recorder.name(name, value)

@@ -12,7 +12,6 @@ from symdyn.errors import ModelError
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
-from symdyn.model.symbols import time
 from symdyn.spatial.vectors import cross, dot, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import is_zero
@@ -130,9 +129,7 @@ class Loads:
         return d, self.algebra.name(f"length_{load.label}", self.algebra.sqrt(dot(d, d))), common
 
     def _rate(self, value: Any) -> Any:
-        a, model = self.algebra, self.model
-        seeds = dict(zip([a.leaves[q] for q in model.coordinates], self.tree.rates, strict=True))
-        return forward(a.recorder, [value], {**seeds, a.leaves[time]: 1})[0]
+        return forward(self.algebra.recorder, [value], self.algebra.by_time(self.model.coordinates, self.tree.rates))[0]
 
     # -- frames
 

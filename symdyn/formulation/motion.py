@@ -11,7 +11,6 @@ import sympy as sp
 
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.composite import Factors, factorize
-from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
@@ -89,9 +88,8 @@ class Motion:
         return self._leaves([*self.coordinates, *self.speeds, *[z for z, _ in self.states]])
 
     def by_time(self) -> dict[Any, Any]:
-        """Seeds of the derivative by time at constant speeds: q -> q_dot, t -> 1."""
-        leaves = self.algebra.leaves
-        return {**{leaves[q]: rate for q, rate in zip(self.coordinates, self.rates, strict=True)}, leaves[time]: 1}
+        """Seeds of the derivative by time at constant speeds."""
+        return self.algebra.by_time(self.coordinates, self.rates)
 
     def rate(self, values: np.ndarray) -> np.ndarray:
         """Derivative by time at constant speeds, entry by entry."""
@@ -113,16 +111,9 @@ class Motion:
             derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
             columns = [factors.solve(-derivatives[:, j]) for j in range(len(by))]
             middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
-            top = _rows(recorder, self.rates, by)
-            bottom = _rows(recorder, self.state_rates(), by)
+            top = jacobian(recorder, self.rates, by, "forward")
+            bottom = jacobian(recorder, self.state_rates(), by, "forward")
             return np.vstack([top, middle, bottom])
 
     def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
         return [self.algebra.leaves[s] for s in symbols]
-
-
-def _rows(recorder: Any, entries: Sequence[Any], by: Sequence[Any]) -> np.ndarray:
-    rows = np.zeros((len(entries), len(by)), dtype=object)
-    for j, leaf in enumerate(by):
-        rows[:, j] = forward(recorder, entries, {leaf: 1})
-    return rows

@@ -165,20 +165,15 @@ class _Builder:
                 self.w_t.append(0)
                 self.b.append(0)
             else:
-                by_time = {a.leaves[time]: 1}
-                by_rates = dict(zip([a.leaves[q] for q in self.model.coordinates], self.rates, strict=True))
-                speed = forward(a.recorder, [s[k]], {**by_rates, **by_time})[0]
-                row = self._partial(speed, row)
+                by_time = a.by_time(self.model.coordinates, self.rates)
+                speed = forward(a.recorder, [s[k]], by_time)[0]
+                row = [forward(a.recorder, [speed], {a.leaves[u]: 1})[0] for u in self.model.speeds]
                 w.append(speed)
-                self.w_t.append(forward(a.recorder, [s[k]], by_time)[0])
-                self.b.append(forward(a.recorder, [speed], {**by_rates, **by_time})[0])
+                self.w_t.append(forward(a.recorder, [s[k]], {a.leaves[time]: 1})[0])
+                self.b.append(forward(a.recorder, [speed], by_time)[0])
             self.rows.append(row)
         self.w.extend(w)
         return s, w
-
-    def _partial(self, speed: Any, row: list[Any]) -> list[Any]:
-        a = self.algebra
-        return [forward(a.recorder, [speed], {a.leaves[u]: 1})[0] for u in self.model.speeds]
 
     def _load(self, child: int, pose: Pose | None) -> None:
         """Add the body's inertia to its link: first about the body's origin, then in the link's frame."""
@@ -187,8 +182,7 @@ class _Builder:
             return
         a, body = self.algebra, self.model.bodies[child]
         with a.section("inertia of the links, about their joints"):
-            about_com = Inertia(a.expression(body.mass), zeros(3), a.matrix(body.inertia))
-            about_com = Inertia(about_com.m, zeros(3), _symmetric(about_com.I))
+            about_com = Inertia(a.expression(body.mass), zeros(3), _symmetric(a.matrix(body.inertia)))
             inertia = about_com.moved(pose.R, pose.point(a.constants(body.com)))
             total = self.inertias[pose.link] + inertia
             n = pose.link + 1

@@ -80,11 +80,12 @@ class TreeQuantities(Motion):
         """Power of all loads but gravity and springs, and of the drives that force prescribed motions, W."""
         with self.algebra.section("power"):
             total: Any = 0
-            if any(not is_zero(v) for v in self.joint_forces(False, conservative=False)):
-                total = inner(self.joint_forces(False, conservative=False), self.tree.w)
+            forces = self.joint_forces(False, conservative=False)
+            if any(not is_zero(v) for v in forces):
+                total = inner(forces, self.tree.w)
             if any(not is_zero(v) for v in self.tree.w_t):
                 applied = self.loads.applied()
-                w_dot = self.tree.D @ self.accelerations() + self.tree.b
+                w_dot = self.tree.D @ self.recall("accelerations") + self.tree.b
                 tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches) - applied.joint
                 total = total + inner(tau, self.tree.w_t)
             return total

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from symdyn.errors import ModelError
 from symdyn.model.bodies import Body, Point
 from symdyn.model.check import check
 from symdyn.model.faults import Faults
@@ -208,5 +207,3 @@ class System:
         self.defaults.update(defaults)
         return self
 
-
-__all__ = ["ModelError", "System"]

@@ -41,8 +41,6 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         options["max_step"] = request.max_step
     if request.first_step:
         options["first_step"] = request.first_step
-    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
-        options["jac"] = lambda s, x: jacobian(s, x)
     trouble: list[str] = []  # why the step under way could not be evaluated
     raised: list[Exception] = []
 
@@ -64,6 +62,9 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         bordered[:n_state, :n_state] = J
         bordered[n_state, :n_state] = module.evaluate("power_x", s, state, request.p, inputs)
         return bordered
+
+    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
+        options["jac"] = jacobian
 
     def field(s: float, x: np.ndarray) -> np.ndarray:
         inputs = given(s, x[:n_state]) if n_in else None

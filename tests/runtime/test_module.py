@@ -17,23 +17,6 @@ from symdyn.errors import ArgumentError, CompilerNotFound, EvaluationError, Symd
 from symdyn.runtime.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
 
-BACKENDS = ["c", "numpy"]
-
-
-@pytest.fixture(params=BACKENDS)
-def backend(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
-@pytest.fixture
-def double(compiled: Callable[..., Any], backend: str) -> Any:
-    return compiled("double_pendulum", backend)
-
-
-@pytest.fixture
-def oscillator(compiled: Callable[..., Any], backend: str) -> Any:
-    return compiled("driven_oscillator", backend)
-
 
 @pytest.fixture
 def sink(compiled: Callable[..., Any], backend: str) -> Any:

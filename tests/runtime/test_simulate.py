@@ -22,24 +22,9 @@ from symdyn.errors import ArgumentError, EvaluationError, MissingExtra, Simulati
 from symdyn.runtime.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
+
+
 BACKENDS = ["c", "numpy"]
-
-
-@pytest.fixture(params=BACKENDS)
-def backend(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
-@pytest.fixture
-def double(compiled: Callable[..., Any], backend: str) -> Any:
-    return compiled("double_pendulum", backend)
-
-
-@pytest.fixture
-def oscillator(compiled: Callable[..., Any], backend: str) -> Any:
-    return compiled("driven_oscillator", backend)
-
-
 START = {"q": [0.5, -0.4], "u": [1.0, -1.5]}
 X0 = [0.5, -0.4, 1.0, -1.5]
 
