@@ -12,8 +12,9 @@ __version__ = "0.1.0"
 
 _HOME = {
     "symdyn.model.symbols": ("coordinates", "inputs", "parameters", "speeds"),
-    "symdyn.model.bodies": ("position", "velocity"),
-    "symdyn.model.joints": ("Cylindrical", "Fixed", "Free", "Planar", "Prismatic", "Revolute", "Spherical", "Universal"),
+    "symdyn.model.bodies": ("acceleration", "bias_acceleration", "jacobian", "position", "velocity"),
+    "symdyn.model.joints": ("Custom", "Cylindrical", "Fixed", "Free", "Helical", "Planar", "Prismatic", "Revolute",
+                            "Spherical", "Universal"),
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
     "symdyn.model.system": ("System",),
     "symdyn.formulation.explicit": ("embedding",),

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from symdyn.formulation.skipped import skipped
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, require_compiler
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+from symdyn.tape.balance import balance
 from symdyn.tape.node import Node
 from symdyn.tape.passes import specialize as specialize_tape
 from symdyn.tape.tape import Output, Tape
@@ -38,6 +39,10 @@ FUNCTIONS = {
     "energy": ("energy", "kinetic and potential energy, J"),
     "inverse_dynamics": ("inverse_dynamics", "tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud"),
     "outputs": ("outputs", "the named outputs, one after the other"),
+    "regressor": ("regressor", "Y, tau = Y pi: ten inertial parameters a body, for given accelerations ud"),
+    "inertial_parameters": ("inertial_parameters", "pi: m, h = m c, I about its origin (xx xy xz yy yz zz) of every body"),
+    "base_regressor": ("base_regressor", "Y_b, tau = Y_b pi_b: base parameters, for given accelerations ud"),
+    "base_parameters": ("base_parameters", "pi_b from the parameters of the model"),
     "power": ("power", "power of all loads but gravity and springs, and of prescribed motions, W"),
     "power_x": ("power_x", "derivative of the power by x"),
     "Jd_qd": ("Jd_qd", "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame"),
@@ -156,7 +161,7 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
 def _content(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
              work: bool) -> Content:
     symbols = equations.symbols
-    tapes = {name: function_tape(equations, name) for name in names}
+    tapes = {name: _quantities(equations, name) for name in names}
     if work:
         power = equations.quantity("power").reshape(1)
         tapes["rhs"] = Tape.of(equations.recorder, rhs=np.concatenate([equations.quantity("rhs"), power]))
@@ -165,7 +170,8 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
         raise SymdynError(f"{equations.name} has no parameter {', '.join(unknown)} to specialize; it has "
                           f"{', '.join(s.name for s in symbols.parameters) or 'none'}")
     if bound:
-        tapes = _bind(equations, tapes, bound)
+        tapes = _together(tapes, lambda whole: specialize_tape(whole, bound))
+    tapes = _together(tapes, balance)
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * work], "ud": [f"{s.name}_dot" for s in symbols.speeds],
               "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters if s.name not in bound]}
@@ -177,7 +183,12 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
 
 
 def function_tape(equations: Equations, name: str) -> Tape:
-    """The tape behind a function of a module."""
+    """The tape behind a function of a module, as it is emitted."""
+    return balance(_quantities(equations, name))
+
+
+def _quantities(equations: Equations, name: str) -> Tape:
+    """The quantities that a function of a module returns."""
     if name != "outputs":
         return equations.tape(_quantity(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
@@ -185,9 +196,10 @@ def function_tape(equations: Equations, name: str) -> Tape:
     return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
 
 
-def _bind(equations: Equations, tapes: Mapping[str, Tape], bound: Mapping[str, float]) -> dict[str, Tape]:
-    """Every function's tape with parameters bound to numbers, still sharing their steps."""
-    whole = specialize_tape(Tape(equations.recorder, {n: next(iter(t.outputs.values())) for n, t in tapes.items()}), bound)
+def _together(tapes: Mapping[str, Tape], change: Callable[[Tape], Tape]) -> dict[str, Tape]:
+    """A pass over all functions' tapes as one, so that they still share their steps."""
+    recorder = next(iter(tapes.values())).recorder
+    whole = change(Tape(recorder, {n: next(iter(t.outputs.values())) for n, t in tapes.items()}))
     return {n: whole.prune((n,)) for n in tapes}
 
 

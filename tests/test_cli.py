@@ -75,7 +75,7 @@ def test_help_and_list_come_without_sympy() -> None:
                              "from symdyn.cli import main; main(['--help'])"],
                             capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ROOT})
     assert helped.returncode == 0 and helped.stdout.splitlines()[-1] == "[]"
-    assert all(f" {c} " in helped.stdout for c in ("list", "derive", "generate", "simulate", "report", "demo"))
+    assert all(f" {c} " in helped.stdout for c in ("list", "derive", "generate", "simulate", "report", "bench", "demo"))
     listed = run("list", after=after)
     assert listed.returncode == 0 and listed.stdout.splitlines()[-1] == "[]"
 
@@ -132,7 +132,7 @@ def test_derive_counts_what_nobody_can_read(capsys: pytest.CaptureFixture[str]) 
     said = capsys.readouterr().out
     written, generated = map(int, re.search(  # type: ignore[union-attr]
         r"k_tilde \(6\): (\d+) operations written out, (\d+) in generated code; --force", said).groups())
-    assert written > 50_000 and generated < 1000 and len(said) < 2000
+    assert written > 10_000 and generated < 1000 and len(said) < 2000
 
 
 def test_the_count_is_that_of_the_expressions(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -316,7 +316,7 @@ def test_a_record_lasts_until_symdyn_changes(here: Path, monkeypatch: pytest.Mon
 def test_a_remembered_module_is_whole(here: Path) -> None:
     for _ in range(2):
         module = recall.recall("cart_pole", {}, "numpy")
-        whole = systems.cart_pole().embedding().compile("numpy")
+        whole = systems.cart_pole().compile("numpy")
         assert isinstance(module, Module) and module.functions == whole.functions
         assert module.metadata["units"] == whole.metadata["units"]
         assert np.array_equal(module.jacobian(0.0, [0.1] * 4, inputs=[1.0]).x, whole.jacobian(0.0, [0.1] * 4,

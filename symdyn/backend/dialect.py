@@ -20,9 +20,25 @@ _LIBRARY = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh 
 ceil erf erfc gamma lgamma tgamma j0 j1 jn y0 y1 yn isnan isinf abs max min sign pi where sum range len print math numpy
 np t q u z x ud xd p c inputs out n status""".split()
 _OTHERS = """logical_and logical_or logical_not symdyn_sign let var function null undefined typeof super arguments eval
-debugger instanceof""".split()
+debugger instanceof angles sines cosines""".split()
 RESERVED = frozenset([*_C_WORDS, *_LIBRARY, *_OTHERS, *keyword.kwlist, *keyword.softkwlist])
 LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
+SINCOS = ("least", "take", "sin", "cos")
+
+
+@dataclass(frozen=True)
+class SinCos:
+    """How sines and cosines are taken all at once, of the angles that need no other sine or cosine.
+
+    least      from how many sines and cosines on this is worth it; fewer are written one by one
+    take       one statement a line, with {n} the number of angles and {angles} their values, separated by commas
+    sin, cos   what then reads the sine and the cosine of angle {k}
+    """
+
+    least: int
+    take: str
+    sin: str
+    cos: str
 
 
 @dataclass(frozen=True)
@@ -34,6 +50,7 @@ class Dialect:
     load         formats of reading a leaf by kind ("q", "u", ..., "p", "c") with {k} its place
     first        index of the first entry of an array, 0 or 1
     comment      what a comment line begins with
+    sincos       sines and cosines taken all at once; None where each is an operation like any other
     """
 
     name: str
@@ -46,6 +63,7 @@ class Dialect:
     literal: str = "{value!r}"
     first: int = 0
     files: dict[str, str] | None = None
+    sincos: SinCos | None = None
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -71,7 +89,7 @@ def read_dialect(folder: Path) -> Dialect:
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
                                           "files") if key in table}
-    return Dialect(folder.name, **fields)
+    return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None)
 
 
 def _check_formats(path: Path, table: dict[str, Any]) -> None:
@@ -84,6 +102,12 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         *[(f"operations.{op}", text, {}) for op, text in table["operations"].items()],
         *[(f"files.{template}", text, {"name": "a"}) for template, text in table["files"].items()]]
     faults = [f"load.{group} is missing" for group in LOADED if group not in table["load"]]
+    if "sincos" in table:
+        sincos = table["sincos"]
+        faults += [f"sincos.{key} is missing" for key in SINCOS if key not in sincos]
+        faults += [f"sincos.{key} is not known" for key in sincos if key not in SINCOS]
+        trials += [(f"sincos.{key}", sincos[key], {"n": 1, "angles": "a"} if key == "take" else {"k": 0})
+                   for key in ("take", "sin", "cos") if key in sincos]
     for key, text, given in trials:
         try:
             text.format(*arguments if key.startswith("operations.") else (), **given)

@@ -170,6 +170,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
         "n_in": sizes["inputs"], "signature": signature, "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
+        "uses_sincos": "symdyn_sincos(" in text,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": ", ".join([field_argument(g) for g in uses.get("rhs", ())] + ["xd"]),
         "tables": _tables(content),

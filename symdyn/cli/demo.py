@@ -21,9 +21,10 @@ def demo(arguments: argparse.Namespace) -> int:
     begun = clock.perf_counter()
     print("The PUMA 560 falls freely under gravity: six joints in space, no motors.")
     with _Stage("derive"):
-        equations = find_system("puma560", {}).embedding()
+        equations = find_system("puma560", {}).equations()
         rhs = equations.tape("rhs")
-        print(f"  {len(equations.symbols.coordinates)} coordinates; accelerations take {rhs.operations} operations")
+        print(f"  {len(equations.symbols.coordinates)} coordinates; accelerations take {rhs.operations} operations "
+              f"({equations.formulation})")
     with _Stage("generate"):
         folder = write_files(equations, ["c", "numpy"], arguments.output)
     with _Stage("compile"):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from symdyn.cli.find import find_equations
 
 if TYPE_CHECKING:
-    from symdyn.formulation.embedding import EmbeddedEquations
+    from symdyn.formulation.motion_equations import MotionEquations
 
 # Quantities with more operations than this, written out, are counted and not printed: nobody reads them.
 READABLE = 1000
@@ -43,7 +43,7 @@ def derive(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _written_out(equations: EmbeddedEquations, name: str) -> int:
+def _written_out(equations: MotionEquations, name: str) -> int:
     """Operations of the quantity as explicit expressions, where nothing is shared."""
     from symdyn.tape.node import Node
 

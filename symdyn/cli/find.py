@@ -13,7 +13,7 @@ from symdyn.cli.userfile import from_file
 from symdyn.errors import SymdynError
 
 if TYPE_CHECKING:
-    from symdyn.formulation.embedding import EmbeddedEquations
+    from symdyn.formulation.motion_equations import MotionEquations
     from symdyn.model.system import System
     from symdyn.runtime.module import Module
 
@@ -33,9 +33,12 @@ def find_system(name: str, options: Mapping[str, Any]) -> System:
         raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
 
 
-def find_equations(arguments: argparse.Namespace) -> EmbeddedEquations:
-    """The equations of the system with its options."""
-    return find_system(arguments.system, options_of(arguments)).embedding()
+def find_equations(arguments: argparse.Namespace) -> MotionEquations:
+    """The equations of the system with its options, in the formulation that was asked for."""
+    from symdyn.choice import formulated
+
+    return formulated(find_system(arguments.system, options_of(arguments)), arguments.formulation,
+                      getattr(arguments, "tune", False))
 
 
 def find_module(arguments: argparse.Namespace) -> Module:
@@ -49,4 +52,4 @@ def find_module(arguments: argparse.Namespace) -> Module:
     options = options_of(arguments)
     if options:
         check_options(arguments.system, getattr(systems, arguments.system), options)
-    return recall(arguments.system, options, arguments.backend)
+    return recall(arguments.system, options, arguments.backend, arguments.formulation)

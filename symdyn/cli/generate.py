@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from symdyn.cli.find import find_equations
 
 if TYPE_CHECKING:
-    from symdyn.formulation.embedding import EmbeddedEquations
+    from symdyn.formulation.motion_equations import MotionEquations
 
 
 def generate(arguments: argparse.Namespace) -> int:
@@ -21,7 +21,7 @@ def generate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def write_files(equations: EmbeddedEquations, backends: Sequence[str], output: Path | None,
+def write_files(equations: MotionEquations, backends: Sequence[str], output: Path | None,
                 functions: Sequence[str] | None = None, templates: str | None = None) -> Path:
     """Write and tell; returns the folder."""
     from symdyn.pipeline import emit, write_source

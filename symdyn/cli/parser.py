@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from symdyn.cli.bench import bench
 from symdyn.cli.demo import demo
 from symdyn.cli.derive import READABLE, derive
 from symdyn.cli.generate import generate
@@ -33,12 +34,21 @@ def make_parser() -> argparse.ArgumentParser:
 
     command("list", list_systems, "list the systems of the catalogue", system=False)
 
-    _add_derive(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde"))
-    _add_generate(command("generate", generate, "write source files; no compiler is needed"))
-    _add_simulate(command("simulate", simulate, "simulate, and save data and a picture"))
+    def formulation(sub: argparse.ArgumentParser, default: str = "auto") -> argparse.ArgumentParser:
+        sub.add_argument("--formulation", choices=("auto", "embedding", "recursive"), default=default,
+                         help=f"auto takes the one with the fastest right-hand side (default: {default})")
+        return sub
+
+    _add_derive(formulation(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde"),
+                            "embedding"))
+    _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
+    _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
     proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
                     "identities at random states")
+    formulation(proof)
+    proof.add_argument("--tune", action="store_true", help="compile the candidates and time them, instead of predicting")
     proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
+    _add_bench(command("bench", bench, "measure symdyn beside its peers: Pinocchio, and CasADi's C code", system=False))
     _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
                         system=False))
     return parser
@@ -74,6 +84,15 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--gif", action="store_true", help="save an animation too")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(parser)
+
+
+def _add_bench(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("peers",), help="peers: accelerations of the same mechanisms, measured side by side")
+    parser.add_argument("--models", metavar="NAME", nargs="+", help="some of the mechanisms, such as spatial_chain or "
+                        "'spatial_chain(7)' (default: all)")
+    parser.add_argument("--repeats", metavar="N", type=int, default=40, help="timings of each contestant, of which the best "
+                        "counts (default: 40)")
+    parser.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,15 @@ class TapeAlgebra:
         self.sin, self.cos, self.sqrt = recorder.sin, recorder.cos, recorder.sqrt
         self.section = recorder.section
         self.positive = recorder.positive
+
+    def within(self, values: Mapping[sp.Basic, Any]) -> TapeAlgebra:
+        """The same algebra with scalars that stand for some symbols, in place of their leaves."""
+        return TapeAlgebra(self.recorder, {**self.leaves, **values})
+
+    def divisor(self, value: Any, least: Any, reason: str) -> Any:
+        """A value to divide by; where it is not above `least` when the code runs, that stops and tells the reason."""
+        apply = self.recorder.apply
+        return self.positive(apply("select", apply("gt", value, least), value, 0), reason)
 
     def expression(self, e: Any) -> Any:
         """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""
@@ -71,6 +80,14 @@ def leaves_of(model: Model, recorder: Recorder) -> dict[sp.Basic, Any]:
     return leaves
 
 
+def accelerations_of(speeds: Iterable[sp.Symbol], recorder: Recorder, leaves: dict[sp.Basic, Any]) -> list[Any]:
+    """Leaves for given accelerations u_dot, which become known under the symbols that they are printed with."""
+    made = {u: recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds}
+    for u, leaf in made.items():
+        leaves.setdefault(u.dot, leaf)
+    return list(made.values())
+
+
 def add_rates(model: Model, algebra: Any) -> list[Any]:
     """q_dot = N(q) u, entry by entry; also makes each coordinate's `.dot` known to the algebra."""
     rates: dict[sp.Basic, Any] = {}
@@ -78,7 +95,8 @@ def add_rates(model: Model, algebra: Any) -> list[Any]:
         if all(isinstance(q, Coordinate) for q in joint.coordinates):
             s = [algebra.leaves[q] for q in joint.coordinates]
             u = [algebra.leaves[v] for v in joint_speeds(joint)]
-            rates.update(zip(joint.coordinates, joint.rates(algebra, s, u), strict=True))
+            with algebra.section(f"joint {joint.name}"):
+                rates.update(zip(joint.coordinates, joint.rates(algebra, s, u), strict=True))
         else:
             rates.update({q: algebra.leaves[v] for q, v in zip(joint.coordinates, joint_speeds(joint), strict=True)
                           if isinstance(q, Coordinate)})

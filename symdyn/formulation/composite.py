@@ -13,19 +13,21 @@ from typing import Any
 import numpy as np
 
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.spatial.vectors import Inertia, cross, dot, zeros
+from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.vectors import cross, dot, zeros
+from symdyn.tape.node import is_zero
 
 
 def mass_matrix(tree: Tree) -> np.ndarray:
     """Mass matrix in the joints' speeds, (n_w, n_w): each entry one link's composite inertia moved to another joint."""
     algebra = tree.algebra
-    composite: list[Inertia] = [link.inertia for link in tree.links]
+    composite: list[Inertia] = [link.effective for link in tree.links]
     M = zeros(len(tree.w), len(tree.w))
     for i in reversed(range(len(tree.links))):
         link = tree.links[i]
         with algebra.section(f"mass matrix: composite body from link {link.name} outwards"):
             for column, place in enumerate(link.speeds):
-                f, n = momentum(composite[i], link.S[:3, column], link.S[3:, column])
+                f, n = composite[i].momentum(link.S[:3, column], link.S[3:, column])
                 for other in range(column + 1):
                     M[place, link.speeds[other]] = dot(link.S[:3, other], n) + dot(link.S[3:, other], f)
                     M[link.speeds[other], place] = M[place, link.speeds[other]]
@@ -38,11 +40,6 @@ def mass_matrix(tree: Tree) -> np.ndarray:
                 algebra.vector(f"Ic{number}", total.I)
                 composite[link.parent] = total
     return M
-
-
-def momentum(inertia: Inertia, omega: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear momentum and angular momentum about the origin for a twist (or force and moment for its derivative)."""
-    return inertia.m * v + cross(omega, inertia.h), inertia.I @ omega + cross(inertia.h, v)
 
 
 def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.ndarray) -> None:
@@ -59,9 +56,13 @@ def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.n
 
 @dataclass(frozen=True)
 class Factors:
-    """M = L^T D L with L unit lower triangular, D diagonal; entries that are zero by structure are the number 0."""
+    """M = L^T D L with L unit lower triangular, D diagonal; entries that are zero by structure are the number 0.
+
+    A pivot that is zero by structure has the inverse 0: what is divided by it must not be used.
+    """
 
     L: np.ndarray
+    D: list[Any]
     inverse_D: list[Any]
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -90,10 +91,10 @@ def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str]) -> Factors:
     for k in reversed(range(n)):
         algebra.name(f"D{k + 1}", A[k, k])
         algebra.positive(A[k, k], reasons[k])
-        inverse[k] = algebra.name(f"iD{k + 1}", 1 / A[k, k])
+        inverse[k] = 0 if is_zero(A[k, k]) else algebra.name(f"iD{k + 1}", 1 / A[k, k])
         for i in range(k):
             L[k, i] = algebra.name(f"L{k + 1}_{i + 1}", A[k, i] * inverse[k])
         for i in range(k):
             for j in range(i + 1):
                 A[i, j] = A[i, j] - L[k, i] * A[k, j]
-    return Factors(L, inverse)
+    return Factors(L, list(np.diagonal(A)), inverse)

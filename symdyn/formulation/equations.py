@@ -42,6 +42,9 @@ class Equations:
     notes        what the formulation left out, and why
     unit_groups  coordinates that form a unit vector (Euler parameters)
     again        derives the same equations on a new tape, so that files do not depend on what was recorded before
+    frames       axes that quantities are formed in: "body", or "parallel" where links keep those of the link before
+    candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
+    identification   what records regressors and base parameters; None without bodies
     """
 
     name: str
@@ -55,6 +58,9 @@ class Equations:
     unit_groups: tuple[tuple[sp.Symbol, ...], ...] = ()
     again: Callable[[], Equations] | None = None
     simplify_seconds: float = 10.0
+    frames: str = "body"
+    candidates: tuple[Any, ...] = ()
+    identification: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[str, Any] = field(default_factory=dict)
 
@@ -92,7 +98,7 @@ class Equations:
         return sp.Matrix(len(self.symbols.speeds), 1, [u.dot for u in self.symbols.speeds])
 
     def lambdify(self, name: str) -> Callable[..., np.ndarray]:
-        """One quantity, such as "M_tilde", as a NumPy function f(q, u, params, t=0, inputs=()).
+        """One quantity, such as "M_tilde", as a NumPy function f(q, u, params, t=0, inputs=(), ud=()).
 
         It takes one state or arrays of states; params as everywhere in Module. Raises SymdynError for an unknown name.
         """
@@ -115,6 +121,12 @@ class Equations:
         from symdyn.pipeline import emit, write_source
 
         return write_source(emit(self, backend, **options), Path(folder))
+
+    def base_parameters(self) -> Any:
+        """The smallest set of inertial parameters that the equations depend on; see symdyn.formulation.identification."""
+        from symdyn.formulation.identification import base_parameters
+
+        return base_parameters(self)
 
     def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Any:
         """Prove the equations sound by identities at random states; see symdyn.verification.verify."""

@@ -5,12 +5,13 @@ Recorded only where they are asked for: the equations themselves are formed in l
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.newton_euler import outward
+from symdyn.formulation.newton_euler import LinkMotion, outward
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.spatial.vectors import cross, dot, identity, zeros
 
@@ -70,19 +71,24 @@ class Kinematics:
         """Velocity (3,) of a point given in body axes, n-frame."""
         return self.jacobian(pose, at)[:3] @ self.tree.w if len(self.tree.w) else zeros(3)
 
+    @cached_property
+    def reference(self) -> list[LinkMotion]:
+        """Motion of every link with u_dot = 0, link axes."""
+        return outward(self.tree, self.tree.b, zeros(3))
+
+    def acceleration(self, pose: Pose, at: np.ndarray, motions: Sequence[LinkMotion]) -> np.ndarray:
+        """[acceleration of a point given in body axes; alpha], n-frame, (6,); motions: of the links, as from `outward`."""
+        rows = zeros(6)
+        if pose.link != GROUND:
+            R, motion = self.frames[pose.link][0], motions[pose.link]
+            rows[:3] = R @ motion.at(pose.point(at))
+            rows[3:] = R @ motion.alpha
+        return rows
+
     def bias(self) -> list[np.ndarray]:
         """Accelerations [a_G; alpha] (6,) of every body with u_dot = 0, n-frame."""
-        motions = outward(self.tree, self.tree.b, zeros(3))
-        result = []
-        for pose, body in zip(self.tree.poses, self.tree.model.bodies, strict=True):
-            rows = zeros(6)
-            if pose.link != GROUND:
-                R = self.frames[pose.link][0]
-                motion = motions[pose.link]
-                rows[:3] = R @ motion.at(pose.point(self.algebra.constants(body.com)))
-                rows[3:] = R @ motion.alpha
-            result.append(rows)
-        return result
+        return [self.acceleration(pose, self.algebra.constants(body.com), self.reference)
+                for pose, body in zip(self.tree.poses, self.tree.model.bodies, strict=True)]
 
     @cached_property
     def twists(self) -> list[tuple[np.ndarray, np.ndarray]]:

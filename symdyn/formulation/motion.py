@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import sympy as sp
 
-from symdyn.formulation.algebra import TapeAlgebra
-from symdyn.formulation.composite import Factors, factorize
+from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
+from symdyn.formulation.composite import factorize
 from symdyn.spatial.vectors import vector
-from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.passes import substitute
 
 
-class Motion:
-    """What every formulation that ends in a mass matrix shares.
+class Solver(Protocol):
+    """Gives the accelerations that forces along the speeds make, M_tilde^-1 right, (n_u,)."""
 
-    A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`.
+    def solve(self, right: np.ndarray) -> np.ndarray: ...
+
+
+class Motion:
+    """What every formulation in independent speeds shares.
+
+    A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`; one that needs no mass matrix for the
+    accelerations has its own `solver` and `accelerations`.
     remarks   speed -> what else to say where the mass matrix is singular along it
     """
 
@@ -32,7 +38,7 @@ class Motion:
         self.states = states
         self.remarks = remarks or {}
         self.rates = list(rates)
-        self.speed_rates = vector(*[algebra.recorder.leaf(f"{u.name}_dot", kinds.ACCELERATION) for u in speeds])
+        self.speed_rates = vector(*accelerations_of(speeds, algebra.recorder, algebra.leaves))
         self._memory: dict[str, Any] = {}
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
@@ -61,18 +67,21 @@ class Motion:
             self._memory[name] = getattr(self, name)()
         return self._memory[name]
 
-    def factors(self) -> Factors:
+    def reasons(self) -> list[str]:
+        """What it means, speed by speed, if a pivot of the mass matrix is not positive."""
+        return [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
+
+    def solver(self) -> Solver:
         """The mass matrix, factorized."""
         M = self.recall("M_tilde")
         with self.algebra.section("factors of the mass matrix, L^T D L"):
-            reasons = [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
-            return factorize(self.algebra, M, reasons)
+            return factorize(self.algebra, M, self.reasons())
 
     def accelerations(self) -> np.ndarray:
         """u_dot, (n_u,)."""
-        factors, bias = self.recall("factors"), self.recall("bias")
+        solver, bias = self.recall("solver"), self.recall("bias")
         with self.algebra.section("accelerations: M_tilde u_dot = F_tilde - k_tilde"):
-            return self.algebra.name("ud", factors.solve(-bias))
+            return self.algebra.name("ud", solver.solve(-bias))
 
     def state_rates(self) -> list[Any]:
         """z_dot of the extra states."""
@@ -103,13 +112,13 @@ class Motion:
         d u_dot = - M_tilde^-1 (dr at constant u_dot), so that the factorization is not differentiated.
         """
         recorder = self.algebra.recorder
-        ud, factors = self.recall("accelerations"), self.recall("factors")
+        ud, solver = self.recall("accelerations"), self.recall("solver")
         with self.algebra.section("Jacobian"):
             residual = self.inverse_dynamics()
             derivatives = jacobian(recorder, residual.tolist(), by)
             at = dict(zip(self.speed_rates, ud, strict=True))
             derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
-            columns = [factors.solve(-derivatives[:, j]) for j in range(len(by))]
+            columns = [solver.solve(-derivatives[:, j]) for j in range(len(by))]
             middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
             top = jacobian(recorder, self.rates, by, "forward")
             bottom = jacobian(recorder, self.state_rates(), by, "forward")

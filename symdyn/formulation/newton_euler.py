@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.spatial.vectors import Inertia, Vector, cross, dot, zeros
+from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.vectors import Vector, cross, dot, zeros
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def inverse_dynamics(tree: Tree, w_dot: Vector, a_0: np.ndarray,
     wrenches = []
     for k, (link, motion) in enumerate(zip(tree.links, motions, strict=True)):
         with tree.algebra.section(f"link {link.name}: inertial force and moment"):
-            f, n = inertial_wrench(link.inertia, motion)
+            f, n = inertial_wrench(link.effective, motion)
             if applied is not None:
                 f, n = f - applied[k][0], n - applied[k][1]
             tree.algebra.vector(f"f{k + 1}", f)

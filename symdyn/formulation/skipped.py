@@ -19,10 +19,9 @@ def skipped(equations: Equations) -> list[str]:
         notes.append("time: nothing depends on t, so no function takes it")
     if not kinds & INPUT:
         notes.append("inputs: there are none")
-    M = equations.quantity("M_tilde")
-    notes += _mass_matrix(M)
-    k = equations.quantity("k_tilde")
-    if not any(isinstance(e, Node) for e in k):
+    if equations.formulation != "recursive":
+        notes += _mass_matrix(equations.quantity("M_tilde"))
+    if not any(isinstance(e, Node) for e in equations.quantity("k_tilde")):
         notes.append("k_tilde: zero by structure")
     if tape.prologue:
         notes.append(f"{sum(tape.count_prologue().values())} operations on parameters only: hoisted into the prologue, "

@@ -1,6 +1,8 @@
 """The tree of links: bodies held by fixed joints merged, each link's frame at its joint, everything on the scalars.
 
-Link frames sit in the joint's moving frame, so that a rotation about a joint's axis keeps its zeros.
+Link frames sit in the joint's moving frame, so that a rotation about a joint's axis keeps its zeros. Where axes stay
+parallel, frames may stay parallel too ("aligned"): they keep the axes of the first link of such a group, the constants of
+the links are turned instead, by the sum of the angles, and nothing has to be turned from link to link.
 """
 
 from __future__ import annotations
@@ -11,11 +13,16 @@ from typing import Any
 import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates
+from symdyn.formulation.axes import along_coordinate_axis
+from symdyn.formulation.lumping import coordinate_axis, unmoved
 from symdyn.model.joints import Fixed, Joint, JointMotion
+from symdyn.model.joints.base import turn
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
-from symdyn.spatial.vectors import Inertia, identity, vector, zeros
+from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.vectors import identity, vector, zeros
 from symdyn.tape.differentiate import forward
+from symdyn.tape.node import Node, is_zero
 
 GROUND = -1
 
@@ -38,10 +45,11 @@ class Link:
     """One moving part.
 
     parent      index of the parent link, or GROUND
-    R, r        (3, 3) link to parent components; (3,) origin in the parent's frame
+    R, r        (3, 3) link to parent components; (3,) origin in the parent's frame, parent axes
     S, c        the joint's motion subspace (6, k) and velocity product (6,), link axes (see JointMotion)
     speeds      places of the joint's speeds among all joint speeds of the tree
     inertia     of all bodies merged into the link, about its origin, link axes
+    effective   the same with what its joint does not move counted to its parent (see lumping); same equations of motion
     """
 
     name: str
@@ -53,6 +61,7 @@ class Link:
     c: np.ndarray
     speeds: range
     inertia: Inertia
+    effective: Inertia
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,7 @@ class Tree:
     w = D u + w_t and w_dot = D u_dot + b, with w the speeds of all joints, (n_w,)
     poses      one for each body; ground: pose of the ground's frame
     rates      q_dot, (n_q,)
+    parallel   number of links whose frames are kept parallel to their parents'
     """
 
     model: Model
@@ -74,6 +84,7 @@ class Tree:
     w_t: np.ndarray
     b: np.ndarray
     rates: list[Any]
+    parallel: int = 0
 
     @property
     def plain(self) -> bool:
@@ -89,21 +100,50 @@ class Tree:
         return result
 
 
-def build(model: Model, algebra: TapeAlgebra) -> Tree:
-    """The tree of a model."""
-    return _Builder(model, algebra).tree()
+def build(model: Model, algebra: TapeAlgebra, aligned: bool = False) -> Tree:
+    """The tree of a model; aligned: with parallel frames where axes stay parallel."""
+    return _Builder(model, algebra, aligned).tree()
+
+
+@dataclass
+class _Part:
+    """A link while the tree is built, in its body-fixed frame.
+
+    R0, p0   orientation and origin of the joint's frame on the parent, in the parent's body-fixed frame
+    spin     axis number and angle by which the body-fixed frame is turned against the frame that is worked in, or None
+    """
+
+    name: str
+    joint: Joint
+    parent: int
+    R0: np.ndarray
+    p0: np.ndarray
+    motion: JointMotion
+    angle: Any
+    speeds: range
+    inertia: Inertia
+    effective: Inertia
+    spin: tuple[int, Any] | None = None
+
+    @property
+    def axis(self) -> int | None:
+        """The coordinate axis that the joint turns about, if it does nothing else."""
+        S = self.motion.S
+        if S.shape[1] != 1 or not self.joint.identity_at_zero or not all(is_zero(e) for e in [*S[3:, 0], *self.motion.d]):
+            return None
+        return coordinate_axis(S[:3, 0])
 
 
 class _Builder:
-    def __init__(self, model: Model, algebra: TapeAlgebra) -> None:
+    def __init__(self, model: Model, algebra: TapeAlgebra, aligned: bool) -> None:
         self.model = model
         self.algebra = algebra
-        self.links: list[Link] = []
+        self.aligned = aligned
+        self.parts: list[_Part] = []
         self.w: list[Any] = []
         self.w_t: list[Any] = []
         self.b: list[Any] = []
         self.rows: list[list[Any]] = []
-        self.inertias: list[Inertia] = []
 
     def tree(self) -> Tree:
         model, a = self.model, self.algebra
@@ -111,20 +151,22 @@ class _Builder:
         self.places = {u: k for k, u in enumerate(model.speeds)}
         ground = Pose(GROUND, identity(), zeros(3))
         if model.ground_motion is not None:
-            ground = self._link(model.ground_motion, ground)
-        poses: list[Pose | None] = [None] * len(model.bodies)
+            ground = self._part(model.ground_motion, ground)
+        poses: list[Pose] = [ground] * len(model.bodies)
         with a.section("constants of the links"):
             for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True):
                 pose = ground if parent == -1 else poses[parent]
-                assert pose is not None
-                poses[child] = self._fixed(joint, pose) if isinstance(joint, Fixed) else self._link(joint, pose)
+                poses[child] = self._fixed(joint, pose) if isinstance(joint, Fixed) else self._part(joint, pose)
                 self._load(child, poses[child])
-        n_u = len(model.speeds)
-        D = np.array(self.rows, dtype=object).reshape(len(self.w), n_u)
-        links = tuple(Link(k.name, k.joint, k.parent, k.R, k.r, k.S, k.c, k.speeds, inertia)
-                      for k, inertia in zip(self.links, self.inertias, strict=True))
-        return Tree(model, a, links, tuple(p for p in poses if p is not None), ground, D, vector(*self.w),
-                    vector(*self.w_t), vector(*self.b), self.rates)
+            self._lump()
+        if self.aligned:
+            self._align()
+        links = tuple(self._link(k) for k in range(len(self.parts)))
+        D = np.array(self.rows, dtype=object).reshape(len(self.w), len(model.speeds))
+        return Tree(model, a, links, tuple(self._worked(p) for p in poses), self._worked(ground), D, vector(*self.w),
+                    vector(*self.w_t), vector(*self.b), self.rates, sum(part.spin is not None for part in self.parts))
+
+    # -- body-fixed frames
 
     def _fixed(self, joint: Joint, parent: Pose) -> Pose:
         a = self.algebra
@@ -132,22 +174,20 @@ class _Builder:
         p = parent.point(a.constants(joint.parent_point)) - R @ a.constants(joint.child_point)
         return Pose(parent.link, R, p)
 
-    def _link(self, joint: Joint, parent: Pose) -> Pose:
+    def _part(self, joint: Joint, parent: Pose) -> Pose:
         """Add the link that the joint moves; returns the pose of the child body in it."""
         a = self.algebra
-        number = len(self.links)
-        R0 = parent.R @ a.matrix(joint.parent_rotation)
+        number = len(self.parts)
+        turned, A = along_coordinate_axis(joint)
+        R0 = parent.R @ a.matrix(joint.parent_rotation) @ a.matrix(A)
         with a.section(f"joint {joint.name}"):
             s, w = self._joint_speeds(joint)
-            motion: JointMotion = joint.motion(a, s, w)
-        R = R0 @ motion.R
-        r = parent.point(a.constants(joint.parent_point)) + R0 @ motion.d
+            motion: JointMotion = turned.motion(a, s, w)
         speeds = range(len(self.w) - len(w), len(self.w))
         name = joint.child if isinstance(joint.child, str) else joint.child.name
-        empty = Inertia(0, zeros(3), zeros(3, 3))
-        self.links.append(Link(name, joint, parent.link, a.vector(f"R{number + 1}", R), r, motion.S, motion.c, speeds, empty))
-        self.inertias.append(empty)
-        back = a.matrix(joint.child_rotation).T
+        self.parts.append(_Part(name, joint, parent.link, R0, parent.point(a.constants(joint.parent_point)), motion,
+                                s[0] if s else 0, speeds, Inertia.none(), Inertia.none()))
+        back = (a.matrix(joint.child_rotation) @ a.matrix(A)).T
         return Pose(number, back, -(back @ a.constants(joint.child_point)))
 
     def _joint_speeds(self, joint: Joint) -> tuple[list[Any], list[Any]]:
@@ -175,19 +215,92 @@ class _Builder:
         self.w.extend(w)
         return s, w
 
-    def _load(self, child: int, pose: Pose | None) -> None:
+    def _load(self, child: int, pose: Pose) -> None:
         """Add the body's inertia to its link: first about the body's origin, then in the link's frame."""
-        assert pose is not None
         if pose.link == GROUND:
             return
         a, body = self.algebra, self.model.bodies[child]
         with a.section("inertia of the links, about their joints"):
             about_com = Inertia(a.expression(body.mass), zeros(3), _symmetric(a.matrix(body.inertia)))
-            inertia = about_com.moved(pose.R, pose.point(a.constants(body.com)))
-            total = self.inertias[pose.link] + inertia
-            n = pose.link + 1
-            a.name(f"m{n}", total.m), a.vector(f"h{n}", total.h), a.vector(f"I{n}", total.I)
-            self.inertias[pose.link] = total
+            part = self.parts[pose.link]
+            part.inertia = part.inertia + about_com.moved(pose.R, pose.point(a.constants(body.com)))
+
+    def _lump(self) -> None:
+        """Count what a joint does not move to the parent, from the leaves inwards."""
+        a = self.algebra
+        with a.section("inertia of the links, about their joints"):
+            for part in self.parts:
+                part.effective = part.inertia
+            for k in reversed(range(len(self.parts))):
+                part = self.parts[k]
+                piece = unmoved(part.motion.S, part.effective) if part.joint.identity_at_zero else Inertia.none()
+                part.effective = part.effective - piece
+                if part.parent != GROUND:
+                    outer = self.parts[part.parent]
+                    # Seen from the parent the piece looks the same at every position of the joint, so also at zero.
+                    R = part.R0 if any(not is_zero(e) for e in part.motion.S[:3].ravel()) else part.R0 @ part.motion.R
+                    outer.effective = outer.effective + piece.moved(R, part.p0)
+                n, total = k + 1, part.effective
+                a.name(f"m{n}", total.m), a.vector(f"h{n}", total.h), a.vector(f"I{n}", total.I)
+
+    # -- the frames that are worked in
+
+    def _align(self) -> None:
+        """Decide which links keep the axes of their parent: turning ones whose children turn about parallel axes."""
+        children: list[list[int]] = [[] for _ in self.parts]
+        for k, part in enumerate(self.parts):
+            if part.parent != GROUND:
+                children[part.parent].append(k)
+        for k, part in enumerate(self.parts):
+            if part.axis is None or not all(self._parallel(child) for child in children[k]):
+                continue
+            outer = part.parent != GROUND and self.parts[part.parent].spin is not None
+            if children[k] or outer:
+                part.spin = (part.axis, self._total_angle(k))
+
+    def _parallel(self, k: int) -> int:
+        """1 or -1 if joint k turns about its parent's axis or its opposite, else 0."""
+        part, outer = self.parts[k], self.parts[self.parts[k].parent]
+        if part.axis is None or outer.axis is None:
+            return 0
+        along = part.R0[outer.axis, part.axis]
+        return 0 if isinstance(along, Node) or abs(along) != 1 else int(along)
+
+    def _total_angle(self, k: int) -> Any:
+        """Angle of link k about its axis against the axes that its parent is worked in."""
+        part = self.parts[k]
+        own = part.motion.S[part.axis, 0] * part.angle
+        spin = None if part.parent == GROUND else self.parts[part.parent].spin
+        return own if spin is None else self.algebra.name(f"theta{k + 1}", own + self._parallel(k) * spin[1])
+
+    def _link(self, k: int) -> Link:
+        a, part = self.algebra, self.parts[k]
+        with a.section("constants of the links"):
+            outer = None if part.parent == GROUND else self.parts[part.parent].spin
+            r = part.p0 + part.R0 @ part.motion.d
+            inertia, effective = part.inertia, part.effective
+            if part.spin is not None:
+                R, turned = part.R0, self._turn(part.spin)
+                inertia, effective = inertia.turned(turned), effective.turned(turned)
+            else:
+                R = part.R0 @ (self._turn((part.axis, self._total_angle(k))) if outer else part.motion.R)
+            if outer is not None:
+                r = self._turn(outer) @ r
+            a.vector(f"r{k + 1}", r)
+        return Link(part.name, part.joint, part.parent, a.vector(f"R{k + 1}", R), r, part.motion.S, part.motion.c, part.speeds,
+                    inertia, effective)
+
+    def _worked(self, pose: Pose) -> Pose:
+        """A body's pose in the frame that its link is worked in."""
+        spin = None if pose.link == GROUND else self.parts[pose.link].spin
+        if spin is None:
+            return pose
+        turned = self._turn(spin)
+        return Pose(pose.link, turned @ pose.R, turned @ pose.p)
+
+    def _turn(self, spin: tuple[int | None, Any]) -> np.ndarray:
+        axis, angle = spin
+        return turn(self.algebra, [int(k == axis) for k in range(3)], angle)
 
 
 def _symmetric(I: np.ndarray) -> np.ndarray:

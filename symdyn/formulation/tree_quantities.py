@@ -1,4 +1,4 @@
-"""What a tree of links tells whatever the formulation: J, positions, energy, power, the user's outputs, joint forces."""
+"""What a tree of links tells whatever the formulation: its equations, J, positions, energy, power, the user's outputs."""
 
 from __future__ import annotations
 
@@ -7,21 +7,24 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.formulation import composite
+from symdyn.formulation.identification import Identification
+from symdyn.formulation.inertia_faults import demand_mass_matrix
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.loads import Loads
 from symdyn.formulation.motion import Motion
-from symdyn.formulation.newton_euler import inverse_dynamics, inward
+from symdyn.formulation.newton_euler import inverse_dynamics, inward, outward
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.model.bodies import Point
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, joint_speeds
-from symdyn.spatial.vectors import cross, inner, vector, zeros
+from symdyn.spatial.vectors import congruence, cross, inner, vector, zeros
 from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import is_zero
 
 
 class TreeQuantities(Motion):
-    """Records the quantities of a tree; a formulation adds the equations themselves."""
+    """Records the quantities of a tree; accelerations from the factorized mass matrix."""
 
     def __init__(self, tree: Tree) -> None:
         model = tree.model
@@ -31,13 +34,48 @@ class TreeQuantities(Motion):
         self.model = model
         self.loads = Loads(tree)
         self.kinematics = Kinematics(tree)
+        self.identification = Identification(tree, self.speed_rates)
+        self.notes: list[str] = []
+
+    def demand_inertia(self) -> None:
+        """Raise ModelError for speeds that move nothing at any state."""
+        demand_mass_matrix(self.model, self.algebra.recorder, self.recall("M_tilde"))
 
     def quantities(self) -> dict[str, Any]:
         """name -> function that records it."""
-        own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
+        own = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde, "J": self.J, "Jdot": self.Jdot,
+               "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
                "energy": self.energy, "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
-        return {**super().quantities(), **own}
+        return {**super().quantities(), **own, **self.identification.quantities()}
+
+    # -- the equations, joint by joint
+
+    def M_tilde(self) -> np.ndarray:
+        M = composite.mass_matrix(self.tree)
+        if self.tree.plain:
+            return self.algebra.name("M_tilde", M)
+        with self.algebra.section("mass matrix in the generalized speeds"):
+            return self.algebra.name("M_tilde", congruence(M, self.tree.D))
+
+    def bias(self) -> np.ndarray:
+        """k_tilde - F_tilde in one pass: the weight as acceleration of the base."""
+        applied = self.loads.applied()
+        tau = inverse_dynamics(self.tree, self.tree.b, -self.gravity(), applied.wrenches)
+        return self.algebra.name("k_minus_F", self.project(tau - applied.joint))
+
+    def inverse_dynamics(self) -> np.ndarray:
+        """M_tilde u_dot + k_tilde - F_tilde by one pass, without the mass matrix."""
+        applied = self.loads.applied()
+        w_dot = self.tree.D @ self.speed_rates + self.tree.b if len(self.tree.w) else self.tree.b
+        tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches)
+        return self.algebra.name("tau", self.project(tau - applied.joint))
+
+    def k_tilde(self) -> np.ndarray:
+        return self.algebra.name("k_tilde", self.project(inverse_dynamics(self.tree, self.tree.b, zeros(3))))
+
+    def F_tilde(self) -> np.ndarray:
+        return self.algebra.name("F_tilde", self.project(self.joint_forces(gravity=True)))
 
     # -- kinematics
 
@@ -101,14 +139,30 @@ class TreeQuantities(Motion):
 
     def _output(self, value: Any) -> Any:
         if isinstance(value, Point):
-            pose = self.loads.pose(value.body)
-            at = self.algebra.constants(value.at)
-            result = (self.kinematics.position(pose, at) if value.quantity == "position"
-                      else self.kinematics.velocity(pose, at))
-            return result[:2] if self.model.planar else result
+            return self._point(value)
         if isinstance(value, tuple):
             return self.algebra.constants(value)
         return self.algebra.expression(value)
+
+    def _point(self, point: Point) -> np.ndarray:
+        """What is asked of a point of a body, n-frame; see Point."""
+        kinematics = self.kinematics
+        pose, at = self.loads.pose(point.body), self.algebra.constants(point.at)
+        if point.quantity == "position":
+            rows = kinematics.position(pose, at)
+        elif point.quantity == "velocity":
+            rows = kinematics.velocity(pose, at)
+        elif point.quantity == "jacobian":
+            rows = kinematics.jacobian(pose, at)
+            rows = rows @ self.tree.D if rows.shape[1] else zeros(6, len(self.speeds))
+        elif point.quantity == "bias_acceleration":
+            rows = kinematics.acceleration(pose, at, kinematics.reference)
+        else:
+            w_dot = self.tree.D @ self.recall("accelerations") + self.tree.b
+            rows = kinematics.acceleration(pose, at, outward(self.tree, w_dot, zeros(3)))[:3]
+        if self.model.planar:
+            return rows[:2] if rows.shape == (3,) else rows[[0, 1, 5]]
+        return rows
 
     # -- forces along the speeds
 
@@ -125,9 +179,9 @@ class TreeQuantities(Motion):
             for k, link in enumerate(self.tree.links):
                 with self.algebra.section(f"link {link.name}: weight"):
                     turned.append(link.R.T @ (g if link.parent == GROUND else turned[link.parent]))
-                    f = link.inertia.m * turned[k]
+                    f = link.effective.m * turned[k]
                     force, moment = applied.wrenches[k]
-                    applied.wrenches[k] = (force + f, moment + cross(link.inertia.h, turned[k]))
+                    applied.wrenches[k] = (force + f, moment + cross(link.effective.h, turned[k]))
         return inward(self.tree, applied.wrenches) + applied.joint
 
     def project(self, tau: np.ndarray) -> np.ndarray:
@@ -140,7 +194,7 @@ def _gimbal_remarks(model: Model) -> dict[Any, str]:
     remarks: dict[Any, str] = {}
     for joint in model.joints:
         orientation = getattr(joint, "orientation", None)
-        if isinstance(orientation, EulerAngles):
+        if isinstance(orientation, EulerAngles) and not orientation.angular_velocity:
             remark = (f": the {orientation.sequence} angles of joint {joint.name} are at gimbal lock or very near it "
                       "(take another sequence, or EulerParameters)")
             remarks.update(dict.fromkeys(joint_speeds(joint)[-3:], remark))

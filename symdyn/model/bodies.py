@@ -28,10 +28,11 @@ class Body:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a body, as an output: its position or velocity.
+    """A point of a body, as an output; components in the inertial n-frame.
 
     at         (3,) position on the body, body axes, from its origin
-    quantity   "position" or "velocity"; components in the inertial n-frame
+    quantity   "position", "velocity" or "acceleration", (3,), planar (2,); "jacobian", (6, n_u), planar (3, n_u), or
+               "bias_acceleration", (6,), planar (3,): rows of the point's velocity first, then of the body's omega
     """
 
     body: Any
@@ -47,3 +48,24 @@ def position(body: Body, at: Any = (0, 0, 0)) -> Point:
 def velocity(body: Body, at: Any = (0, 0, 0)) -> Point:
     """The velocity of a point of a body in the n-frame, for `System.add_output`; m/s."""
     return Point(body, at, "velocity")
+
+
+def acceleration(body: Body, at: Any = (0, 0, 0)) -> Point:
+    """The acceleration of a point of a body in the n-frame, under all loads, for `System.add_output`; m/s^2."""
+    return Point(body, at, "acceleration")
+
+
+def jacobian(body: Body, at: Any = (0, 0, 0)) -> Point:
+    """J of a point of a body, (6, n_u), for `System.add_output`: [v; omega] = J u, and what given motion adds, n-frame.
+
+    Rows: velocity of the point, then angular velocity of the body; in a planar system v_x, v_y, omega_z, (3, n_u).
+    """
+    return Point(body, at, "jacobian")
+
+
+def bias_acceleration(body: Body, at: Any = (0, 0, 0)) -> Point:
+    """J_dot u of a point of a body, (6,), for `System.add_output`: [a; alpha] = J u_dot + J_dot u, rows as in `jacobian`.
+
+    What is left of the accelerations when u_dot = 0; given motion is part of it. m/s^2 and rad/s^2.
+    """
+    return Point(body, at, "bias_acceleration")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import keyword
 import math
-import re
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -16,7 +15,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body, Point
-from symdyn.model.faults import Faults
+from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint
 from symdyn.model.loads import Force, JointForce
 from symdyn.model.orientation import EulerParameters
@@ -27,10 +26,6 @@ from symdyn.model.uses import units_of, uses
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
-
-
-# Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
-_NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
 
 
 def check(system: System) -> Model:
@@ -109,7 +104,7 @@ class _Checker:
 
     def _spelling(self, what: str, names: Iterable[Any]) -> None:
         for name in names:
-            if not isinstance(name, str) or not _NAME.fullmatch(name):
+            if not isinstance(name, str) or not NAME.fullmatch(name):
                 self.faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
                                    "_ . , : + - * / ^ ' # % and brackets")
 
@@ -199,9 +194,8 @@ class _Checker:
         speeds: list[sp.Symbol] = []
         for joint in self.joints:
             independent = [isinstance(q, Coordinate) for q in joint.coordinates]
-            if joint.n_speeds != len(joint.coordinates) and not all(independent) and not joint.faults:
-                self.faults.append(f"joint {joint.name!r}: with Euler parameters every coordinate must be a symbol; "
-                                   "use Euler angles for a prescribed motion")
+            if joint.symbols_only and not all(independent) and not joint.faults:
+                self.faults.append(f"joint {joint.name!r}: {joint.symbols_only}")
             for place, q in enumerate(joint.coordinates):
                 if not isinstance(q, Coordinate):
                     continue
@@ -213,10 +207,10 @@ class _Checker:
                     continue
                 driver[q] = joint
                 coordinates.append(q)
-            if joint.n_speeds == len(joint.coordinates):
+            if not joint.symbols_only:
                 speeds += [u for u, free in zip(joint_speeds(joint), independent, strict=True) if free]
             else:
-                speeds += joint_speeds(joint)
+                speeds += [u for u in joint_speeds(joint) if u is not None]
         for q in dict.fromkeys(s.extra_coordinates):
             if q in driver:
                 self.faults.append(f"{q} was given to add_coordinate, but joint {driver[q].name!r} has it for its own; "
@@ -354,7 +348,7 @@ class _Checker:
             if name not in symbols:
                 self.faults.append(f"units has one for {name!r}, which is no symbol of the system"
                                    f"{self._nearest(name, symbols)}")
-            elif not isinstance(unit, str) or not _NAME.fullmatch(unit):
+            elif not isinstance(unit, str) or not NAME.fullmatch(unit):
                 self.faults.append(f"units: that of {name} is {unit!r}; pass text such as 'N m'")
             else:
                 units[symbols[name]] = unit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,9 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.symbols import as_expression
+
+# Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
+NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
 
 
 class Faults(list[str]):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.model.bodies import Body
-from symdyn.model.joints import Fixed, Joint, Planar, Prismatic, Revolute
+from symdyn.model.joints import Custom, Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
 
 
@@ -51,7 +51,11 @@ def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
             if any(abs(numeric(R[k])) > 1e-9 for k in (2, 5)):
                 faults.append(f"{where}: {what} turns out of the x-y plane, but the system is planar; "
                                    "turn about z only, or make the system spatial: planar=False")
-        if not isinstance(joint, (Revolute, Prismatic, Planar, Fixed)):
+        if isinstance(joint, Custom):
+            if joint.transform is not None and not joint.transform.in_plane:
+                faults.append(f"{where} (custom): its transform leaves the x-y plane, but the system is planar; turn about z "
+                              "and move in x and y only, or make the system spatial: planar=False")
+        elif not isinstance(joint, (Revolute, Prismatic, Planar, Fixed)):
             faults.append(f"{where} is {joint.kind}, but the system is planar; use Revolute, Prismatic, Planar or "
                                "Fixed, or make the system spatial: planar=False")
         elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in joint.axis[:2]):

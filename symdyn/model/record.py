@@ -10,7 +10,6 @@ import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Joint
-from symdyn.model.symbols import Coordinate, Speed
 
 
 @dataclass(frozen=True)
@@ -65,11 +64,5 @@ class Model:
 
 
 def joint_speeds(joint: Joint) -> tuple[Any, ...]:
-    """The symbols of a joint's speeds: given ones, else derivatives of coordinates, else omega by joint name."""
-    if joint.speeds is not None:
-        return joint.speeds
-    same = len(joint.coordinates) == joint.n_speeds
-    n_linear = joint.n_speeds if same else joint.n_speeds - 3
-    linear = [q.dot if isinstance(q, Coordinate) else None for q in joint.coordinates[:n_linear]]
-    angular = [] if same else [Speed(f"omega_{axis}_{joint.name}") for axis in "xyz"]
-    return (*linear, *angular)
+    """The symbols of a joint's speeds: given ones, else its own; None for that of a coordinate that is an expression."""
+    return joint.speeds if joint.speeds is not None else joint.default_speeds()

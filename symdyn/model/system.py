@@ -18,6 +18,8 @@ from symdyn.model.symbols import Coordinate, as_coordinate
 
 if TYPE_CHECKING:
     from symdyn.formulation.embedding import EmbeddedEquations
+    from symdyn.formulation.motion_equations import MotionEquations
+    from symdyn.formulation.recursion import RecursiveEquations
 
 ZERO = (0, 0, 0)
 
@@ -157,7 +159,7 @@ class System:
 
     def add_output(self, name: str, value: Any) -> None:
         """A named output: an expression in coordinates, speeds, states, inputs, t and parameters, a list of them, or
-        sd.position(body, point), sd.velocity(body, point)."""
+        a point of a body: sd.position, sd.velocity, sd.acceleration, sd.jacobian, sd.bias_acceleration(body, point)."""
         if isinstance(value, Point):
             at = self._faults.vector(value.at, f"output {name!r}: point", True)
             taken: Any = Point(value.body, tuple(at), value.quantity)
@@ -185,11 +187,40 @@ class System:
         """The checked, frozen model. Raises ModelError with every fault found."""
         return check(self)
 
-    def embedding(self) -> EmbeddedEquations:
-        """The embedded equations M_tilde u_dot + k_tilde = F_tilde. Raises ModelError with every fault found."""
+    def embedding(self, frames: str = "body") -> EmbeddedEquations:
+        """The embedded equations M_tilde u_dot + k_tilde = F_tilde: mass matrix by composite bodies, factorized.
+
+        frames   the axes that quantities are formed in: "body", each link's own, or "parallel", those of the link before
+                 where axes stay parallel
+        Raises ModelError with every fault found.
+        """
         from symdyn.formulation.embedding import embed
 
-        return embed(self.check())
+        return embed(self.check(), frames)
+
+    def recursive(self, frames: str = "body") -> RecursiveEquations:
+        """The recursive equations: inverse dynamics by Newton-Euler, accelerations by articulated bodies, both O(n).
+
+        frames   as for `embedding`
+        Raises ModelError with every fault found.
+        """
+        from symdyn.formulation.recursion import recursive
+
+        return recursive(self.check(), frames)
+
+    def equations(self, tune: bool = False) -> MotionEquations:
+        """The equations in the formulation that computes accelerations in the least predicted time.
+
+        tune   compile the candidates and time them, instead of predicting from their operations
+        The result's `candidates` tells what it was chosen from. Raises ModelError with every fault found.
+        """
+        from symdyn.choice import choose
+
+        return choose(self.check(), tune)
+
+    def compile(self, backend: str | None = None, tune: bool = False, **options: Any) -> Any:
+        """A numeric module of `equations(tune)`; see symdyn.pipeline.compile_equations for the backend and the options."""
+        return self.equations(tune).compile(backend, **options)
 
     def _declared(self, given: Any) -> tuple[sp.Symbol, ...]:
         listed = list(given) if hasattr(given, "__iter__") and not isinstance(given, str) else [given]

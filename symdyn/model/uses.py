@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.bodies import Point
-from symdyn.model.joints import Joint, Revolute
+from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.record import joint_speeds
 from symdyn.model.symbols import Coordinate, time
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
+
+# Unit of the force along a speed, by the speed's: their product is a power.
+_FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
 def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], bool]]:
@@ -24,9 +27,7 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
     for body in s.bodies:
         yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
     for joint in [*joints, *s.loops]:
-        constants = [*joint.parent_point, *joint.child_point, *joint.parent_rotation, *joint.child_rotation,
-                     *getattr(joint, "axis", []), *[e for axis in getattr(joint, "axes", []) for e in axis]]
-        yield f"joint {joint.name!r}", constants, True
+        yield f"joint {joint.name!r}", joint.constants, True
         yield (f"joint {joint.name!r}: coordinates",
                [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
     if s.ground_motion is not None:
@@ -68,10 +69,7 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True):
             if isinstance(q, Coordinate):
                 units[q] = unit
-        same = joint.n_speeds == len(joint.coordinates)
-        speed_units = [f"{u}/s" for u in joint.coordinate_units] if same else [
-            *["m/s"] * (joint.n_speeds - 3), *["rad/s"] * 3]
-        for speed, unit in zip(joint_speeds(joint), speed_units, strict=True):
+        for speed, unit in zip(joint_speeds(joint), joint.speed_units, strict=True):
             if speed is not None:
                 units[speed] = unit
     note(s.gravity, "m/s^2")
@@ -81,6 +79,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         note(body.inertia, "kg m^2")
     for joint in joints:
         note([*joint.parent_point, *joint.child_point], "m")
+        if isinstance(joint, Helical):
+            note([joint.pitch], "m/rad")
     for load in loads:
         if isinstance(load, Force):
             note(load.force, "N")
@@ -89,7 +89,9 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
             note(load.torque, "N m")
         elif isinstance(load, JointForce):
             driven = next((j for j in joints if load.joint in (j, j.name)), None)
-            note(load.values, "N m" if isinstance(driven, Revolute) else "N")
+            for value, unit in zip(load.values, () if driven is None else driven.speed_units, strict=False):
+                if unit in _FORCES:
+                    note([value], _FORCES[unit])
         elif isinstance(load, SpringDamper):
             note([load.stiffness], "N/m")
             note([load.damping], "N s/m")

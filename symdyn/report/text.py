@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from symdyn.choice import HEADING, Candidate
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.skipped import skipped
 
@@ -32,6 +33,7 @@ class Report:
     sizes: dict[str, int]
     rows: tuple[Row, ...]
     skipped: tuple[str, ...]
+    candidates: tuple[Candidate, ...] = ()
 
     def __str__(self) -> str:
         lines = [self.title, f"  backend {self.backend}" + (f": {self.fallback}" if self.fallback else "")]
@@ -44,6 +46,9 @@ class Report:
             lines.append(f"  {r.function:20}{r.total:>11}{kinds[0]:>7}{kinds[1]:>7}{kinds[2]:>5}{kinds[3]:>6}{other:>7}"
                          f"{r.prologue:>10}{r.chain:>15}")
         lines.append("  Every function is generated when it is first used, with nothing in it that it does not need.")
+        if self.candidates:
+            lines.append("  Chosen for the least time of its right-hand side:")
+            lines += [f"    {HEADING}", *(f"    {candidate}" for candidate in self.candidates)]
         lines.append("  Skipped:")
         lines += [f"    {note}" for note in self.skipped]
         return "\n".join(lines)
@@ -65,4 +70,4 @@ def report(equations: Equations, backend: str, fallback: str = "") -> Report:
     sizes = {"coordinates": len(s.coordinates), "speeds": len(s.speeds), "extra states": len(s.states),
              "inputs": len(s.inputs), "parameters": len(s.parameters)}
     return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
-                  tuple(skipped(equations)))
+                  tuple(skipped(equations)), equations.candidates)

@@ -53,6 +53,11 @@ def build(source: str, stem: str, compiler: Compiler) -> Path:
     return target
 
 
+def is_built(source: str, stem: str, compiler: Compiler) -> bool:
+    """Whether the shared library of this source is there already."""
+    return _target(source, stem, compiler).exists()
+
+
 def load(source: str, stem: str, compiler: Compiler) -> ctypes.CDLL:
     """The loaded library of this C source; a damaged file in the cache is built once more.
 

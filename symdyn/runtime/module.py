@@ -139,11 +139,12 @@ class Module:
                           for w in Jacobian._fields])
 
     def function(self, name: str) -> Callable[..., np.ndarray]:
-        """One function as f(q, u, params, t=0, inputs=()), of one state or of rows of states."""
+        """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states."""
         self._unit(name)
 
-        def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> np.ndarray:
-            return self.evaluate(name, t, self._state(q, u), params, inputs)
+        def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = (),
+                 ud: Any = ()) -> np.ndarray:
+            return self.evaluate(name, t, self._state(q, u), params, inputs, ud)
 
         return call
 

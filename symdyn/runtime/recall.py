@@ -23,26 +23,29 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 
 
-def recall(name: str, options: Mapping[str, Any], backend: str | None = None) -> Module:
+def recall(name: str, options: Mapping[str, Any], backend: str | None = None, formulation: str = "auto") -> Module:
     """The module of a system of the catalogue, from what is remembered of it as far as that goes.
 
-    backend   "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
+    backend       "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
+    formulation   "auto", "embedding" or "recursive"
     Raises what deriving and compiling the system raises.
     """
     compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
     chosen = backend or ("c" if compiler else "numpy")
-    memory = _Memory(name, options, chosen, compiler)
+    memory = _Memory(name, options, chosen, compiler, formulation)
     fallback = no_compiler_reason() if backend is None and compiler is None else ""
     return Module(memory.metadata, memory.unit, chosen, fallback, lambda folder: memory.derived.write(folder),
                   lambda: memory.derived.report())
 
 
 class _Memory:
-    """The record of one system with one backend."""
+    """The record of one system in one formulation with one backend."""
 
-    def __init__(self, name: str, options: Mapping[str, Any], backend: str, compiler: Compiler | None) -> None:
+    def __init__(self, name: str, options: Mapping[str, Any], backend: str, compiler: Compiler | None,
+                 formulation: str) -> None:
         self.name, self.options, self.backend, self.compiler = name, dict(options), backend, compiler
-        own = hashlib.sha256(repr((name, sorted(self.options.items()), backend)).encode()).hexdigest()[:16]
+        self.formulation = formulation
+        own = hashlib.sha256(repr((name, sorted(self.options.items()), backend, formulation)).encode()).hexdigest()[:16]
         self.path = cache.cache_dir() / f"{name}-{own}.json"
         self.state = _state_of_symdyn()
         self.record = self._read() or {"state": self.state, "metadata": dict(self.derived.metadata), "units": {}}
@@ -52,9 +55,10 @@ class _Memory:
     def derived(self) -> Module:
         """The module made from the description."""
         from symdyn import systems
+        from symdyn.choice import formulated
         from symdyn.pipeline import compile_equations
 
-        return compile_equations(systems.get(self.name, **self.options).embedding(), self.backend)
+        return compile_equations(formulated(systems.get(self.name, **self.options), self.formulation), self.backend)
 
     def unit(self, function: str) -> Unit:
         """A unit from the record, else a derived one, which is put into it."""

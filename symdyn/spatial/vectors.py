@@ -1,9 +1,8 @@
-"""Three-vectors and the inertia of a rigid body; arrays of nodes or of floats."""
+"""Three-vectors; arrays of nodes or of floats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,37 +54,3 @@ def congruence(M: np.ndarray, D: np.ndarray) -> np.ndarray:
         for j in range(i + 1):
             result[i, j] = result[j, i] = inner(D[:, i], half[:, j])
     return result
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Mass m, first moment h = m r_G and inertia I about the origin of the frame, (3, 3), in the frame's axes."""
-
-    m: Any
-    h: np.ndarray
-    I: np.ndarray
-
-    def __add__(self, other: Inertia) -> Inertia:
-        return Inertia(self.m + other.m, self.h + other.h, self.I + other.I)
-
-    def moved(self, R: np.ndarray, p: np.ndarray) -> Inertia:
-        """The same inertia seen from a frame in which this one has orientation R and origin p.
-
-        I' = R I R^T - [h'] [p] - [p] [h'] - m [p] [p] with h' = R h (parallel axes), symmetric entries once.
-        """
-        h = R @ self.h
-        rotated = R @ self.I
-        g = h + self.m * p
-        I = zeros(3, 3)
-        # -( [h][p] + [p][g] ) = (h.p + p.g) 1 - (p h^T + g p^T)
-        hp, pg = [h[k] * p[k] for k in range(3)], [p[k] * g[k] for k in range(3)]
-        both = [hp[k] + pg[k] for k in range(3)]
-        for i in range(3):
-            for j in range(i, 3):
-                turned = rotated[i, 0] * R[j, 0] + rotated[i, 1] * R[j, 1] + rotated[i, 2] * R[j, 2]
-                if i == j:
-                    a, b = (k for k in range(3) if k != i)
-                    I[i, i] = turned + (both[a] + both[b])
-                else:
-                    I[i, j] = I[j, i] = turned - (p[i] * h[j] + g[i] * p[j])
-        return Inertia(self.m, g, I)

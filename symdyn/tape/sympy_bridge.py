@@ -139,6 +139,8 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
             continue
         if node.op == "leaf":
             done[node] = symbols[node]
+        elif node.op == "select" and node in node.recorder.checks:
+            done[node] = done[node.args[1]]  # the code stops where it is the other branch
         else:
             done[node] = _expression(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
     entries = [done[e] if isinstance(e, Node) else number(e) for e in output.entries]

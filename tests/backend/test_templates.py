@@ -188,6 +188,10 @@ def test_file_that_the_dialect_names_is_missing(derived: Callable[..., Any], fol
     ("{name} = {value};", "{name} = {values};", "assign = 'const {name} = {values};' cannot be filled in"),
     ("({0} && {1})", "({0} && {3})", "operations.and = '({0} && {3})' cannot be filled in"),
     ("({0} && {1})", "{ {0} && {1} }", "braces are doubled"),
+    ("[operations]", "[sincos]\nleast = 2\ntake = ''\nsine = ''\ncos = ''\n[operations]",
+     "sincos.sin is missing; sincos.sine is not known"),
+    ("[operations]", "[sincos]\nleast = 2\ntake = '{angle}'\nsin = ''\ncos = ''\n[operations]",
+     "sincos.take = '{angle}' cannot be filled in ('angle'); it may use {n}, {angles}"),
 ])
 def test_broken_dialect(old: str, new: str, message: str, derived: Callable[..., Any], folder: Path) -> None:
     path = folder / "javascript" / "dialect.toml"

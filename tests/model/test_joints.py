@@ -67,6 +67,9 @@ JOINTS: dict[str, tuple[Make, Any, Any]] = {
     "cylindrical": (lambda *n, **p: sd.Cylindrical(*n, [a, x], **p), turn(2, a), [0, 0, x]),
     "cylindrical 3-4": (lambda *n, **p: sd.Cylindrical(*n, [a, x], axis=AXES["3-4"], **p), about(AXES["3-4"], a),
                         sp.Matrix(AXES["3-4"]) * x),
+    "helical": (lambda *n, **p: sd.Helical(*n, a, pitch=0.3, **p), turn(2, a), [0, 0, sp.Rational(3, 10) * a]),
+    "helical 1-2-2": (lambda *n, **p: sd.Helical(*n, a, axis=AXES["1-2-2"], pitch=-1 / sp.pi, **p), about(AXES["1-2-2"], a),
+                      -sp.Matrix(AXES["1-2-2"]) * a / sp.pi),
     "universal": (lambda *n, **p: sd.Universal(*n, [a, b], **p), turn(0, a) * turn(1, b), [0, 0, 0]),
     "universal skew": (lambda *n, **p: sd.Universal(*n, [a, b], axes=[AXES["3-4"], AXES["1-2-2"]], **p),
                        about(AXES["3-4"], a) * about(AXES["1-2-2"], b), [0, 0, 0]),
@@ -74,10 +77,23 @@ JOINTS: dict[str, tuple[Make, Any, Any]] = {
     "spherical": (lambda *n, **p: sd.Spherical(*n, [a, b, c], **p), sequence("ZYX"), [0, 0, 0]),
     **{f"spherical {s}": (lambda *n, s=s, **p: sd.Spherical(*n, [a, b, c], sd.EulerAngles(s), **p), sequence(s), [0, 0, 0])
        for s in SEQUENCES},
+    **{f"spherical {s} body": (lambda *n, s=s, **p: sd.Spherical(*n, [a, b, c], sd.EulerAngles(s, "body"), **p), sequence(s),
+                               [0, 0, 0]) for s in ("ZYX", "XZY", "ZXZ", "YZY")},
     "spherical parameters": (lambda *n, **p: sd.Spherical(*n, e, sd.EulerParameters(), **p), quaternion(), [0, 0, 0]),
     "free": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], **p), sequence("ZYX"), [x, y, z]),
     "free XZX": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], sd.EulerAngles("XZX"), **p), sequence("XZX"), [x, y, z]),
     "free parameters": (lambda *n, **p: sd.Free(*n, [x, y, z, *e], sd.EulerParameters(), **p), quaternion(), [x, y, z]),
+    "free body": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], velocity="body", **p), sequence("ZYX"), [x, y, z]),
+    "free YXY body": (lambda *n, **p: sd.Free(*n, [x, y, z, a, b, c], sd.EulerAngles("YXY", "body"), velocity="body", **p),
+                      sequence("YXY"), [x, y, z]),
+    "free parameters body": (lambda *n, **p: sd.Free(*n, [x, y, z, *e], sd.EulerParameters(), velocity="body", **p),
+                             quaternion(), [x, y, z]),
+    "custom on a parabola": (lambda *n, **p: sd.Custom(*n, [x], turn(2, sp.atan(2 * x)), [x, x**2, 0], **p),
+                             turn(2, sp.atan(2 * x)), [x, x**2, 0]),
+    "custom turned at zero": (lambda *n, **p: sd.Custom(*n, [a], turn(0, half) * turn(2, a + 1), [half, 2, 1], **p),
+                              turn(0, half) * turn(2, a + 1), [half, 2, 1]),
+    "custom 3": (lambda *n, **p: sd.Custom(*n, [a, x, b], turn(1, a) * turn(2, x * b), [sp.sin(a) * x, b * a, sp.exp(x)], **p),
+                 turn(1, a) * turn(2, x * b), [sp.sin(a) * x, b * a, sp.exp(x)]),
 }
 
 
@@ -160,25 +176,31 @@ def test_place_of_the_child(name: str) -> None:
 
 
 def test_unit_speeds(name: str) -> None:
-    """The speeds are the derivatives of the coordinates; with Euler parameters, the angular velocity in child axes."""
+    """The speeds are the derivatives of the coordinates, or components of velocity and angular velocity in child axes."""
     equations = mechanism(name, moving=False, place={})
     values = helpers.state(equations, 5)
     rates, J, frames = helpers.quantities(equations, values, "rates", "J", "frames")
-    speeds = [values[u.name] for u in equations.symbols.speeds]
+    coordinates, symbols = equations.symbols.coordinates, equations.symbols.speeds
+    speeds = np.array([helpers.number(values[u.name]) for u in symbols], dtype=object)
     R = frames[1, 3:].reshape(3, 3)
-    omega = R.T @ (J[9:] @ np.array([helpers.number(v) for v in speeds], dtype=object)) if speeds else np.zeros(3)
+    n = len(speeds)
+    if "parameters" in name or "body" in name:
+        n -= 3
+        assert [u.name for u in symbols[n:]] == [f"omega_{axis}_joint" for axis in "xyz"]
+        assert helpers.close(R.T @ (J[9:] @ speeds), speeds[n:])
     if "parameters" in name:
-        assert helpers.close(omega, np.array([helpers.number(v) for v in speeds[-3:]], dtype=object))
         with mpmath.workdps(40):
-            along = sum(values[s.name] * rate for s, rate in zip(equations.symbols.coordinates, rates, strict=True) if s in e)
+            along = sum(values[s.name] * rate for s, rate in zip(coordinates, rates, strict=True) if s in e)
         assert helpers.close(along, 0)
-        assert [u.name for u in equations.symbols.speeds[-3:]] == [f"omega_{axis}_joint" for axis in "xyz"]
-    else:
-        assert helpers.close(rates, np.array([helpers.number(v) for v in speeds], dtype=object)) if speeds else rates.size == 0
-        assert [u.name for u in equations.symbols.speeds] == [f"{q.name}_dot" for q in equations.symbols.coordinates]
+    if "free" in name and "body" in name:
+        n -= 3
+        assert [u.name for u in symbols[:3]] == [f"v_{axis}_joint" for axis in "xyz"]
+        assert helpers.close(R.T @ rates[:3], speeds[:3])
+    assert [u.name for u in symbols[:n]] == [f"{q.name}_dot" for q in coordinates[:n]]
+    assert helpers.close(rates[:n], speeds[:n]) if n else True
 
 
-@pytest.mark.parametrize("name", ["revolute z", "cylindrical", "planar", "free parameters"])
+@pytest.mark.parametrize("name", ["revolute z", "helical", "cylindrical", "planar", "free parameters", "free body", "custom 3"])
 def test_speeds_of_ones_own_names(name: str) -> None:
     s = sd.System("named", gravity=[0, 0, -9.81])
     box = s.add_body("box", mass=3, inertia=[2, 3, 4], com=[0.3, -0.1, 0.2])

@@ -238,6 +238,23 @@ def test_a_joint_away_from_both_origins_is_found() -> None:
     assert np.abs(drawing.lines[1][:, 0] - hinge).max() < 1e-6
 
 
+@pytest.mark.parametrize("joint", [lambda *n, **p: symdyn.Helical(*n, pitch=0.1, **p), symdyn.Cylindrical])
+def test_a_nut_slides_on_its_screw_wherever_their_origins_are(joint: Any) -> None:
+    system = symdyn.System("screw", gravity=[1, 0, -9.81])
+    nut = system.add_body("nut", mass=3, inertia=[2, 3, 4], com=[0.3, 0.1, 0.2])
+    system.add_joint(joint("thread", system.ground, nut, child_point=[0.2, 0.3, 0], parent_point=[0.1, 0.2, 0.3]))
+    drawing = Drawing.of(system.embedding().compile("numpy").simulate((0.0, 1.0)))
+    assert drawing is not None and list(drawing.sliders) == [0]
+
+
+def test_a_body_that_tumbles_is_on_no_screw() -> None:
+    system = symdyn.System("tumbling", gravity=[0, 0, -9.81])
+    body = system.add_body("body", mass=3, inertia=[2, 3, 4])
+    system.add_joint(symdyn.Free("float", system.ground, body, velocity="body", child_point=[0.2, 0.3, 0]))
+    drawing = Drawing.of(system.embedding().compile("numpy").simulate((0.0, 1.0), u=[1, 0, 0, 0.1, 2, 0.2]))
+    assert drawing is not None and not drawing.sliders and not len(drawing.pivots)
+
+
 def test_bodies_at_rest_are_drawn() -> None:
     solution = motion("pendulum").module.simulate((0.0, 1.0), q=[0.0])
     drawing = Drawing.of(solution)

@@ -48,6 +48,9 @@ class Joint:
 
     kind = ""
     coordinate_units: tuple[str, ...] = ()
+    # Whether R = 1 and d = 0 where every coordinate is zero, and a single rotation about a coordinate axis turns by its
+    # coordinate times its entry of S.
+    identity_at_zero = True
 
     def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None, speeds: Sequence[Any] | None,
                  parent_point: Any, child_point: Any, parent_rotation: Any, child_rotation: Any) -> None:
@@ -70,9 +73,29 @@ class Joint:
         raise NotImplementedError
 
     @property
+    def speed_units(self) -> tuple[str, ...]:
+        """Unit of each speed."""
+        return tuple(f"{unit}/s" for unit in self.coordinate_units)
+
+    @property
     def n_speeds(self) -> int:
         """Number of degrees of freedom."""
-        return len(self.coordinate_units)
+        return len(self.speed_units)
+
+    def default_speeds(self) -> tuple[sp.Symbol | None, ...]:
+        """Symbols of the speeds where none are given; None for that of a coordinate that is an expression."""
+        return tuple(q.dot if isinstance(q, Coordinate) else None for q in self.coordinates)
+
+    @property
+    def symbols_only(self) -> str:
+        """Why coordinates must be symbols, not expressions, and what else to do; "" where they need not."""
+        return ""
+
+    @property
+    def constants(self) -> list[sp.Expr]:
+        """Expressions of parameters that describe the joint."""
+        return [*self.parent_point, *self.child_point, *self.parent_rotation, *self.child_rotation,
+                *getattr(self, "axis", []), *[e for axis in getattr(self, "axes", []) for e in axis]]
 
     def rates(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> list[Any]:
         """Derivatives of the coordinates from the speeds, q_dot = N(q) u."""
@@ -85,7 +108,7 @@ class Joint:
         if given is None:
             ends = [""] if wanted == 1 else [f"_{k + 1}" for k in range(wanted)]
             given = [Coordinate(f"q_{self.name}{end}") for end in ends]
-        if not _listed(given):
+        if not listed(given):
             self.faults.append(f"joint {self.name!r}: coordinates is {given!r}; pass a list of {wanted}")
             given = [sp.S.Zero] * wanted
         given = list(given)
@@ -101,7 +124,7 @@ class Joint:
     def _speeds(self, given: Sequence[Any] | None) -> tuple[sp.Symbol, ...] | None:
         if given is None:
             return None
-        given = [as_coordinate(e) for e in given] if _listed(given) else given
+        given = [as_coordinate(e) for e in given] if listed(given) else given
         if not isinstance(given, list) or len(given) != self.n_speeds or not all(isinstance(e, sp.Symbol) for e in given):
             self.faults.append(f"joint {self.name!r} ({self.kind}) takes {self.n_speeds} symbols as speeds, found {given}")
             return None
@@ -134,7 +157,8 @@ class Joint:
         return f"{type(self).__name__}({self.name!r})"
 
 
-def _listed(value: Any) -> bool:
+def listed(value: Any) -> bool:
+    """Whether a value is a sequence of values."""
     return hasattr(value, "__iter__") and not isinstance(value, (str, bytes, dict))
 
 

@@ -39,7 +39,7 @@ def find_joints(poses: Sequence[tuple], ground: tuple, size: float) -> Iterator[
 def _joint(parent: tuple, child: tuple, size: float) -> tuple[np.ndarray, bool, float] | None:
     """Where two bodies meet: the shared point over time, whether they slide instead, the length of the connection.
 
-    None if they have no point in common throughout the motion, nor a straight way.
+    None if they have no point in common throughout the motion, nor a straight way, nor the axis of a screw.
     """
     n_t = len(parent[0])
     some = np.unique(np.linspace(0, n_t - 1, _SAMPLES).astype(int))
@@ -57,7 +57,22 @@ def _joint(parent: tuple, child: tuple, size: float) -> tuple[np.ndarray, bool, 
         miss = O + R @ a - o - r @ b
         if np.abs(miss).max() > tolerance:
             way = ahead - ahead.mean(axis=0)
-            if np.linalg.svd(way, compute_uv=False)[1] < tolerance:
+            if np.linalg.svd(way, compute_uv=False)[1] < tolerance or _on_a_screw(ahead, R, r, tolerance):
                 return parent[0], True, float(np.linalg.norm(ahead, axis=1).mean())
             return None
     return parent[0] + parent[1] @ a, False, float(np.linalg.norm(a))
+
+
+def _on_a_screw(ahead: np.ndarray, R: np.ndarray, r: np.ndarray, tolerance: float) -> bool:
+    """Whether a child with the origin `ahead`, (n, 3) in the parent's frame, turns about an axis fixed in the parent and
+    moves along it: then some points of it stay on that axis."""
+    Q = np.einsum("tji,tjk->tik", R, r)
+    _, size, axes = np.linalg.svd((Q @ Q[0].T - np.eye(3)).reshape(-1, 3), full_matrices=False)
+    if size[1] < 1e-6 or size[2] > 1e-6 * size[1]:
+        return False
+    across = axes[:2]
+    # across (Q b + ahead - a) = 0 for a point b of the child and a of the parent
+    left = np.concatenate([across @ Q, np.broadcast_to(-across, (len(Q), 2, 3))], axis=2).reshape(-1, 6)
+    right = -(ahead @ across.T).ravel()
+    solved = np.linalg.lstsq(left, right, rcond=1e-9)[0]
+    return bool(np.abs(left @ solved - right).max() < tolerance)

@@ -43,9 +43,11 @@ def _symbols(solution: Solution) -> Iterator[Panel]:
 
 
 def _outputs(solution: Solution) -> Iterator[Panel]:
-    """A panel for each output; components of points are named x, y, z, of other arrays by their place."""
+    """A panel for each output but matrices; components of points are named x, y, z, of other arrays by their place."""
     points = points_of(solution)
     for name, rows in solution.outputs.items():
+        if rows.ndim > 2:  # such as J of a point: too many curves to read
+            continue
         flat = rows.reshape(len(solution.t), -1)
         if name in points:
             labels = [f"{name} {axis}" for axis in "xyz"[:flat.shape[1]]]

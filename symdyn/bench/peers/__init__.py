@@ -1,0 +1,13 @@
+"""symdyn beside its peers on the same mechanisms, in one run: `symdyn bench peers`.
+
+    models        the mechanisms, with the bounds that symdyn is held to
+    description   a mechanism as plain text that the peers read
+    toolchain     headers, libraries and compilers, and what to install where they are missing
+    symdyn_peer, pinocchio_peer, casadi_peer   each one as a Contestant: n evaluations in a compiled loop
+    race          whether the contestants agree, and their times, measured side by side
+    contest       one mechanism: counts and times
+    table         rows, verdicts, text
+    command       all of it
+
+The peers are Pinocchio's articulated-body algorithm in C++, and the C code that CasADi generates from that algorithm.
+"""

@@ -1,0 +1,46 @@
+"""What takes part: evaluations of the accelerations at one state, in a compiled loop."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One that takes part.
+
+    run             run(n): n evaluations; one coordinate of each depends on the result of the one before, so latency counts
+    accelerations   (n_u,) derivatives of the speeds of the last evaluation, in symdyn's order of speeds
+    """
+
+    name: str
+    run: Callable[[int], None]
+    accelerations: Callable[[], np.ndarray]
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the accelerations are evaluated: q (n_q,) and u (n_u,) in symdyn's order.
+
+    fed   index of the coordinate that carries the result of an evaluation on to the next
+    """
+
+    q: np.ndarray
+    u: np.ndarray
+    fed: int = 0
+
+
+def address(array: np.ndarray) -> ctypes.c_void_p:
+    """An array as the argument of a C function; the array must outlive the call."""
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def unsorted(values: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
+    """Values in the order of a peer, in symdyn's; `order` holds symdyn's index of each."""
+    result = np.empty_like(values)
+    result[list(order)] = values
+    return result

@@ -1,0 +1,40 @@
+"""Pinocchio's articulated-body algorithm in C++."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from symdyn.bench.peers.contestant import Contestant, State, address, unsorted
+from symdyn.bench.peers.description import Description
+from symdyn.bench.peers.toolchain import SOURCES, build_cpp, include_flags, package_folder
+from symdyn.errors import SymdynError
+
+_ERROR_SIZE = 1000
+
+
+class PinocchioPeer:
+    """The compiled algorithm. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+
+    def __init__(self) -> None:
+        package_folder("pinocchio")
+        text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_aba.cpp"))
+        self.library = build_cpp("pinocchio_aba", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
+        self.library.aba_open.restype = ctypes.c_void_p
+
+    def contestant(self, description: Description, state: State) -> Contestant:
+        """The algorithm on a model in double precision, at a state."""
+        message = ctypes.create_string_buffer(_ERROR_SIZE)
+        values = description.values
+        opened = ctypes.c_void_p(self.library.aba_open(description.text.encode(), address(values), ctypes.c_long(len(values)),
+                                                       message, ctypes.c_long(_ERROR_SIZE)))
+        if not opened:
+            raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
+        q, u = state.q[list(description.q_order)], state.u[list(description.u_order)]
+        out, fed = np.zeros(len(u)), description.q_order.index(state.fed)
+
+        def run(n: int) -> None:
+            self.library.aba_loop(opened, ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(out))
+
+        return Contestant("pinocchio", run, lambda: unsorted(out, description.u_order))

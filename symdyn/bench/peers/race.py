@@ -1,0 +1,40 @@
+"""Contestants side by side: that they compute the same, and their times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symdyn.bench.kernel import best_times
+from symdyn.bench.peers.contestant import Contestant
+from symdyn.errors import SymdynError
+
+# Accelerations may differ by rounding times the condition number of the mass matrix; a wrong model differs by far more.
+AGREEMENT = 1e-7
+
+
+def agree(contestants: Sequence[Contestant], model: str) -> float:
+    """Largest difference of the contestants' accelerations from those of the first, relative to their norm.
+
+    Raises SymdynError if they do not compute the same.
+    """
+    for contestant in contestants:
+        contestant.run(1)
+    first, worst = contestants[0], 0.0
+    wanted = first.accelerations()
+    for other in contestants[1:]:
+        found = other.accelerations()
+        difference = float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        if not difference <= AGREEMENT:
+            raise SymdynError(f"{model}: {other.name} and {first.name} do not compute the same accelerations, {found} and "
+                              f"{wanted}: they differ by {difference:.2g} of their norm, more than {AGREEMENT:.0e}; look for a "
+                              "difference between the models that they were given")
+        worst = max(worst, difference)
+    return worst
+
+
+def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, float]:
+    """Seconds of one evaluation of each contestant, the best of its timings; they take turns."""
+    times = best_times([contestant.run for contestant in contestants], repeats)
+    return {contestant.name: time for contestant, time in zip(contestants, times, strict=True)}

@@ -1,0 +1,62 @@
+"""From a checked model to the equations of its tree: what the formulations of a tree share."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TypeVar
+
+import sympy as sp
+
+from symdyn.errors import ModelError, SymdynError
+from symdyn.formulation.algebra import TapeAlgebra, leaves_of
+from symdyn.formulation.equations import Symbols
+from symdyn.formulation.motion_equations import MotionEquations
+from symdyn.formulation.tree import Tree, build
+from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.model.joints import Fixed
+from symdyn.model.orientation import EulerParameters
+from symdyn.model.record import Model
+from symdyn.tape.recorder import Recorder
+
+FRAMES = ("body", "parallel")
+E = TypeVar("E", bound=MotionEquations)
+
+
+def derive_tree(model: Model, formulation: str, frames: str, derivation: type[TreeQuantities], result: type[E]) -> E:
+    """Equations of a tree, recorded on a tape of their own.
+
+    frames   "body": every link in its own axes; "parallel": in those of the link before where axes stay parallel
+    Raises ModelError for constraints and for speeds that move nothing, SymdynError for unknown frames.
+    """
+    if frames not in FRAMES:
+        raise SymdynError(f"frames {frames!r} asked for; there are {' and '.join(map(repr, FRAMES))}")
+    if model.constraints or model.loops:
+        count = len(model.constraints) + len(model.loops)
+        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: "
+                          "use system.augmented(), or remove them"], model.name)
+    recorder = Recorder()
+    algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
+    tree = build(model, algebra, frames == "parallel")
+    quantities = derivation(tree)
+    quantities.demand_inertia()
+    symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
+                      model.parameters, model.defaults, model.initial, model.units, model.duration)
+    return result(model.name, formulation, model.planar, symbols, recorder, algebra.leaves, quantities.quantities(),
+                  tuple(_notes(model, tree) + quantities.notes), _unit_groups(model),
+                  partial(derive_tree, model, formulation, frames, derivation, result),
+                  frames="parallel" if tree.parallel else "body", identification=quantities.identification)
+
+
+def _notes(model: Model, tree: Tree) -> list[str]:
+    notes = []
+    fixed = [j.name for j in model.joints if isinstance(j, Fixed)]
+    if fixed:
+        notes.append(f"fixed joints {', '.join(fixed)}: their bodies are merged with their parents before the derivation")
+    if tree.parallel:
+        notes.append(f"turning between links: the frames of {tree.parallel} links stay parallel to those before them")
+    return notes
+
+
+def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:
+    joints = [j for j in model.joints if isinstance(getattr(j, "orientation", None), EulerParameters)]
+    return tuple(tuple(j.coordinates[-4:]) for j in joints)

@@ -1,0 +1,44 @@
+"""The helical joint: a screw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from symdyn.model.joints.axis import AxisJoint
+from symdyn.model.joints.base import JointMotion, turn
+from symdyn.spatial.vectors import zeros
+
+
+class Helical(AxisJoint):
+    """Rotation by `coordinate` (rad) about `axis` and translation by pitch * coordinate along it.
+
+    axis    a unit vector in the joint frame, default z
+    pitch   m/rad, a number or an expression of parameters: the advance of one full turn over 2 pi; positive: a
+            right-handed screw
+    See Joint for the frames.
+    """
+
+    kind = "helical"
+    coordinate_units = ("rad",)
+    default_axis = (0, 0, 1)
+
+    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any = None, axis: Any = ..., pitch: Any = None,
+                 speed: Any = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
+                 child_rotation: Any = None) -> None:
+        super().__init__(name, parent, child, coordinate, axis, speed, parent_point, child_point, parent_rotation,
+                         child_rotation)
+        self.pitch = self.faults.expression(pitch, f"joint {name!r}: pitch (m/rad)")
+
+    @property
+    def constants(self) -> list[sp.Expr]:
+        return [*super().constants, self.pitch]
+
+    def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
+        axis, pitch = algebra.constants(self.axis), algebra.expression(self.pitch)
+        S = zeros(6, 1)
+        S[:3, 0] = axis
+        S[3:, 0] = axis * pitch
+        return JointMotion(turn(algebra, axis, s[0]), axis * (pitch * s[0]), S, zeros(6))

@@ -1,0 +1,185 @@
+"""`symdyn bench peers`: the contestants have the same models, verdicts are right, and what is missing is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symdyn import systems
+from symdyn.bench.peers import command, toolchain
+from symdyn.bench.peers.contest import Row, cases, contest, random_state
+from symdyn.bench.peers.contestant import Contestant, unsorted
+from symdyn.bench.peers.description import Description, describe
+from symdyn.bench.peers.models import CASES, Bound, turbine_tree
+from symdyn.bench.peers.race import agree, race
+from symdyn.bench.peers.table import heading, line, record, verdict
+from symdyn.cli import main
+from symdyn.errors import SymdynError
+from symdyn.runtime.compiler import find_compiler
+
+needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+def pinocchio_accelerations(description: Description, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """What the Python package of Pinocchio makes of a description, in symdyn's order."""
+    pin = pytest.importorskip("pinocchio")
+    model = pin.Model()
+
+    def number(word: str) -> float:
+        value = description.values[int(word.lstrip("-p"))] if "p" in word else abs(float(word))
+        return -value if word[0] == "-" else value
+
+    for words in map(str.split, description.text.splitlines()):
+        numbers = [number(word) for word in words[1:] if word[0] in "-p0123456789"]
+        if words[0] == "gravity":
+            model.gravity.linear = np.array(numbers)
+        elif words[0] == "joint":
+            kind = pin.JointModelSpherical() if words[2] == "S" else getattr(pin, f"JointModel{words[2]}")()
+            model.addJoint(int(numbers[0]), kind, pin.SE3(np.eye(3), np.array(numbers[1:])), f"joint{model.njoints}")
+        else:
+            joint, m, x, y, z, xx, xy, xz, yy, yz, zz = numbers
+            model.inertias[int(joint)] = pin.Inertia(m, np.array([x, y, z]), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    result = pin.aba(model, model.createData(), q[list(description.q_order)], u[list(description.u_order)], np.zeros(model.nv))
+    return unsorted(np.array(result), description.u_order)
+
+
+@pytest.mark.parametrize("name", ["n_link_pendulum(5)", "spatial_chain(4)", "turbine_tree", "turbine_tree_body_rates"])
+def test_description_is_the_model(name: str) -> None:
+    system = CASES[name].make()
+    equations, description = system.embedding(), describe(system.check())
+    state = random_state(equations)
+    x_dot = equations.compile(backend="numpy").rhs(0.0, np.concatenate([state.q, state.u]))
+    found = pinocchio_accelerations(description, state.q, state.u)
+    assert np.linalg.norm(found - x_dot[len(state.q):]) < 1e-11 * np.linalg.norm(found)
+
+
+def test_every_number_of_the_turbine_is_a_parameter() -> None:
+    text = describe(turbine_tree().check()).text
+    written_out = {word for line in text.splitlines() for word in line.split()[3 if line.startswith("joint") else 2:]
+                   if "p" not in word}
+    assert written_out == {"0"}
+    assert len(turbine_tree().check().parameters) == 19
+
+
+def test_what_peers_are_not_told() -> None:
+    with pytest.raises(SymdynError, match="has loads or a moving ground; peers are compared under gravity alone"):
+        describe(systems.cart_pole().check())
+    with pytest.raises(SymdynError, match="has turned frames or a place on its child"):
+        describe(systems.puma560().check())
+    with pytest.raises(SymdynError, match=r"no number for m1; add them to its defaults"):
+        system = systems.n_link_pendulum(n=2)
+        del system.defaults[next(p for p in system.defaults if p.name == "m1")]
+        describe(system.check())
+
+
+def row(**changes: Any) -> Row:
+    """A row that meets its bounds exactly, with some changes."""
+    given = {"operations": 100, "times": {"symdyn": 80.0, "casadi runtime": 100.0, "pinocchio": 480.0},
+             "bound": Bound(100, 0.80, 6.0), **changes}
+    return Row("mechanism", "embedding", prologue=10, chain=20, casadi_operations={"casadi baked": 120, "casadi runtime": 130},
+               difference=1e-15, **given)
+
+
+@pytest.mark.parametrize("changes, wanted", [
+    ({}, "MET"),
+    ({"operations": 101}, "MISSED: 101 operations > 100"),
+    ({"times": {"symdyn": 81.0, "casadi runtime": 100.0, "pinocchio": 486.0}}, "MISSED: symdyn/CasADi 0.81 > 0.80"),
+    ({"times": {"symdyn": 80.0, "casadi runtime": 100.0, "pinocchio": 472.0}}, "MISSED: Pinocchio/symdyn 5.9 < 6.0"),
+    ({"times": {"symdyn": 80.0}}, "MET, as far as it could be measured"),
+    ({"times": {"symdyn": 80.0}, "operations": 101}, "MISSED: 101 operations > 100"),
+    ({"bound": Bound()}, ""),
+])
+def test_verdict(changes: dict[str, Any], wanted: str) -> None:
+    measured = row(**changes)
+    assert verdict(measured).endswith(wanted) and bool(verdict(measured)) == bool(wanted)
+    assert bool(measured.misses()) == ("MISSED" in wanted)
+    assert record(measured)["missed"] == measured.misses()
+
+
+def test_columns_are_aligned() -> None:
+    above, titles = heading().splitlines()
+    cells = line(row())
+    assert above.rstrip().endswith("ratio of times")
+    for title, cell in (("chain", "20"), ("Pinocchio/symdyn", "6.0"), ("symdyn/CasADi", "0.80")):
+        assert titles[:titles.index(title) + len(title)].rstrip() == titles[:titles.index(title) + len(title)]
+        assert cells[:titles.index(title) + len(title)].endswith(cell)
+
+
+def counting(name: str, value: float, calls: list[str]) -> Contestant:
+    """A contestant that only notes its turns."""
+    return Contestant(name, lambda n: calls.append(name), lambda: np.array([value, 1.0]))
+
+
+def test_contestants_take_turns_and_must_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("symdyn.bench.kernel.TIMING_SECONDS", 0.0)
+    calls: list[str] = []
+    contestants = [counting("a", 1.0, calls), counting("b", 1.0 + 1e-9, calls)]
+    assert 0 < agree(contestants, "mechanism") < 1e-8
+    calls.clear()
+    assert set(race(contestants, 3)) == {"a", "b"}
+    assert calls[-6:] == ["a", "b"] * 3
+    with pytest.raises(SymdynError, match="mechanism: c and a do not compute the same accelerations"):
+        agree([*contestants, counting("c", 1.1, calls)], "mechanism")
+
+
+def test_names_of_cases() -> None:
+    assert list(cases(["spatial_chain", "turbine_tree"])) == [*[f"spatial_chain({n})" for n in (4, 6, 7, 12)], "turbine_tree"]
+    with pytest.raises(SymdynError, match=r"no benchmark model crane; there are n_link_pendulum\(5\)"):
+        cases(["crane"])
+
+
+@needs_c
+def test_without_peers(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    monkeypatch.setattr("symdyn.bench.peers.toolchain._installed", lambda name: None)
+    code = main(["bench", "peers", "--models", "turbine_tree", "--repeats", "1", "--json", str(tmp_path / "rows.json")])
+    printed = capsys.readouterr().out
+    assert printed.splitlines()[0] == ("the peers are not installed, symdyn is measured alone; "
+                                       "run: pip install 'symdyn[peers]'")
+    (found,) = json.loads((tmp_path / "rows.json").read_text())["models"]
+    assert code == bool(found["missed"]) and found["operations"] > 100
+    assert found["times"].keys() == {"symdyn"} and 0 < found["times"]["symdyn"] < 1e5
+    assert found["ratios"]["symdyn_over_casadi_runtime"] is None
+
+
+@needs_c
+def test_formulation_is_a_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def make(system: Any) -> Any:
+        asked.append(system.name)
+        return system.embedding()
+
+    assert contest("turbine_tree", CASES["turbine_tree"], [], 1, make).formulation == "embedding" and asked == ["turbine_tree"]
+
+
+def test_missing_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    with pytest.raises(SymdynError, match="compiler was found, tried no-such-compiler; install"):
+        toolchain.cpp_compiler([])
+
+
+@needs_c
+@pytest.mark.slow
+def test_counts_of_casadi() -> None:
+    """CasADi's operations for five links, parameters baked in, as published with the bounds; building takes a minute."""
+    pytest.importorskip("casadi")
+    pytest.importorskip("pinocchio")
+    found, notes = command.find_peers()
+    (casadi,) = [peer for peer in found if hasattr(peer, "forms")] or pytest.skip("; ".join(notes))
+    forms = {f.name: f for f in casadi.forms(describe(CASES["n_link_pendulum(5)"].make().check()))}
+    assert forms["casadi baked"].operations == 328
+    assert forms["casadi runtime"].operations == forms["casadi hoisted"].operations == 363
+
+
+def test_one_missing_peer_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> None:
+        raise SymdynError("gcc could not build it.\nCommand: c++\nSource kept at: x.c\nOutput:\n1: error: no\n2: error: nor that")
+
+    monkeypatch.setattr(command, "CasadiPeer", absent)
+    monkeypatch.setattr(command, "PinocchioPeer", lambda: "Pinocchio's peer")
+    assert command.find_peers() == (["Pinocchio's peer"], [
+        "CasADi is left out: gcc could not build it. 1: error: no Source kept at: x.c"])

@@ -1,0 +1,53 @@
+"""Reordering sums: same values, no more operations, shorter chains; names, checks and shared sums stay."""
+
+from __future__ import annotations
+
+import pytest
+
+import symdyn as sd
+from symdyn.tape import Tape
+from symdyn.tape import node as kinds
+from symdyn.tape.balance import balance
+from symdyn.tape.recorder import Recorder
+from tests import helpers
+
+
+@pytest.mark.parametrize(("name", "options", "formulation"), [
+    ("spatial_chain", {"n": 5}, "recursive"), ("spatial_chain", {"n": 5}, "embedding"), ("puma560", {}, "embedding"),
+    ("n_link_pendulum", {"n": 6}, "recursive"), ("cart_pole", {}, "embedding")])
+def test_same_values_shorter_chain(name: str, options: dict, formulation: str) -> None:
+    equations = getattr(sd.systems.get(name, **options), formulation)()
+    tape = equations.tape("rhs", "inverse_dynamics")
+    ours = balance(tape)
+    values = helpers.state(equations, 7)
+    before, after = helpers.at(tape, values), helpers.at(ours, values)
+    assert all(helpers.close(after[n], before[n]) for n in before)
+    assert ours.operations <= tape.operations and ours.longest_chain() <= tape.longest_chain()
+    assert {n.args[1] for n in ours.inputs} == {n.args[1] for n in tape.inputs}
+
+
+def test_what_is_ready_first_is_added_first() -> None:
+    r = Recorder()
+    a, b, c, d = (r.leaf(name, kinds.COORDINATE) for name in "abcd")
+    late = r.sin(a)
+    tape = Tape.of(r, y=[late + b - c + d])
+    assert tape.longest_chain() == 4
+    assert balance(tape).longest_chain() == 3  # b - c + d while the sine is computed
+
+
+def test_signs() -> None:
+    r = Recorder()
+    a, b, c, d = (r.leaf(name, kinds.COORDINATE) for name in "abcd")
+    tape = Tape.of(r, y=[-a - b - c - d, a - (b - (c - d)), -(a + b) * c, 1 - (a + b)])
+    values = dict(zip("abcd", (2, 3, 5, 7), strict=True))
+    assert list(helpers.at(balance(tape), values)["y"]) == [-17, -3, -25, -4] and balance(tape).operations == tape.operations
+
+
+def test_named_checked_and_shared_sums_stay() -> None:
+    r = Recorder()
+    a, b, c, d = (r.leaf(name, kinds.COORDINATE) for name in "abcd")
+    named, checked = r.name("kept", r.sin(a) + b), r.positive(r.cos(a) + c, "why")
+    shared = r.sin(b) + d
+    ours = balance(Tape.of(r, y=[named + c, d / checked, checked + d, shared + a, shared + c]))
+    assert list(ours.recorder.names.values()) == ["kept"] and list(ours.recorder.checks.values()) == ["why"]
+    assert ours.operations == 11
