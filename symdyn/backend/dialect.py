@@ -23,6 +23,7 @@ _OTHERS = """logical_and logical_or logical_not symdyn_sign let var function nul
 debugger instanceof angles sines cosines""".split()
 RESERVED = frozenset([*_C_WORDS, *_LIBRARY, *_OTHERS, *keyword.kwlist, *keyword.softkwlist])
 LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
+PARTS = ("whole", "longest", "load", "store")
 SINCOS = ("least", "take", "sin", "cos")
 
 
@@ -42,6 +43,21 @@ class SinCos:
 
 
 @dataclass(frozen=True)
+class Parts:
+    """How a long function is divided.
+
+    whole        functions of so many steps are not divided
+    longest      steps of a part, at most
+    load, store  what reads and what keeps value {k} of those that parts hand on
+    """
+
+    whole: int
+    longest: int
+    load: str
+    store: str
+
+
+@dataclass(frozen=True)
 class Dialect:
     """How one language writes numbers, operations and assignments.
 
@@ -51,6 +67,8 @@ class Dialect:
     first        index of the first entry of an array, 0 or 1
     comment      what a comment line begins with
     sincos       sines and cosines taken all at once; None where each is an operation like any other
+    parts        how long functions are divided; None if they are not
+    madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
 
     name: str
@@ -64,6 +82,8 @@ class Dialect:
     first: int = 0
     files: dict[str, str] | None = None
     sincos: SinCos | None = None
+    madd: str | None = None
+    parts: Parts | None = None
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -88,8 +108,9 @@ def read_dialect(folder: Path) -> Dialect:
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
-                                          "files") if key in table}
-    return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None)
+                                          "files", "madd") if key in table}
+    return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
+                   parts=Parts(**table["parts"]) if "parts" in table else None)
 
 
 def _check_formats(path: Path, table: dict[str, Any]) -> None:
@@ -99,6 +120,7 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         ("assign", table["assign"], {"name": "a", "value": "b"}), ("store", table["store"], {"k": 0, "value": "a"}),
         ("check", table["check"], {"name": "a", "code": 1}), ("literal", table.get("literal", ""), {"value": 1.0}),
         *[(f"load.{group}", text, {"k": 0}) for group, text in table["load"].items()],
+        *[("operations.madd", table["madd"], {}) for _ in range("madd" in table)],
         *[(f"operations.{op}", text, {}) for op, text in table["operations"].items()],
         *[(f"files.{template}", text, {"name": "a"}) for template, text in table["files"].items()]]
     faults = [f"load.{group} is missing" for group in LOADED if group not in table["load"]]
@@ -108,6 +130,12 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         faults += [f"sincos.{key} is not known" for key in sincos if key not in SINCOS]
         trials += [(f"sincos.{key}", sincos[key], {"n": 1, "angles": "a"} if key == "take" else {"k": 0})
                    for key in ("take", "sin", "cos") if key in sincos]
+    if "parts" in table:
+        parts = table["parts"]
+        faults += [f"parts.{key} is missing" for key in PARTS if key not in parts]
+        faults += [f"parts.{key} is not known" for key in parts if key not in PARTS]
+        trials += [(f"parts.{key}", parts[key], {"k": 0, "value": "a"} if key == "store" else {"k": 0})
+                   for key in ("load", "store") if key in parts]
     for key, text, given in trials:
         try:
             text.format(*arguments if key.startswith("operations.") else (), **given)

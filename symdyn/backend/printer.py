@@ -57,6 +57,10 @@ class Printer:
         custom = self.dialect.operations.get(op)
         if custom is not None:
             return custom.format(*[self._text(a)[0] for a in args]), _ATOM
+        if op in ("add", "sub") and self.dialect.madd is not None:
+            fused = self._fused(args[0], args[1], op == "sub")
+            if fused:
+                return fused, _ATOM
         if op == "add":
             first, second = args
             if not isinstance(first, Node):
@@ -73,6 +77,20 @@ class Printer:
         if op in _COMPARE:
             return f"({self._text(args[0])[0]} {_COMPARE[op]} {self._text(args[1])[0]})", _ATOM
         return f"{op}({', '.join(self._text(a)[0] for a in args)})", _ATOM
+
+    def _fused(self, first: Any, second: Any, minus: bool) -> str:
+        """a*b + c, a*b - c or c - a*b in one step, where a product is written nowhere else; else nothing.
+
+        Of two products the one recorded later is taken, which is likely to be known later.
+        """
+        assert self.dialect.madd is not None
+        for product, other, negated, subtracted in ((second, first, minus, False), (first, second, False, minus)):
+            if isinstance(product, Node) and product.op == "mul" and product in self.inline:
+                a, b = product.args
+                left = self._negative(a)[0] if negated else self._text(a)[0]
+                rest = self._negative(other) if subtracted else self._text(other)
+                return self.dialect.madd.format(left, self._text(b)[0], rest[0])
+        return ""
 
     def _infix(self, sign: str, left: Any, right: Any, strength: int) -> tuple[str, int]:
         first, binds = self._text(left)

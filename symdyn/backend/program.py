@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
 from typing import Any
 
 from symdyn.backend.dialect import Dialect, identifier
+from symdyn.backend.divide import divide
 from symdyn.backend.printer import Printer
 from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
 from symdyn.tape.tape import Tape, reachable, unsigned
 
 GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
+ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
 _INLINE_LENGTH = 72
 
 
@@ -25,11 +29,26 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Part:
+    """A stretch of a long function, a function of its own: compilers take more than linear time for one function.
+
+    arguments   groups it reads, of t q u z ud inputs p c, in this order; it also gets w, which holds what parts hand on
+    results     statements that keep values in w; of the last part, those that store the function's result
+    """
+
+    arguments: tuple[str, ...]
+    loads: tuple[str, ...]
+    sections: tuple[Section, ...]
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Function:
     """One function of the generated module.
 
     arguments   groups it reads, of t q u z ud inputs p c, in this order
     shape       of its result; loads, sections, results: statements in the dialect
+    parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
     """
 
     name: str
@@ -41,6 +60,8 @@ class Function:
     results: tuple[str, ...]
     operations: Mapping[str, int]
     longest_chain: int
+    parts: tuple[Part, ...] = ()
+    n_w: int = 0
 
     @property
     def size(self) -> int:
@@ -82,21 +103,49 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
         [*reasons, *_checks(whole, whole.steps).values()]))}
     used = set(_cores([a for n in whole.running for a in n.args] + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.hoisted if n in used)}
-    functions = tuple(_Writer(dialect, tape, places, constants, codes).function(name, titles[name])
-                      for name, tape in tapes.items())
+    hoisted = {node: ("c", k) for node, k in constants.items()}
+    functions = tuple(_function(dialect, tape, places, hoisted, codes, name, titles[name]) for name, tape in tapes.items())
     prologue = _Writer(dialect, whole, places, {}, codes).prologue(constants)
     return Program(functions, prologue, len(constants), tuple(codes))
 
 
+def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
+              codes: Mapping[str, int], name: str, title: str) -> Function:
+    """One function, in parts if it is long and the dialect divides long ones."""
+    output = next(iter(tape.outputs.values()))
+    body = [n for n in tape.running if n not in hoisted]
+    if dialect.parts is None or len(body) <= dialect.parts.whole:
+        writer = _Writer(dialect, tape, places, hoisted, codes)
+        part = writer.part(body, output.entries, writer.results_of(output.entries))
+        return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, tape.count(),
+                        tape.longest_chain())
+    parts: list[Part] = []
+    earlier: dict[Node, tuple[str, int]] = {}
+    stretches, slots, n_w = divide(body, output.entries, dialect.parts.longest)
+    for k, (stretch, kept) in enumerate(stretches):
+        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes)
+        if k == len(stretches) - 1:
+            parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries)))
+        else:
+            parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots)))
+        earlier |= {node: ("w", slots[node]) for node in kept}
+    groups = {g for part in parts for g in part.arguments}
+    return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), tape.count(),
+                    tape.longest_chain(), tuple(parts), n_w)
+
+
 class _Writer:
-    """Writes one function: decides which nodes get a variable, and in which words."""
+    """Writes one function or part of one: decides which nodes get a variable, and in which words.
+
+    stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, place)
+    """
 
     def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
-                 constants: Mapping[Node, int], codes: Mapping[str, int]) -> None:
+                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int]) -> None:
         self.dialect = dialect
         self.tape = tape
         self.places = places
-        self.constants = constants
+        self.stored = stored
         self.codes = codes
         self.names = tape.recorder.names
         self.checks: Mapping[Node, str] = {}
@@ -108,29 +157,33 @@ class _Writer:
         self.groups: set[str] = set()
         self.n_unnamed = 0
 
-    def function(self, name: str, title: str) -> Function:
-        output = next(iter(self.tape.outputs.values()))
-        body = [n for n in self.tape.running if n not in self.constants]
-        self.checks = _checks(self.tape, body)
-        self._count(body, output.entries)
-        # Only what the sines and cosines need is read before them: whatever else is has to wait in registers.
+    def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]]) -> Part:
+        """Statements for the steps of `body`, of which `entries` are used afterwards."""
+        self.checks = _checks(self.tape, self.tape.running)
+        self._count(body, entries)
+        # Only what the sines and cosines need is read before them; anything else would wait in registers, or be spilled.
         at_once = self._at_once(body)
         needed = set(reachable(at_once)).difference(at_once)
         before = [n for n in body if n in needed]
         loads = self._read([*before, *at_once])
         sections = self._statements(before) + self._sines_and_cosines(at_once)
-        rest = [n for n in body if n not in self.text]
-        others = self._read(rest, output.entries)
-        if not at_once:
-            loads = others
-        elif others:
+        sections += self._statements([n for n in body if n not in self.text])
+        others = self._read((), entries)
+        if others:
             sections.append(Section("the other arguments", tuple(others)))
-        sections += self._statements(rest)
-        results = tuple(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
-                        for k, e in enumerate(output.entries))
-        order = [g for g in ("t", "q", "u", "z", "ud", "inputs", "p", "c") if g in self.groups]
-        return Function(name, title, output.shape, tuple(order), tuple(loads), tuple(sections), results,
-                        self.tape.count(), self.tape.longest_chain())
+        written = results()
+        return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), written)
+
+    def results_of(self, entries: Sequence[Any]) -> Callable[[], tuple[str, ...]]:
+        """What stores the entries as result, once their text is known."""
+        return lambda: tuple(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
+                             for k, e in enumerate(entries))
+
+    def keep(self, nodes: Sequence[Node], slots: Mapping[Node, int]) -> tuple[str, ...]:
+        """What keeps values for later parts."""
+        assert self.dialect.parts is not None
+        return tuple(self.dialect.parts.store.format(k=slots[n] + self.dialect.first, value=self.printer.text(n))
+                     for n in nodes)
 
     def prologue(self, constants: Mapping[Node, int]) -> Function:
         """The function that computes the constants c from the parameters p."""
@@ -143,8 +196,7 @@ class _Writer:
                 if core.op == "leaf" and core not in self.text:
                     self._load(core, loads)
         sections = self._statements(body)
-        results = tuple(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(node))
-                        for node, k in constants.items())
+        results = self.results_of(tuple(constants))()
         return Function("prologue", "constants: everything that depends on parameters only", (len(constants),),
                         tuple(g for g in ("p",) if g in self.groups), tuple(loads), tuple(sections), results,
                         self.tape.count_prologue(), 0)
@@ -154,16 +206,18 @@ class _Writer:
     def _read(self, body: Sequence[Node], entries: Sequence[Any] = ()) -> list[str]:
         """Reads the leaves and constants among the arguments of these steps and the entries that are not read yet."""
         used = dict.fromkeys(core for values in [*[n.args for n in body], entries] for core in _cores(values)
-                             if core not in self.text)
+                             if core not in self.text and (core.op == "leaf" or core in self.stored))
         lines: list[str] = []
         for leaf in sorted((n for n in used if n.op == "leaf"),
                            key=lambda n: (list(GROUPS).index(n.mask), self.places[n.args[1]][1])):
             self._load(leaf, lines)
-        for node in sorted((n for n in used if n in self.constants), key=lambda n: self.constants[n]):
-            self.groups.add("c")
-            self.text[node] = identifier(self.names.get(node, f"k{self.constants[node] + 1}"), self.taken)
-            value = self.dialect.load["c"].format(k=self.constants[node] + self.dialect.first)
-            lines.append(self.dialect.assign.format(name=self.text[node], value=value))
+        for node in sorted((n for n in used if n in self.stored), key=lambda n: self.stored[n]):
+            group, place = self.stored[node]
+            self.groups.add(group)
+            unnamed = f"k{place + 1}" if group == "c" else f"w{place + 1}"
+            self.text[node] = identifier(self.names.get(node, unnamed), self.taken)
+            load = self.dialect.load["c"] if group == "c" else self.dialect.parts.load  # type: ignore[union-attr]
+            lines.append(self.dialect.assign.format(name=self.text[node], value=load.format(k=place + self.dialect.first)))
         return lines
 
     def _load(self, leaf: Node, lines: list[str]) -> None:
@@ -216,18 +270,22 @@ class _Writer:
         self.results = set(_cores(entries))
 
     def _statements(self, body: Sequence[Node]) -> list[Section]:
-        sections: list[tuple[str, list[str]]] = []
-        for node in body:
-            named = node in self.names and node not in self.results
-            value = self.printer.operation(node)
-            if self.uses[node] <= 1 and not named and node not in self.checks and len(value) <= _INLINE_LENGTH:
-                self.text[node] = value
-                self.printer.inline.add(node)
-                continue
-            if not sections or sections[-1][0] != node.section:
-                sections.append((node.section, []))
-            self._assign(node, self._name(node), value, sections[-1][1])
-        return [Section(title, tuple(lines)) for title, lines in sections]
+        """Sections of statements; each begins with the arguments that are first needed there."""
+        sections: list[Section] = []
+        for title, group in groupby(body, key=lambda node: node.section):
+            nodes = list(group)
+            lines = self._read(nodes)
+            for node in nodes:
+                named = node in self.names and node not in self.results
+                value = self.printer.operation(node)
+                if self.uses[node] <= 1 and not named and node not in self.checks and len(value) <= _INLINE_LENGTH:
+                    self.text[node] = value
+                    self.printer.inline.add(node)
+                else:
+                    self._assign(node, self._name(node), value, lines)
+            if lines:
+                sections.append(Section(title, tuple(lines)))
+        return sections
 
     def _name(self, node: Node) -> str:
         known = self.names.get(node)

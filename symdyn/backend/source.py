@@ -15,7 +15,7 @@ import jinja2
 
 import symdyn
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
-from symdyn.backend.program import Function, Program, build
+from symdyn.backend.program import Function, Part, Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.errors import SymdynError
 from symdyn.tape.tape import Tape
@@ -135,6 +135,12 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     def signature(f: Function) -> str:
         return ", ".join([_C_TYPE[g] for g in f.arguments] + ["double *out"])
 
+    def part_signature(part: Part) -> str:
+        return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
+
+    def part_call(part: Part) -> str:
+        return "".join(f"{g}, " for g in part.arguments)
+
     def state(argument: str, base: str) -> str:
         offset = {"q": 0, "u": sizes["q"], "z": sizes["q"] + sizes["u"]}.get(argument)
         return argument if offset is None else base if offset == 0 else f"{base} + {offset}"
@@ -161,14 +167,15 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "n_c": program.n_c, "operations": {f.name: f.count for f in program.functions},
         "arguments": {f.name: list(f.arguments) for f in program.functions},
     }
-    text = repr([(f.name, f.loads, f.sections, f.results) for f in (*program.functions, program.prologue)])
+    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*program.functions, program.prologue)])
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
         "hash": hashlib.sha256(text.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
-        "n_in": sizes["inputs"], "signature": signature, "rows_call": rows_call, "shape_text": _shape_text,
+        "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
+        "uses_parts": any(f.parts for f in program.functions), "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},

@@ -100,9 +100,13 @@ class Tree:
         return result
 
 
-def build(model: Model, algebra: TapeAlgebra, aligned: bool = False) -> Tree:
-    """The tree of a model; aligned: with parallel frames where axes stay parallel."""
-    return _Builder(model, algebra, aligned).tree()
+def build(model: Model, algebra: TapeAlgebra, aligned: bool = False, grouped: bool = True) -> Tree:
+    """The tree of a model.
+
+    aligned   parallel frames where axes stay parallel
+    grouped   False: `effective` inertias are the links' own, to measure what grouping is worth
+    """
+    return _Builder(model, algebra, aligned, grouped).tree()
 
 
 @dataclass
@@ -135,8 +139,9 @@ class _Part:
 
 
 class _Builder:
-    def __init__(self, model: Model, algebra: TapeAlgebra, aligned: bool) -> None:
+    def __init__(self, model: Model, algebra: TapeAlgebra, aligned: bool, grouped: bool) -> None:
         self.model = model
+        self.grouped = grouped
         self.algebra = algebra
         self.aligned = aligned
         self.parts: list[_Part] = []
@@ -233,7 +238,8 @@ class _Builder:
                 part.effective = part.inertia
             for k in reversed(range(len(self.parts))):
                 part = self.parts[k]
-                piece = unmoved(part.motion.S, part.effective) if part.joint.identity_at_zero else Inertia.none()
+                regular = self.grouped and part.joint.identity_at_zero
+                piece = unmoved(part.motion.S, part.effective) if regular else Inertia.none()
                 part.effective = part.effective - piece
                 if part.parent != GROUND:
                     outer = self.parts[part.parent]

@@ -18,7 +18,7 @@ pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip in
 from tests.oracles.pinocchio import CannotExpress, PinocchioOracle
 
 # Methods of System that derive its equations.
-FORMULATIONS = ("embedding",)
+FORMULATIONS = ("embedding", "recursive")
 TOLERANCE = 1e-12
 STATES = 3
 TREES = 50

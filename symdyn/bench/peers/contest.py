@@ -17,6 +17,7 @@ from symdyn.bench.peers.symdyn_peer import symdyn_contestant
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
+from symdyn.pipeline import function_tape
 from symdyn.tape.tape import Tape
 
 SEED = 20
@@ -27,6 +28,7 @@ class Row:
     """What was measured of one mechanism.
 
     formulation       of symdyn's equations; operations, prologue, chain: of its right-hand side
+    leanest           operations of the candidate with the fewest, of which the fastest was taken
     times             contestant -> ns of one evaluation; casadi_operations: form -> count
     difference        of the accelerations, relative to their norm, the largest between contestants
     """
@@ -34,6 +36,7 @@ class Row:
     model: str
     formulation: str
     operations: int
+    leanest: int
     prologue: int
     chain: int
     times: dict[str, float]
@@ -51,8 +54,8 @@ class Row:
         """Bounds that are missed, in words; what was not measured misses nothing."""
         casadi, pinocchio = self.over("symdyn", "casadi runtime"), self.over("pinocchio", "symdyn")
         b, found = self.bound, []
-        if b.operations is not None and self.operations > b.operations:
-            found.append(f"{self.operations} operations > {b.operations}")
+        if b.operations is not None and self.leanest > b.operations:
+            found.append(f"{self.leanest} operations > {b.operations}")
         if b.ratio is not None and casadi is not None and casadi > b.ratio:
             found.append(f"symdyn/CasADi {casadi:.2f} > {b.ratio:.2f}")
         if b.pinocchio is not None and pinocchio is not None and pinocchio < b.pinocchio:
@@ -85,8 +88,9 @@ def contest(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], 
             contestants.append(peer.contestant(description, state))
     difference = agree(contestants, name)
     times = {who: seconds * 1e9 for who, seconds in race(contestants, repeats).items()}
-    tape = equations.tape("rhs")
-    return Row(name, equations.formulation, tape.operations, sum(tape.count_prologue().values()), tape.longest_chain(), times,
+    tape = function_tape(equations, "rhs")
+    leanest = min([tape.operations, *[c.operations for c in equations.candidates]])
+    return Row(name, equations.formulation, tape.operations, leanest, sum(tape.count_prologue().values()), tape.longest_chain(), times,
                counts, difference, case.bound)
 
 

@@ -1,0 +1,72 @@
+"""Divides a long sequence of steps into stretches, and finds places for what one stretch hands on to later ones."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from symdyn.tape.node import Node
+from symdyn.tape.tape import unsigned
+
+Stretch = tuple[list[Node], list[Node]]
+
+
+def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[list[Stretch], dict[Node, int], int]:
+    """Stretches of `body`, each with the nodes that later ones or the entries need; the place of each such node; their number.
+
+    A stretch ends with a section where it can, and has at most `longest` steps. A place is used again once the last stretch
+    that reads it is over.
+    """
+    stretches = _stretches(_products_beside_their_sums(body, entries), longest)
+    where = {node: k for k, stretch in enumerate(stretches) for node in stretch}
+    last_use: dict[Node, int] = {}
+    for k, stretch in enumerate(stretches):
+        for node in stretch:
+            for a in node.args:
+                core = unsigned(a)
+                if where.get(core, k) != k:
+                    last_use[core] = k
+    for e in entries:
+        core = unsigned(e)
+        if where.get(core, len(stretches) - 1) != len(stretches) - 1:
+            last_use[core] = len(stretches) - 1
+    slots: dict[Node, int] = {}
+    free: list[int] = []
+    count = 0
+    result: list[Stretch] = []
+    for k, stretch in enumerate(stretches):
+        kept = [node for node in stretch if node in last_use]
+        for node in kept:
+            if free:
+                slots[node] = free.pop()
+            else:
+                slots[node], count = count, count + 1
+        free += sorted((slots[node] for node in slots if last_use[node] == k), reverse=True)
+        result.append((stretch, kept))
+    return result, slots, count
+
+
+def _products_beside_their_sums(body: Sequence[Node], entries: Sequence[Any]) -> list[Node]:
+    """The steps with each product that only one sum needs just before that sum, so that both become one operation."""
+    uses = Counter(unsigned(a) for values in [*[n.args for n in body], entries] for a in values)
+    steps = set(body)
+    late = {unsigned(a) for node in body if node.op in ("add", "sub") for a in node.args
+            if uses[unsigned(a)] == 1 and unsigned(a) in steps and unsigned(a).op == "mul"}
+    ordered: list[Node] = []
+    for node in body:
+        if node not in late:
+            ordered += [unsigned(a) for a in node.args if unsigned(a) in late]
+            ordered.append(node)
+    return ordered
+
+
+def _stretches(body: Sequence[Node], longest: int) -> list[list[Node]]:
+    stretches: list[list[Node]] = [[]]
+    for node in body:
+        current = stretches[-1]
+        ends = len(current) >= longest // 2 and current[-1].section != node.section
+        if ends or len(current) >= longest:
+            stretches.append([])
+        stretches[-1].append(node)
+    return stretches
