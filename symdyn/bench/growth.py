@@ -10,24 +10,27 @@ from pathlib import Path
 
 import numpy as np
 
-from symdyn.bench.kernel import evaluation_time
+from symdyn.bench.kernel import evaluation_times
 from symdyn.bench.random_tree import random_tree
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
-from symdyn.pipeline import emit
+from symdyn.pipeline import emit, function_tape
+from symdyn.runtime import cache
+from symdyn.runtime.compiler import require_compiler
 from symdyn.systems import get
 
 SIZES = (2, 3, 4, 5, 7, 10, 14, 20, 30, 50, 70, 100)
 FORMULATIONS = ("embedding", "recursive")
-# Beyond this many operations the mass matrix is not compiled any more: it has lost long before.
-LARGEST_EMBEDDING = 40_000
+# Sizes after one with more operations than this are left to the recursion: the mass matrix has lost long before.
+LARGEST_EMBEDDING = 50_000
 HEADING = (f"{'n':>5} {'formulation':12}{'operations':>11}{'longest chain':>15}{'derive s':>10}{'C bytes':>10}{'compile s':>11}"
            f"{'evaluation us':>15}")
 
 
 @dataclass(frozen=True)
 class Growth:
-    """One size in one formulation; seconds of derivation with emission and of the first use (compilation and loading)."""
+    """One size in one formulation: exact counts, seconds of derivation with emission, bytes of C, seconds of compilation and of
+    one evaluation."""
 
     n: int
     formulation: str
@@ -53,28 +56,39 @@ def grow(make: Callable[[int], System] = chain, sizes: Sequence[int] = SIZES,
     """Measure size after size; a formulation that gets too long is left out from there on."""
     going = list(formulations)
     for n in sizes:
-        for formulation in list(going):
-            row = _measure(make(n), n, formulation)
+        for row in measure(make(n), n, going):
             yield row
-            if formulation == "embedding" and row.operations > LARGEST_EMBEDDING / 2:
-                going.remove(formulation)
+            if row.formulation == "embedding" and row.operations > LARGEST_EMBEDDING:
+                going.remove("embedding")
 
 
-def _measure(system: System, n: int, formulation: str) -> Growth:
+def measure(system: System, n: int, formulations: Sequence[str]) -> list[Growth]:
+    """The formulations of one system, their evaluations timed side by side."""
+    derived = [_derive(system, formulation) for formulation in formulations]
+    times = evaluation_times([equations for equations, _, _ in derived], repeats=20)
+    rows = []
+    for formulation, (equations, seconds, text), time in zip(formulations, derived, times, strict=True):
+        tape = function_tape(equations, "rhs")
+        rows.append(Growth(n, formulation, tape.operations, tape.longest_chain(), seconds, len(text), _compile(text), time))
+    return rows
+
+
+def _derive(system: System, formulation: str) -> tuple[Equations, float, str]:
+    """Equations, seconds until their C text was there, and the text."""
     begun = clock.perf_counter()
     equations: Equations = getattr(system, formulation)()
     source = emit(equations, "c", ("rhs",), standalone=False, integrator=False)
-    derived = clock.perf_counter() - begun
-    tape = equations.tape("rhs")
+    return equations, clock.perf_counter() - begun, next(iter(source.files.values()))
+
+
+def _compile(text: str) -> float:
+    """Seconds that the compiler takes, nothing cached."""
     begun = clock.perf_counter()
-    evaluation_time(equations, loops=1, repeats=1)
-    compiled = clock.perf_counter() - begun - derived
-    loops = max(10, 20_000_000 // (tape.operations + 1) // 100)
-    return Growth(n, formulation, tape.operations, tape.longest_chain(), derived, len(next(iter(source.files.values()))),
-                  compiled, evaluation_time(equations, loops=loops, repeats=10))
+    cache.build(f"{text}// measured at {clock.time_ns()}\n", "growth", require_compiler()).unlink()
+    return clock.perf_counter() - begun
 
 
-def order(rows: Sequence[Growth], value: Callable[[Growth], float], upper: int = 4) -> float:
+def order(rows: Sequence[Growth], value: Callable[[Growth], float], upper: int = 3) -> float:
     """The exponent of n with which a value grows, fitted to the largest sizes."""
     last = sorted(rows, key=lambda r: r.n)[-upper:]
     return float(np.polyfit(np.log([r.n for r in last]), np.log([value(r) for r in last]), 1)[0])
@@ -101,7 +115,7 @@ def picture(rows: Sequence[Growth], path: Path) -> None:
                                           ("recursive", "tab:blue", "articulated bodies")):
             own = [r for r in rows if r.formulation == formulation]
             if own:
-                grown = f"{label} (last sizes: n$^{{{order(own, value):.1f}}}$)" if len(own) > 3 else label
+                grown = f"{label} (last sizes: n$^{{{order(own, value):.1f}}}$)" if len(own) > 2 else label
                 axes.loglog([r.n for r in own], [value(r) for r in own], "o-", color=color, label=grown)
         where = crossover(rows, value)
         if where is not None and title.startswith(("operations", "one")):
@@ -122,12 +136,12 @@ def run(sizes: Sequence[int], folder: Path) -> int:
     for row in grow(sizes=sizes):
         rows.append(row)
         print(row, flush=True)
-    tree = _measure(random_tree(200), 200, "recursive")
+    tree, = measure(random_tree(200), 200, ["recursive"])
     print(f"a random tree of 200 bodies:\n{tree}")
     for what, value in (("operations", lambda r: r.operations), ("evaluation", lambda r: r.evaluation)):
         for formulation in FORMULATIONS:
             own = [r for r in rows if r.formulation == formulation]
-            if len(own) > 3:
+            if len(own) > 2:
                 print(f"{what} of {formulation} grow like n^{order(own, value):.2f} over the last sizes")
         where = crossover(rows, value)
         print(f"{what}: recursion ahead from n = {where}" if where else f"{what}: the mass matrix is ahead throughout")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from symdyn.cli.bench import bench
+from symdyn.cli import bench
 from symdyn.cli.demo import demo
 from symdyn.cli.derive import READABLE, derive
 from symdyn.cli.generate import generate
@@ -48,7 +48,7 @@ def make_parser() -> argparse.ArgumentParser:
     formulation(proof)
     proof.add_argument("--tune", action="store_true", help="compile the candidates and time them, instead of predicting")
     proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
-    _add_bench(command("bench", bench, "measure symdyn beside its peers: Pinocchio, and CasADi's C code", system=False))
+    _add_bench(commands.add_parser("bench", help="measure symdyn", description="Measure symdyn on this machine."))
     _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
                         system=False))
     return parser
@@ -87,12 +87,20 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("peers",), help="peers: accelerations of the same mechanisms, measured side by side")
-    parser.add_argument("--models", metavar="NAME", nargs="+", help="some of the mechanisms, such as spatial_chain or "
+    kinds = parser.add_subparsers(title="what", metavar="WHAT", required=True)
+    text = "accelerations of the same mechanisms beside Pinocchio and CasADi's C code, in one run"
+    peers = kinds.add_parser("peers", help=text, description=text)
+    peers.set_defaults(run=bench.peers)
+    peers.add_argument("--models", metavar="NAME", nargs="+", help="some of the mechanisms, such as spatial_chain or "
                         "'spatial_chain(7)' (default: all)")
-    parser.add_argument("--repeats", metavar="N", type=int, default=40, help="timings of each contestant, of which the best "
+    peers.add_argument("--repeats", metavar="N", type=int, default=40, help="timings of each contestant, of which the best "
                         "counts (default: 40)")
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
+    peers.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
+    text = "how operations, derivation, compilation and run time grow with the number of bodies: table and picture"
+    growth = kinds.add_parser("growth", help=text, description=text)
+    growth.set_defaults(run=bench.growth)
+    growth.add_argument("--sizes", metavar="N", nargs="+", type=int, help="numbers of bodies (default: 2 to 100)")
+    _add_output(growth)
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:

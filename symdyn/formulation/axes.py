@@ -19,7 +19,7 @@ def along_coordinate_axis(joint: Joint) -> tuple[Joint, sp.ImmutableMatrix]:
     axis = getattr(joint, "axis", None)
     if axis is None or not all(e.is_number for e in axis) or sum(e != 0 for e in axis) == 1:
         return joint, sp.ImmutableMatrix(sp.eye(3))
-    x, y, z = axis
+    x, y, _ = axis
     across = sp.sqrt(x * x + y * y) if (x, y) != (0, 0) else sp.S.One
     first = sp.Matrix([-y, x, 0]) / across
     A = sp.ImmutableMatrix(sp.Matrix.hstack(first, sp.Matrix(axis).cross(first), sp.Matrix(axis)))

@@ -81,8 +81,8 @@ def row(**changes: Any) -> Row:
     """A row that meets its bounds exactly, with some changes."""
     given = {"operations": 100, "times": {"symdyn": 80.0, "casadi runtime": 100.0, "pinocchio": 480.0},
              "bound": Bound(100, 0.80, 6.0), **changes}
-    return Row("mechanism", "embedding", leanest=given.get("operations", 100), prologue=10, chain=20, casadi_operations={"casadi baked": 120, "casadi runtime": 130},
-               difference=1e-15, **given)
+    return Row("mechanism", "embedding", leanest=given["operations"], prologue=10, chain=20,
+               casadi_operations={"casadi baked": 120, "casadi runtime": 130}, difference=1e-15, **given)
 
 
 @pytest.mark.parametrize("changes, wanted", [

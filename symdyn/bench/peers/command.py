@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from symdyn.bench.peers import arm
 from symdyn.bench.peers.casadi_peer import CasadiPeer
 from symdyn.bench.peers.contest import cases, contest, fastest
 from symdyn.bench.peers.pinocchio_peer import PinocchioPeer
@@ -63,10 +64,11 @@ def run(names: Sequence[str] | None = None, repeats: int = 40, to_json: Path | N
         rows.append(contest(name, case, peers, repeats, make_equations))
         print(line(rows[-1]), flush=True)
     print(LEGEND)
+    print(arm.line())
     if to_json is not None:
         result: dict[str, Any] = {
             "machine": platform.machine(), "compiler": compiler.version, "repeats": repeats, "notes": notes,
             "versions": {name: version(name) for name in ("symdyn", "pin", "casadi")}, "models": [record(row) for row in rows]}
         to_json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         print(f"wrote {to_json}")
-    return sum(bool(row.misses()) for row in rows)
+    return sum(bool(row.misses()) for row in rows) + bool(arm.misses())

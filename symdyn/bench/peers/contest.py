@@ -90,8 +90,8 @@ def contest(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], 
     times = {who: seconds * 1e9 for who, seconds in race(contestants, repeats).items()}
     tape = function_tape(equations, "rhs")
     leanest = min([tape.operations, *[c.operations for c in equations.candidates]])
-    return Row(name, equations.formulation, tape.operations, leanest, sum(tape.count_prologue().values()), tape.longest_chain(), times,
-               counts, difference, case.bound)
+    return Row(name, equations.formulation, tape.operations, leanest, sum(tape.count_prologue().values()),
+               tape.longest_chain(), times, counts, difference, case.bound)
 
 
 def random_state(equations: Equations) -> State:

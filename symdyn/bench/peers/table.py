@@ -23,9 +23,9 @@ _WIDTHS = [width for _, group in _COLUMNS for _, width in group]
 
 LEGEND = """\
 ops: + - * / sqrt sin cos of one evaluation that depend on the state; leanest: the same of the formulation that has the
-fewest, the fastest being taken; prologue: those that depend on parameters only; chain: the longest that wait for each other. CasADi: C of Pinocchio's articulated-body algorithm, parameters baked in as
-numbers, given at run time, or given at run time with what depends on them alone computed before. symdyn/CasADi: times,
-parameters at run time."""
+fewest, the fastest being taken; prologue: those that depend on parameters only; chain: the longest that wait for each
+other. CasADi: C of Pinocchio's articulated-body algorithm, parameters baked in as numbers, given at run time, or given at
+run time with what depends on them alone computed before. symdyn/CasADi: times, parameters at run time."""
 
 
 def heading() -> str:

@@ -1,0 +1,58 @@
+"""The measurement of growth: exact counts that grow linearly, orders, crossover, table and picture."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import symdyn as sd
+from symdyn.bench import growth
+from symdyn.bench.growth import Growth
+from symdyn.bench.random_tree import random_tree
+from symdyn.cli import main
+from symdyn.runtime.compiler import find_compiler
+
+needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+def row(n: int, formulation: str, operations: int) -> Growth:
+    return Growth(n, formulation, operations, 0, 0.0, 0, 0.0, operations * 1e-9)
+
+
+def test_the_recursion_grows_linearly() -> None:
+    """Three links (z, y, x) add the same operations wherever they are added."""
+    counts = [sd.systems.get("spatial_chain", n=n).recursive().tape("rhs").operations for n in (10, 13, 16, 40, 43)]
+    assert counts[1] - counts[0] == counts[2] - counts[1] == counts[4] - counts[3]
+    chains = [sd.systems.get("spatial_chain", n=n).recursive().tape("rhs").longest_chain() for n in (10, 13, 16)]
+    assert chains[1] - chains[0] == chains[2] - chains[1]
+
+
+def test_order_and_crossover() -> None:
+    rows = [row(n, "embedding", n**3) for n in (2, 4, 8, 16)] + [row(n, "recursive", 40 * n) for n in (2, 4, 8, 16, 32)]
+    cubic, linear = ([r for r in rows if r.formulation == f] for f in ("embedding", "recursive"))
+    assert growth.order(cubic, lambda r: r.operations) == pytest.approx(3)
+    assert growth.order(linear, lambda r: r.operations) == pytest.approx(1)
+    assert growth.crossover(rows, lambda r: r.operations) == 8
+    assert growth.crossover([r for r in rows if r.n < 8], lambda r: r.operations) is None
+
+
+def test_a_random_tree_is_the_same_for_the_same_seed() -> None:
+    one, again, other = (random_tree(12, seed).recursive().tape("rhs").operations for seed in (3, 3, 4))
+    assert one == again != other
+
+
+@needs_c
+def test_table_picture_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "random_tree", lambda n: random_tree(4))
+    assert main(["bench", "growth", "--sizes", "2", "3", "4", "--output", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "operations of recursive grow like n^" in said and said.count("embedding") >= 3
+    assert len(json.loads((tmp_path / "growth.json").read_text(encoding="utf-8"))) == 7
+    assert (tmp_path / "growth.png").stat().st_size > 10_000
+
+
+def test_sizes_must_be_positive(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "growth", "--sizes", "0"]) != 0
+    assert "--sizes takes numbers of bodies, 1 or more; found 0" in capsys.readouterr().err
