@@ -175,6 +175,25 @@ def jacobian_of_positions(s: Sample) -> float | None:
     return _relative(found - wanted, wanted)
 
 
+def coriolis_times_speeds(s: Sample) -> float | None:
+    if not s.has("coriolis", "k_tilde"):
+        return None
+    found = s["coriolis"] @ s.u
+    return _relative(found - s["k_tilde"], found)
+
+
+def coriolis_is_skew_with_mass_rate(s: Sample) -> float | None:
+    """M_tilde_dot - 2 C, whose symmetric part must vanish, by the derivative of the tape along the motion."""
+    if not s.has("coriolis", "M_tilde", "rates"):
+        return None
+    eq = s.equations
+    M = eq.quantity("M_tilde")
+    seeds = dict(zip([eq.leaves[q] for q in eq.symbols.coordinates], eq.quantity("rates"), strict=True))
+    rate = np.array(forward(eq.recorder, M.ravel().tolist(), seeds), dtype=object).reshape(M.shape)
+    found = evaluate(Tape.of(eq.recorder, rate=rate, C=eq.quantity("coriolis")), s.values, s.digits)
+    return _relative(found["rate"] - found["C"] - found["C"].T, found["C"])
+
+
 def _angular(s: Sample, changes: Mapping[str, Any]) -> np.ndarray:
     """Angular velocity of every body, n-frame, from the difference of its rotation: R_dot R^T = [omega x]."""
     R = s.at(changes)["frames"][:, 3:].reshape(-1, 3, 3)
@@ -221,6 +240,8 @@ CHECKS: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
     ("rate of energy equals power of the loads", energy_balance, 1e-20),
     ("kinetic energy is quadratic in u with M_tilde", kinetic_energy_quadratic, 1e-20),
     ("J u is the rate of the positions and rotations", jacobian_of_positions, 1e-15),
+    ("Coriolis matrix times u is k_tilde", coriolis_times_speeds, 1e-20),
+    ("rate of M_tilde less twice the Coriolis matrix is skew", coriolis_is_skew_with_mass_rate, 1e-20),
 )
 
 
