@@ -15,12 +15,13 @@ PRINTED = {
     "J": ["J u is the rate"],
     "positions": ["J u is the rate"],
     "inverse_dynamics": ["inverse dynamics"],
+    "coriolis": ["Coriolis matrix times u", "twice the Coriolis matrix"],
 }
 
 
 @pytest.fixture(scope="module")
 def equations():
-    return sd.systems.get("two_link_arm").embedding()
+    return sd.systems.get("two_link_arm").recursive()
 
 
 def test_sound_equations_pass(equations):
