@@ -136,8 +136,8 @@ def run(sizes: Sequence[int], folder: Path) -> int:
     for row in grow(sizes=sizes):
         rows.append(row)
         print(row, flush=True)
-    tree, = measure(random_tree(200), 200, ["recursive"])
-    print(f"a random tree of 200 bodies:\n{tree}")
+    tree = measure(random_tree(2 * max(sizes)), 2 * max(sizes), ["recursive"])
+    print(f"a random tree of {2 * max(sizes)} bodies:\n{tree[0]}")
     for what, value in (("operations", lambda r: r.operations), ("evaluation", lambda r: r.evaluation)):
         for formulation in FORMULATIONS:
             own = [r for r in rows if r.formulation == formulation]
@@ -146,7 +146,7 @@ def run(sizes: Sequence[int], folder: Path) -> int:
         where = crossover(rows, value)
         print(f"{what}: recursion ahead from n = {where}" if where else f"{what}: the mass matrix is ahead throughout")
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "growth.json").write_text(json.dumps([asdict(r) for r in [*rows, tree]], indent=1), encoding="utf-8")
+    (folder / "growth.json").write_text(json.dumps([asdict(r) for r in [*rows, *tree]], indent=1), encoding="utf-8")
     picture(rows, folder / "growth.png")
     print(f"wrote {folder / 'growth.json'}\nwrote {folder / 'growth.png'}")
     return 0

@@ -28,6 +28,6 @@ def embed(model: Model, frames: str = "body") -> EmbeddedEquations:
     """The embedded equations of a checked model.
 
     frames   "body": every link in its own axes; "parallel": in those of the link before where axes stay parallel
-    Raises ModelError for constraints (they need the augmented formulation) and for joints that move no inertia.
+    Raises ModelError for constraints and for joints that move no inertia.
     """
     return derive_tree(model, "embedding", frames, TreeQuantities, EmbeddedEquations)

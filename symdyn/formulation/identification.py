@@ -97,9 +97,13 @@ class BaseParameters:
     def values(self, params: Mapping[Any, float] | None = None) -> np.ndarray:
         """pi_b in numbers, (n,), from numbers for parameters by symbol or name; what is left out takes its default.
 
-        Raises SymdynError naming parameters that have no number.
+        Raises SymdynError naming parameters that have no number, and names that are no parameters.
         """
         given = {str(getattr(k, "name", k)): float(v) for k, v in {**self.equations.symbols.defaults, **(params or {})}.items()}
+        known = [p.name for p in self.equations.symbols.parameters]
+        unknown = [name for name in given if name not in known]
+        if unknown:
+            raise SymdynError(f"{self.equations.name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
         tape = self.equations.tape("base_parameters")
         missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in given]
         if missing:

@@ -19,6 +19,7 @@ from symdyn.formulation.recursive.page import Page
 from symdyn.formulation.tree import Tree
 from symdyn.formulation.tree_equations import derive_tree
 from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed
 from symdyn.model.record import Model
 from symdyn.spatial.vectors import zeros
@@ -49,12 +50,13 @@ class RecursiveEquations(MotionEquations):
         """(n_u, 1) forces along the speeds that hold the weights."""
         return self.explicit("gravity_load")
 
-    def link(self, which: str | int) -> LinkPage:
-        """What the lecture's pages name of one link, by its name or its number from 1.
+    def link(self, which: Body | str | int) -> LinkPage:
+        """What the lecture's pages name of one link: the body that a joint moves, its name, or its number from 1.
 
         Raises SymdynError for a link that is not there.
         """
-        number = which if isinstance(which, int) else self.links.index(which) + 1 if which in self.links else 0
+        name = which.name if isinstance(which, Body) else which
+        number = name if isinstance(name, int) else self.links.index(name) + 1 if name in self.links else 0
         if not 1 <= number <= len(self.links):
             there = ", ".join(f"{k + 1} {name}" for k, name in enumerate(self.links))
             raise SymdynError(f"{self.name} has no link {which!r}; it has {there} (bodies on fixed joints belong to the link "
@@ -62,7 +64,7 @@ class RecursiveEquations(MotionEquations):
         return LinkPage(self, number)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LinkPage:
     """One link's X, X_star, S, S_ring, I, v, c, p, a, f, I_A, p_A, v_G, a_G, f_G as explicit SymPy; see recursive.page."""
 
@@ -73,10 +75,14 @@ class LinkPage:
         end = f"_{self.number}"
         return sorted(n.removesuffix(end) for n in self.equations.quantities if n.endswith(end) and not n.startswith("output"))
 
+    def __repr__(self) -> str:
+        return f"<link {self.number} of {self.equations.name}: {', '.join(dir(self))}>"
+
     def __getattr__(self, name: str) -> sp.Matrix:
         quantity = f"{name}_{self.number}"
         if name.startswith("__") or quantity not in self.equations.quantities:
-            raise AttributeError(f"link {self.number} has no {name}; it has {', '.join(dir(self))}")
+            reasons = "".join(f" ({note})" for note in self.equations.notes if note.startswith("no "))
+            raise AttributeError(f"link {self.number} has no {name}; it has {', '.join(dir(self))}{reasons}")
         return self.equations.explicit(quantity)
 
 

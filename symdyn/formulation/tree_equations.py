@@ -32,8 +32,8 @@ def derive_tree(model: Model, formulation: str, frames: str, derivation: type[Tr
         raise SymdynError(f"frames {frames!r} asked for; there are {' and '.join(map(repr, FRAMES))}")
     if model.constraints or model.loops:
         count = len(model.constraints) + len(model.loops)
-        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: "
-                          "use system.augmented(), or remove them"], model.name)
+        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: remove "
+                          "them, or let joints take expressions of fewer coordinates"], model.name)
     recorder = Recorder()
     algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
     tree = build(model, algebra, frames == "parallel")

@@ -234,3 +234,9 @@ def test_many_points_at_once() -> None:
             assert np.allclose(found[name][k], value.astype(float), rtol=1e-12)
     with pytest.raises(KeyError, match="no value for F"):
         evaluate_rows(tape, {name: value for name, value in rows.items() if name != "F"}, 3)
+
+
+def test_unknown_parameters_of_values_are_named() -> None:
+    base = sd.systems.get("double_pendulum").recursive().base_parameters()
+    with pytest.raises(SymdynError, match=r"double_pendulum has no parameter mm; it has g, m1"):
+        base.values({"mm": 1.0})

@@ -92,3 +92,31 @@ def test_constraints_are_refused() -> None:
     s.add_constraint(sp.sin(sd.coordinates("q1")))
     with pytest.raises(ModelError, match="the recursive form takes trees only"):
         s.recursive()
+
+
+def test_links_by_body_name_and_number() -> None:
+    s = sd.systems.get("double_pendulum")
+    equations = s.recursive()
+    assert equations.links == ("rod1", "rod2")
+    by = [equations.link(which) for which in (s.bodies[1], "rod2", 2)]
+    assert len({b.number for b in by}) == 1 and "I_A" in repr(by[0]) and by[0].S == sp.Matrix([0, 0, 1, 0, 0, 0])
+    with pytest.raises(SymdynError, match=r"no link 'rod3'; it has 1 rod1, 2 rod2"):
+        equations.link("rod3")
+    with pytest.raises(AttributeError, match=r"link 1 has no I_B; it has I, I_A"):
+        _ = equations.link(1).I_B
+
+
+def test_what_a_mechanism_does_not_have_is_told_with_the_reason() -> None:
+    s = sd.systems.get("double_pendulum")
+    s.move_ground([sp.sin(sd.t), 0])
+    with pytest.raises(SymdynError, match=r"no quantity 'coriolis'.*joints .* follow given functions of time"):
+        _ = s.recursive().coriolis
+
+
+def test_lecture_quantities_of_the_double_pendulum() -> None:
+    equations = sd.systems.get("double_pendulum").recursive()
+    u = sp.Matrix(equations.symbols.speeds)
+    assert sp.simplify(equations.coriolis * u - equations.k_tilde) == sp.zeros(2, 1)
+    assert sp.simplify(equations.gravity_load + equations.F_tilde) == sp.zeros(2, 1)
+    assert sp.simplify(equations.tau - equations.M_tilde * equations.accelerations - equations.k_tilde + equations.F_tilde
+                       ) == sp.zeros(2, 1)
