@@ -1,12 +1,14 @@
 """Which formulation to take when none is named: every candidate is derived, and the one with the least predicted time wins.
 
-The prediction rests on two exact properties of the tape, the operations of one evaluation and the longest chain of
-operations that wait for each other; the first tells what the processor has to do, the second how much of it cannot overlap.
+The prediction rests on exact properties of the tape alone, so that the choice is the same on every machine: how many cycles
+a processor takes for its steps in their order (symdyn.tape.cycles), how many there are, and the sines and cosines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import gc
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,17 +16,30 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.recursion import recursive
-from symdyn.model.record import Model
+from symdyn.model.record import Model, joint_speeds
 from symdyn.pipeline import function_tape
+from symdyn.tape.cycles import WIDTH, Schedule, schedule
+from symdyn.tape.node import PARAMETER
+from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
 
-# Nanoseconds by kind of operation, and for each step of the longest chain, of compiled right-hand sides: fitted to the
-# candidates of n_link_pendulum(2 ... 20), spatial_chain(2 ... 20), PUMA 560 and trees (`python -m symdyn.bench.model`).
-TIME_OF = {"add": 0.07, "mul": 0.07, "div": 1.0, "sqrt": 1.5, "trig": 3.0, "function": 10.0, "compare": 0.1}
-TIME_OF_STEP = 0.7
+# Nanoseconds for each of the `terms` of a tape. `python -m symdyn.bench.cost_model` measures the compiled right-hand sides
+# of all candidates of 40 systems and fits these by non-negative least squares of the relative errors; here with gcc 12 on
+# an AMD EPYC of 3.4 GHz (Zen 3). Of the models that it compares, this one lost the least time where it had not been fitted.
+COSTS = {"cycles": 0.302, "beyond": 0.167, "sines": 24.2, "angles": 4.22}
+# Instructions that the processor keeps decoded; all further ones are decoded in every evaluation.
+KEPT_DECODED = 900
+# Of right-hand sides longer than this, operations, what is unlikely to win is not derived: body frames where axes are
+# parallel (parallel ones took fewer cycles in every long one), and the mass matrix unless it promises to win by far.
+LONG = 10_000
+PROMISING = 0.7
+
+FORMULATIONS = ("auto", "embedding", "recursive")
+HEADING = (f"{'formulation':12}{'frames':10}{'operations':>10}{'prologue':>10}{'longest chain':>15}{'predicted ns':>14}"
+           f"{'measured ns':>13}")
 
 
 @dataclass(frozen=True)
@@ -49,79 +64,173 @@ class Candidate:
         return self.predicted if self.measured is None else self.measured
 
     def __str__(self) -> str:
-        measured = "" if self.measured is None else f"{self.measured:>10.0f}"
+        """A line under HEADING."""
+        measured = "-" if self.measured is None else f"{self.measured:.0f}"
         return (f"{self.formulation:12}{self.frames:10}{self.operations:>10}{self.prologue:>10}{self.chain:>15}"
-                f"{self.predicted:>13.0f}{measured}{'  chosen' if self.chosen else ''}")
+                f"{self.predicted:>14.0f}{measured:>13}{'  chosen' if self.chosen else ''}")
 
 
-HEADING = f"{'formulation':12}{'frames':10}{'operations':>10}{'prologue':>10}{'longest chain':>15}{'predicted ns':>13}"
+def terms(tape: Tape, run: Schedule) -> dict[str, float]:
+    """What the prediction weighs, under the names of COSTS; run is the schedule of the tape.
+
+    cycles   of one evaluation from when sines and cosines are known
+    beyond   instructions beyond KEPT_DECODED
+    sines    1 if there are any sines or cosines: they are taken all at once, and everything waits for the first
+    angles   of which sines or cosines are taken
+    """
+    angles = {node.args[0] for node in tape.running if OPERATIONS[node.op].kind == "trig"}
+    return {"cycles": run.cycles, "beyond": max(0, run.instructions - KEPT_DECODED), "sines": min(1, len(angles)),
+            "angles": len(angles)}
+
+
+def time_of(weighed: Mapping[str, float]) -> float:
+    """Nanoseconds for the terms of a tape."""
+    return sum(COSTS[name] * value for name, value in weighed.items())
 
 
 def predicted_time(tape: Tape) -> float:
-    """Nanoseconds of one evaluation of a tape, from its counts."""
-    return sum(TIME_OF[kind] * n for kind, n in tape.count().items()) + TIME_OF_STEP * tape.longest_chain()
+    """Nanoseconds of one evaluation of a tape."""
+    return time_of(terms(tape, schedule(tape)))
 
 
-def choose(model: Model, tune: bool = False) -> MotionEquations:
+def choose(model: Model, tune: bool = False, formulation: str = "auto") -> MotionEquations:
     """The equations of a checked model in the formulation that takes the least time for accelerations.
 
-    tune   compile the candidates and time them, instead of predicting
+    tune          compile the candidates and time them, instead of predicting
+    formulation   "auto", or the one whose frames are to be chosen
     The result's `candidates` is the table. Raises ModelError as the formulations do; CompilerNotFound if there is no
     compiler to tune with.
     """
-    derived = list(_candidates(model))
-    times: list[float | None] = [None] * len(derived)
     if tune:
-        from symdyn.bench.kernel import evaluation_times
+        from symdyn.runtime.compiler import require_compiler
 
-        times = list(evaluation_times(derived))
-    table = [_candidate(e, t) for e, t in zip(derived, times, strict=True)]
+        require_compiler()
+    with _collector_paused():
+        derived = _worth_comparing(model, formulation)
+    times: Sequence[float | None] = [None] * len(derived)
+    if tune:
+        from symdyn.bench.side_by_side import times_side_by_side
+
+        times = times_side_by_side([d.equations for d in derived])
+    table = [d.candidate(t) for d, t in zip(derived, times, strict=True)]
     best = min(range(len(table)), key=lambda k: table[k].time)
-    return replace(derived[best], candidates=tuple(replace(c, chosen=k == best) for k, c in enumerate(table)))
-
-
-FORMULATIONS = ("auto", "embedding", "recursive")
+    return replace(derived[best].equations, candidates=tuple(replace(c, chosen=k == best) for k, c in enumerate(table)))
 
 
 def formulated(system: System, formulation: str = "auto", tune: bool = False) -> MotionEquations:
     """The equations of a system in the formulation of that name; "auto" takes the fastest.
 
+    tune   compile the candidates and time them, instead of predicting; of a formulation that is named, its frames
     Raises SymdynError for an unknown name.
     """
     if formulation not in FORMULATIONS:
         raise SymdynError(f"formulation {formulation!r} asked for; there are {', '.join(FORMULATIONS)}")
-    if formulation == "auto":
-        return system.equations(tune)
+    if tune or formulation == "auto":
+        return choose(system.check(), tune, formulation)
     return system.embedding() if formulation == "embedding" else system.recursive()
 
 
-def _candidates(model: Model) -> Iterator[MotionEquations]:
-    """The formulations of a tree; parallel frames only where axes are parallel, the mass matrix only where it can win."""
-    forms: list[Callable[[Model, str], MotionEquations]] = [recursive]
-    yield recursive(model)
-    if factorization_operations(model) < recursive(model).tape("rhs").operations:
-        forms.append(embed)
-        yield embed(model)
-    for form in forms:
-        equations = form(model, "parallel")
-        if equations.frames == "parallel":
-            yield equations
+@dataclass(frozen=True)
+class Derived:
+    """Equations with the tape of their right-hand side as it is emitted, what it takes, and nanoseconds predicted."""
+
+    equations: MotionEquations
+    tape: Tape
+    run: Schedule
+    predicted: float
+
+    @classmethod
+    def of(cls, equations: MotionEquations) -> Derived:
+        """Count and predict; terms as in `terms`."""
+        tape = function_tape(equations, "rhs")
+        run = schedule(tape)
+        return cls(equations, tape, run, time_of(terms(tape, run)))
+
+    def candidate(self, seconds: float | None) -> Candidate:
+        """Its line of the table."""
+        tape = self.tape
+        return Candidate(self.equations.formulation, self.equations.frames, tape.operations,
+                         sum(tape.count_prologue().values()), tape.longest_chain(), self.predicted,
+                         None if seconds is None else seconds * 1e9)
+
+    def computes_like(self, other: Derived) -> bool:
+        """Whether all counts agree: where joints share a speed, the recursion comes to the mass matrix, too."""
+        return self._counts() == other._counts()
+
+    def _counts(self) -> tuple[object, ...]:
+        return self.tape.count(), self.tape.count_prologue(), self.tape.longest_chain(), self.run
 
 
-def _candidate(equations: MotionEquations, measured: float | None) -> Candidate:
-    tape = function_tape(equations, "rhs")
-    return Candidate(equations.formulation, equations.frames, tape.operations, sum(tape.count_prologue().values()),
-                     tape.longest_chain(), predicted_time(tape), None if measured is None else measured * 1e9)
+def derived_in_frames(derive: Callable[[Model, str], MotionEquations], model: Model) -> list[Derived]:
+    """A formulation in body frames, and in parallel frames where axes stay parallel; of long ones only the last."""
+    parallel = Derived.of(derive(model, "parallel"))
+    if parallel.equations.frames == "body" or parallel.tape.operations > LONG:
+        return [parallel]
+    return [Derived.of(derive(model, "body")), parallel]
 
 
-def factorization_operations(model: Model) -> int:
-    """Operations of factorizing and solving with the mass matrix, L^T D L without fill-in: they alone grow like n^3."""
+def _worth_comparing(model: Model, formulation: str) -> list[Derived]:
+    """The candidates; the mass matrix only where it can win, and nothing twice."""
+    if formulation == "embedding":
+        return derived_in_frames(embed, model)
+    recursions = derived_in_frames(recursive, model)
+    if formulation == "recursive" or not _mass_matrix_can_win(model, recursions):
+        return recursions
+    embeddings = derived_in_frames(embed, model)
+    return embeddings + [d for d in recursions if not any(d.computes_like(e) for e in embeddings)]
+
+
+def _mass_matrix_can_win(model: Model, recursions: Sequence[Derived]) -> bool:
+    best = min(recursions, key=lambda d: d.predicted)
+    ahead = PROMISING if best.tape.operations > LONG else 1
+    return least_time_with_mass_matrix(model, best) < ahead * best.predicted
+
+
+def least_time_with_mass_matrix(model: Model, recursion: Derived) -> float:
+    """Nanoseconds that the embedding takes at the least, without deriving it.
+
+    Factorizing and solving are counted, and nothing waits. Forces and forming the mass matrix take no fewer than half of the
+    instructions of the recursion (0.52 to 1.35 of them in the systems of symdyn.bench.cost_model with more than two speeds);
+    if all pivots are constant, solving alone is left.
+    """
+    least = float(solving_instructions(model))
+    if any(pivot.mask & ~PARAMETER for pivot in recursion.equations.recorder.checks):
+        least += factorizing_instructions(model) + recursion.run.instructions / 2
+    return time_of(terms(recursion.tape, Schedule(round(least), round(least / WIDTH))))
+
+
+def factorizing_instructions(model: Model) -> int:
+    """Instructions of L^T D L without fill-in, which alone grow like n^3: for each speed a division, its row of L, and what
+    that takes from the rows above."""
+    return sum(1 + above + above * (above + 1) // 2 for above in _coupled(model))
+
+
+def solving_instructions(model: Model) -> int:
+    """Instructions of solving with the factors: for each speed a product, and both ways along its row of L."""
+    return sum(1 + 2 * above for above in _coupled(model))
+
+
+def _coupled(model: Model) -> list[int]:
+    """For each speed of a joint the number of speeds before it, on the way to the ground, that it is coupled with."""
+    speeds = set(model.speeds)
     before: dict[int, int] = {-1: 0}
-    total = 0
+    counts: list[int] = []
     for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True):
         above = before[parent]
-        for _ in range(joint.n_speeds):
-            total += 2 + above + above * (above + 1) + 4 * above
-            above += 1
-        before[child] = above
-    return total
+        own = sum(u in speeds for u in joint_speeds(joint))
+        counts += range(above, above + own)
+        before[child] = above + own
+    return counts
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """No search for garbage meanwhile: the nodes of a derivation all stay, and to look through them again and again takes as
+    long as a long derivation itself."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()

@@ -21,6 +21,7 @@ from symdyn.backend.source import Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.skipped import skipped
+from symdyn.runtime.arguments import some
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, require_compiler
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
@@ -75,12 +76,13 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     """
     if standalone and equations.again is not None:
         equations = equations.again()
+    bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     names = tuple(functions) if functions is not None else tuple(n for n in STANDARD if has_function(equations, n))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
-    content = _content(equations, names, standalone, _by_name(specialize or {}), work)
+    content = _content(equations, names, standalone, bound, work)
     return render(content, backend, templates, standalone, integrator)
 
 
@@ -170,10 +172,6 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
     if work:
         power = equations.quantity("power").reshape(1)
         tapes["rhs"] = Tape.of(equations.recorder, rhs=np.concatenate([equations.quantity("rhs"), power]))
-    unknown = [n for n in bound if n not in [s.name for s in symbols.parameters]]
-    if unknown:
-        raise SymdynError(f"{equations.name} has no parameter {', '.join(unknown)} to specialize; it has "
-                          f"{', '.join(s.name for s in symbols.parameters) or 'none'}")
     if bound:
         tapes = _together(tapes, lambda whole: specialize_tape(whole, bound))
     tapes = _together(tapes, balance)

@@ -18,6 +18,7 @@ import numpy as np
 from symdyn.errors import EvaluationError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.model.symbols import time
+from symdyn.runtime.arguments import some
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Tape
@@ -272,7 +273,8 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
 def _samples(equations: Equations, states: int, digits: int, params: Mapping[Any, float] | None, seed: int) -> list[Sample]:
     stream = random.Random(seed)
     symbols = equations.symbols
-    given = {str(getattr(k, "name", k)): float(v) for k, v in {**symbols.defaults, **(params or {})}.items()}
+    given = {str(getattr(k, "name", k)): float(v) for k, v in symbols.defaults.items()}
+    given |= some(params, [p.name for p in symbols.parameters], "parameters", equations.name)
     numbers = all(p.name in given for p in symbols.parameters)
     parameters = {p.name: given.get(p.name, stream.uniform(0.5, 1.5)) for p in symbols.parameters}
     samples: list[Sample] = []
@@ -289,7 +291,7 @@ def _samples(equations: Equations, states: int, digits: int, params: Mapping[Any
             samples.append(sample)
     raise SymdynError(f"{equations.name}: the right-hand side is defined at {len(samples)} of {40 * states} random states only "
                       "(coordinates and speeds in [-1, 1]); check where its loads leave their domain, such as log, sqrt or a "
-                      "division")
+                      "division, and whether these parameters leave a joint without mass and inertia")
 
 
 def _defined(sample: Sample) -> bool:

@@ -70,9 +70,10 @@ class Equations:
             name = f"output_{name}"
         if name not in self._recorded:
             if name not in self.quantities:
-                reasons = "".join(f" ({note})" for note in self.notes if note.startswith("no "))
-                raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {name!r}; it has "
-                                  f"{', '.join(self.quantities)}{reasons}")
+                reason = "".join(f": {note}" for note in self.notes
+                                 if note.startswith("no ") and name.partition("_")[0].lower() in note.lower())
+                raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {name!r}{reason}; it has "
+                                  f"{', '.join(self.quantities)}")
             self._recorded[name] = np.asarray(self.quantities[name](), dtype=object)
         return self._recorded[name]
 

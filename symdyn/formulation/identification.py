@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.base_parameters import Base, base
 from symdyn.formulation.regressor import inertial_parameters, project, regressor
 from symdyn.formulation.tree import Tree
+from symdyn.runtime.arguments import take
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import ACCELERATION
 from symdyn.tape.sympy_bridge import expand
@@ -94,21 +95,17 @@ class BaseParameters:
 
         return simplified(self._explicit("base_regressor"), self.equations.simplify_seconds)
 
-    def values(self, params: Mapping[Any, float] | None = None) -> np.ndarray:
-        """pi_b in numbers, (n,), from numbers for parameters by symbol or name; what is left out takes its default.
+    def values(self, params: Any = None) -> np.ndarray:
+        """pi_b in numbers, (n,), from parameters in order or by symbol or name; what is left out takes its default.
 
-        Raises SymdynError naming parameters that have no number, and names that are no parameters.
+        Raises ArgumentError naming what is missing, unknown or not a finite number.
         """
-        given = {str(getattr(k, "name", k)): float(v) for k, v in {**self.equations.symbols.defaults, **(params or {})}.items()}
-        known = [p.name for p in self.equations.symbols.parameters]
-        unknown = [name for name in given if name not in known]
-        if unknown:
-            raise SymdynError(f"{self.equations.name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
-        tape = self.equations.tape("base_parameters")
-        missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in given]
-        if missing:
-            raise SymdynError(f"{self.equations.name}: no number for {', '.join(missing)}; pass params with one for each")
-        return evaluate_rows(tape, given, 1)["base_parameters"][0]
+        symbols = self.equations.symbols
+        names = [p.name for p in symbols.parameters]
+        defaults = {str(getattr(k, "name", k)): float(v) for k, v in symbols.defaults.items()}
+        numbers = take(params, names, "parameters", defaults, self.equations.name)
+        return evaluate_rows(self.equations.tape("base_parameters"), dict(zip(names, numbers.tolist(), strict=True)),
+                             1)["base_parameters"][0]
 
     def _explicit(self, name: str) -> sp.Matrix:
         eq = self.equations

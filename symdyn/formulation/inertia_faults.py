@@ -22,7 +22,7 @@ DIGITS = 40
 
 def demand_mass_matrix(model: Model, recorder: Recorder, M: np.ndarray) -> None:
     """Raise ModelError if M_tilde (n_u, n_u) has a zero on its diagonal or dependent rows at every state."""
-    faults = [_massless(model, u) for k, u in enumerate(model.speeds) if is_zero(M[k, k])]
+    faults = [massless(model, u) for k, u in enumerate(model.speeds) if is_zero(M[k, k])]
     if faults:
         raise ModelError(faults, model.name)
     dependent = first_dependent(recorder, M)
@@ -35,7 +35,7 @@ def demand_pivots(model: Model, recorder: Recorder, pivots: Sequence[tuple[Any, 
 
     Tried at a random state, with so many digits that rounding cannot hide it.
     """
-    faults = [_massless(model, u) for pivot, u in pivots if is_zero(pivot)]
+    faults = [massless(model, u) for pivot, u in pivots if is_zero(pivot)]
     if faults:
         raise ModelError(faults, model.name)
     nodes = [(pivot, u) for pivot, u in pivots if isinstance(pivot, Node)]
@@ -47,7 +47,8 @@ def demand_pivots(model: Model, recorder: Recorder, pivots: Sequence[tuple[Any, 
             raise ModelError([_dependent(u)], model.name)
 
 
-def _massless(model: Model, u: sp.Symbol) -> str:
+def massless(model: Model, u: sp.Symbol) -> str:
+    """That nothing with mass moves along a speed, and what to do."""
     joint = next((j for j in model.joints if u in joint_speeds(j)), None)
     if joint is None:
         return f"no joint with mass or inertia moves with {u}; use its coordinate in the expression of a joint, or leave it out"

@@ -11,7 +11,7 @@ import sympy as sp
 
 from symdyn.errors import SymdynError
 from symdyn.formulation.articulated import Articulated
-from symdyn.formulation.inertia_faults import demand_pivots
+from symdyn.formulation.inertia_faults import demand_pivots, massless
 from symdyn.formulation.motion import Solver
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.newton_euler import inertial_wrench, outward
@@ -111,8 +111,8 @@ class RecursiveTree(TreeQuantities):
         self.own = _own_speeds(tree)
         self.notes = ["mass matrix: accelerations come from articulated bodies, without it"]
         if self.own is None:
-            self.notes = ["articulated bodies: joints share a speed, so accelerations come from the mass matrix by composite "
-                          "bodies"]
+            self.notes = ["articulated bodies: a speed moves several joints, or one by a factor, so accelerations come from "
+                          "the mass matrix by composite bodies"]
         self.notes += self.page.notes
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
@@ -126,6 +126,11 @@ class RecursiveTree(TreeQuantities):
         speeds = dict(zip(self.own, self.speeds, strict=True))
         pivots = [(pivot, speeds[place]) for place, pivot in self.articulated().pivots]
         demand_pivots(self.model, self.algebra.recorder, pivots)
+
+    def reasons(self) -> list[str]:
+        """What it means, speed by speed, if S^T I^A S is not positive."""
+        return super().reasons() if self.own is None else [
+            f"{massless(self.model, u)} (S^T I^A S is not positive){self.remarks.get(u, '')}" for u in self.speeds]
 
     def articulated(self) -> Articulated:
         """Articulated inertias of the links, recorded once."""

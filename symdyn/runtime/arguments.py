@@ -35,6 +35,20 @@ def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, fl
     return array
 
 
+def some(values: Any, names: Sequence[str], what: str, owner: str) -> dict[str, float]:
+    """Those values that are given, by name; None for none of them.
+
+    Raises ArgumentError as `take` does, and for what is no mapping.
+    """
+    if values is None:
+        return {}
+    if not isinstance(values, Mapping):
+        raise ArgumentError(f"{owner}: {what} must be a mapping from symbols or names to numbers, found {values!r}")
+    array = take(values, names, what, dict.fromkeys(names, 0.0), owner)
+    given = {str(getattr(key, "name", key)) for key in values}
+    return {name: float(value) for name, value in zip(names, array, strict=True) if name in given}
+
+
 def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Mapping[str, float | None],
                   owner: str) -> np.ndarray:
     given: dict[str, Any] = {}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from symdyn.errors import EvaluationError
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.recorder import Recorder
-from symdyn.tape.tape import Output, Tape, reachable
+from symdyn.tape.tape import Output, Tape, reachable, unsigned
 
 _ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
 
@@ -29,7 +30,11 @@ def substitute(entries: tuple, replacements: Mapping[Node, Any], recorder: Recor
             new[node] = recorder.leaf(node.args[1], node.args[0])
         else:
             with recorder.section(node.section):
-                value = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
+                try:
+                    value = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
+                except ZeroDivisionError:
+                    reason = node.recorder.checks.get(unsigned(node.args[-1]), "an expression divides by zero")
+                    raise EvaluationError(f"with the numbers that are bound: {reason}") from None
             new[node] = value
             if isinstance(value, Node):
                 if node in node.recorder.names:

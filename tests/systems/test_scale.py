@@ -42,6 +42,19 @@ def test_a_random_tree_of_200_bodies_is_derived_and_written() -> None:
     assert equations.tape("rhs").operations < 400 * 200 and text.count("_part_") > 50
 
 
+@needs_c
+def test_a_random_tree_compiled() -> None:
+    """In parts, against the recursion of the lecture's page on plain floats."""
+    system = random_tree(25)
+    module = system.recursive().compile(backend="c")
+    n_q, n_u = (len(module.metadata[group]) for group in ("q", "u"))
+    rng = np.random.default_rng(6)
+    q, u = rng.uniform(-0.8, 0.8, n_q), rng.uniform(-1, 1, n_u)
+    numbers = NumericTree(system.check()).at(q, u)
+    plain = forward_dynamics(numbers.tree, numbers.applied.joint, numbers.applied.wrenches).u_dot.astype(float)
+    assert np.linalg.norm(module.rhs(0.0, np.concatenate([q, u]))[n_q:] - plain) <= 1e-10 * np.linalg.norm(plain)
+
+
 def test_the_choice_leaves_the_mass_matrix_of_a_long_chain_alone(chain: sd.System) -> None:
     equations = chain.equations()
     assert [c.formulation for c in equations.candidates] == ["recursive"] and equations.formulation == "recursive"
