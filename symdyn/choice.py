@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from symdyn.errors import SymdynError
+from symdyn.formulation.augmented import augment
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.recursion import recursive
@@ -37,7 +38,7 @@ KEPT_DECODED = 900
 LONG = 10_000
 PROMISING = 0.7
 
-FORMULATIONS = ("auto", "embedding", "recursive")
+FORMULATIONS = ("auto", "embedding", "recursive", "augmented")
 HEADING = (f"{'formulation':12}{'frames':10}{'operations':>10}{'prologue':>10}{'longest chain':>15}{'predicted ns':>14}"
            f"{'measured ns':>13}")
 
@@ -117,6 +118,11 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto") -> Motio
     return replace(derived[best].equations, candidates=tuple(replace(c, chosen=k == best) for k, c in enumerate(table)))
 
 
+def constrained(model: Model) -> bool:
+    """Whether a model has closed loops or constraints."""
+    return bool(model.loops or model.constraints)
+
+
 def formulated(system: System, formulation: str = "auto", tune: bool = False) -> MotionEquations:
     """The equations of a system in the formulation of that name; "auto" takes the fastest.
 
@@ -127,7 +133,9 @@ def formulated(system: System, formulation: str = "auto", tune: bool = False) ->
         raise SymdynError(f"formulation {formulation!r} asked for; there are {', '.join(FORMULATIONS)}")
     if tune or formulation == "auto":
         return choose(system.check(), tune, formulation)
-    return system.embedding() if formulation == "embedding" else system.recursive()
+    ways: dict[str, Callable[[], MotionEquations]] = {
+        "embedding": system.embedding, "recursive": system.recursive, "augmented": system.augmented}
+    return ways[formulation]()
 
 
 @dataclass(frozen=True)
@@ -171,6 +179,8 @@ def derived_in_frames(derive: Callable[[Model, str], MotionEquations], model: Mo
 
 def _worth_comparing(model: Model, formulation: str) -> list[Derived]:
     """The candidates; the mass matrix only where it can win, and nothing twice."""
+    if formulation == "augmented" or (formulation == "auto" and constrained(model)):
+        return derived_in_frames(lambda m, frames: augment(m, frames=frames), model)
     if formulation == "embedding":
         return derived_in_frames(embed, model)
     recursions = derived_in_frames(recursive, model)

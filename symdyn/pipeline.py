@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.backend.source import Content, Source, render
+from symdyn.backend.source import CORRECTIONS, Content, Source, render
 from symdyn.errors import SymdynError
+from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.skipped import skipped
 from symdyn.runtime.arguments import some
@@ -49,6 +50,19 @@ FUNCTIONS = {
     "inertial_parameters": ("inertial_parameters", "pi: m, h = m c, I about its origin (xx xy xz yy yz zz) of every body"),
     "base_regressor": ("base_regressor", "Y_b, tau = Y_b pi_b: base parameters, for given accelerations ud"),
     "base_parameters": ("base_parameters", "pi_b from the parameters of the model"),
+    "C": ("C", "constraints, zero where they hold; 0 in rows of velocity constraints"),
+    "C_r": ("C_r", "Jacobian of the constraints in the speeds"),
+    "C_t": ("C_t", "partial derivative of the constraints by time"),
+    "C_dot": ("C_dot", "rate of the constraints, C_r u + C_t"),
+    "F_d": ("F_d", "right side of C_r u_dot = F_d"),
+    "lam": ("lam", "multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde"),
+    "reactions": ("reactions", "force and moment of every joint on its child, at the joint's point on it, n-frame"),
+    "C_scale": ("C_scale", "factors that make every constraint a length"),
+    "length": ("length", "the mechanism's length, m"),
+    "N": ("N", "q_dot = N u + what is given"),
+    "position_correction": ("position_correction", "constraints as lengths, and the smallest change of q that makes them zero"),
+    "velocity_correction": ("velocity_correction", "their rates, m/s, and the smallest change of u that makes them zero"),
+    "residual": ("residual", "residual of the stabilized index-2 form; ud: q_dot, u_dot, z_dot, lam, mu"),
     "power": ("power", "power of all loads but gravity and springs, and of prescribed motions, W"),
     "power_x": ("power_x", "derivative of the power by x"),
     "Jd_qd": ("Jd_qd", "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame"),
@@ -66,11 +80,12 @@ STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
-         specialize: Mapping[Any, float] | None = None, work: bool = False) -> Source:
+         specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False) -> Source:
     """The source of the named functions (default: STANDARD, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
     work         rhs gets one more state at the end: the work of all loads but gravity and springs
+    baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
 
     Raises SymdynError for an unknown function, parameter, backend or a broken template.
     """
@@ -82,7 +97,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
-    content = _content(equations, names, standalone, bound, work)
+    content = _content(equations, names, standalone, bound, work, baumgarte)
     return render(content, backend, templates, standalone, integrator)
 
 
@@ -119,9 +134,11 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                           "emit() writes source for others")
 
     def source_of(name: str) -> Source:
-        work = name == "rhs_work"
-        return emit(equations, backend, ("rhs",) if work else (name,), templates, standalone=False, specialize=specialize,
-                    work=work)
+        if not name.startswith("rhs"):
+            return emit(equations, backend, (name,), templates, standalone=False, specialize=specialize)
+        needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
+        return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in name,
+                    baumgarte="baumgarte" in name)
 
     rhs = source_of("rhs")
 
@@ -142,7 +159,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         return make(equations, backend, fallback)
 
     metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
-                "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
+                "reactions": list(equations.joints), "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
     return Module(metadata, provide, backend, fallback, write, report)
@@ -166,23 +184,51 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
 
 
 def _content(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
-             work: bool) -> Content:
+             work: bool, baumgarte: bool) -> Content:
     symbols = equations.symbols
-    tapes = {name: _quantities(equations, name) for name in names}
-    if work:
-        power = equations.quantity("power").reshape(1)
-        tapes["rhs"] = Tape.of(equations.recorder, rhs=np.concatenate([equations.quantity("rhs"), power]))
+    tapes = _tapes(equations, names, work, baumgarte)
+    if equations.otherwise is not None:
+        there = _tapes(equations.otherwise, names, work, baumgarte)
+        differ = {n: t for n, t in there.items() if _entries(t) != _entries(tapes[n])}
+        tapes |= {f"{n} otherwise": t for n, t in differ.items()}
     if bound:
         tapes = _together(tapes, lambda whole: specialize_tape(whole, bound))
     tapes = _together(tapes, balance)
+    otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
-              "z": [*[s.name for s in symbols.states], *[WORK] * work], "ud": [f"{s.name}_dot" for s in symbols.speeds],
-              "inputs": [s.name for s in symbols.inputs], "p": [s.name for s in symbols.parameters if s.name not in bound]}
+              "z": [*[s.name for s in symbols.states], *[WORK] * work], "ud": _given_rates(equations, names),
+              "inputs": [s.name for s in symbols.inputs],
+              "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * baumgarte]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
     titles = {n: FUNCTIONS[n][1] if n in FUNCTIONS else n for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
-                   _by_name(symbols.initial), outputs, skipped(equations) if standalone else ())
+                   _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
+                   [[q.name for q in group] for group in equations.unit_groups], otherwise)
+
+
+def _tapes(equations: Equations, names: Sequence[str], work: bool, baumgarte: bool) -> dict[str, Tape]:
+    """The tapes of functions; of rhs with the variations asked for."""
+    tapes = {name: _quantities(equations, name) for name in names}
+    if work or baumgarte:
+        field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
+        if work:
+            field = np.concatenate([field, equations.quantity("power").reshape(1)])
+        tapes["rhs"] = Tape.of(equations.recorder, rhs=field)
+    return tapes
+
+
+def _entries(tape: Tape) -> tuple[Any, ...]:
+    return next(iter(tape.outputs.values())).entries
+
+
+def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
+    """What stands in the group ud: accelerations; for the residual also the rates of the coordinates, and multipliers."""
+    symbols = equations.symbols
+    accelerations = [f"{s.name}_dot" for s in symbols.speeds]
+    if "residual" not in names:
+        return accelerations
+    return residual_names(symbols.coordinates, symbols.speeds, symbols.states, len(equations.constraints))
 
 
 def function_tape(equations: Equations, name: str) -> Tape:

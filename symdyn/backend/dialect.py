@@ -25,6 +25,7 @@ RESERVED = frozenset([*_C_WORDS, *_LIBRARY, *_OTHERS, *keyword.kwlist, *keyword.
 LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
 PARTS = ("whole", "longest", "load", "store")
 SINCOS = ("least", "take", "sin", "cos")
+CALL = ("take", "item")
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,19 @@ class Parts:
 
 
 @dataclass(frozen=True)
+class Call:
+    """How a numeric algorithm of the tape is called; its text is the template {function}.*.jinja of the backend.
+
+    take   one statement a line, with {name} of its results, {function}, {sizes} and {arguments} separated by commas, {n_in}
+           and {n_out} their numbers, and {code} to return where it fails
+    item   what then reads result {k}
+    """
+
+    take: str
+    item: str
+
+
+@dataclass(frozen=True)
 class Dialect:
     """How one language writes numbers, operations and assignments.
 
@@ -67,6 +81,7 @@ class Dialect:
     first        index of the first entry of an array, 0 or 1
     comment      what a comment line begins with
     sincos       sines and cosines taken all at once; None where each is an operation like any other
+    call         how numeric algorithms are called; None if the language has none
     parts        how long functions are divided; None if they are not
     madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
@@ -84,6 +99,7 @@ class Dialect:
     sincos: SinCos | None = None
     madd: str | None = None
     parts: Parts | None = None
+    call: Call | None = None
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -110,7 +126,8 @@ def read_dialect(folder: Path) -> Dialect:
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
                                           "files", "madd") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
-                   parts=Parts(**table["parts"]) if "parts" in table else None)
+                   parts=Parts(**table["parts"]) if "parts" in table else None,
+                   call=Call(**table["call"]) if "call" in table else None)
 
 
 def _check_formats(path: Path, table: dict[str, Any]) -> None:
@@ -136,6 +153,12 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         faults += [f"parts.{key} is not known" for key in parts if key not in PARTS]
         trials += [(f"parts.{key}", parts[key], {"k": 0, "value": "a"} if key == "store" else {"k": 0})
                    for key in ("load", "store") if key in parts]
+    if "call" in table:
+        call = table["call"]
+        faults += [f"call.{key} is missing" for key in CALL if key not in call]
+        faults += [f"call.{key} is not known" for key in call if key not in CALL]
+        take = {"name": "r", "function": "f", "sizes": "1", "arguments": "a", "n_in": 1, "n_out": 1, "code": 1}
+        trials += [(f"call.{key}", call[key], take if key == "take" else {"name": "r", "k": 0}) for key in CALL if key in call]
     for key, text, given in trials:
         try:
             text.format(*arguments if key.startswith("operations.") else (), **given)

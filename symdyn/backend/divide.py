@@ -66,7 +66,7 @@ def _stretches(body: Sequence[Node], longest: int) -> list[list[Node]]:
     for node in body:
         current = stretches[-1]
         ends = len(current) >= longest // 2 and current[-1].section != node.section
-        if ends or len(current) >= longest:
+        if (ends or len(current) >= longest) and node.op != "item":  # what a call returns stays in its stretch
             stretches.append([])
         stretches[-1].append(node)
     return stretches

@@ -57,6 +57,9 @@ class Printer:
         custom = self.dialect.operations.get(op)
         if custom is not None:
             return custom.format(*[self._text(a)[0] for a in args]), _ATOM
+        if op == "item":
+            assert self.dialect.call is not None
+            return self.dialect.call.item.format(name=self.names[args[0]], k=args[1] + self.dialect.first), _ATOM
         if op in ("add", "sub") and self.dialect.madd is not None:
             fused = self._fused(args[0], args[1], op == "sub")
             if fused:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import groupby
+from textwrap import fill
 from typing import Any
 
 from symdyn.backend.dialect import Dialect, identifier
 from symdyn.backend.divide import divide
 from symdyn.backend.printer import Printer
+from symdyn.errors import SymdynError
 from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
 from symdyn.tape.tape import Tape, reachable, unsigned
 
 GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
 ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
 _INLINE_LENGTH = 72
+# Ends of the names of the two ways of a function that is tried in one way first.
+REGULAR, OTHERWISE = "regular", "singular"
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class Function:
     arguments   groups it reads, of t q u z ud inputs p c, in this order
     shape       of its result; loads, sections, results: statements in the dialect
     parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
+    regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
+                statements of its own
     """
 
     name: str
@@ -62,6 +68,8 @@ class Function:
     longest_chain: int
     parts: tuple[Part, ...] = ()
     n_w: int = 0
+    regular: Function | None = None
+    otherwise: Function | None = None
 
     @property
     def size(self) -> int:
@@ -82,6 +90,7 @@ class Program:
     """All functions with their shared prologue.
 
     reasons   what the return codes 1, 2, ... mean
+    kernels   numeric algorithms that are called: name -> largest size of each kind
     n_c       number of constants that the prologue computes
     """
 
@@ -89,24 +98,48 @@ class Program:
     prologue: Function
     n_c: int
     reasons: tuple[str, ...]
+    kernels: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
-          reasons: Sequence[str] = ()) -> Program:
+          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None) -> Program:
     """Write every tape (function name -> tape with one output) in the dialect.
 
-    places   leaf name -> (group, place in it)
+    places      leaf name -> (group, place in it)
+    otherwise   function name -> the tape for where the first one fails
     """
+    otherwise = otherwise or {}
     whole = Tape(next(iter(tapes.values())).recorder,
-                 {name: next(iter(tape.outputs.values())) for name, tape in tapes.items()})
+                 {name: next(iter(tape.outputs.values())) for name, tape in
+                  [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]})
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
         [*reasons, *_checks(whole, whole.steps).values()]))}
     used = set(_cores([a for n in whole.running for a in n.args] + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.hoisted if n in used)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    functions = tuple(_function(dialect, tape, places, hoisted, codes, name, titles[name]) for name, tape in tapes.items())
+    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes)
+    functions = tuple(
+        _either(name, titles[name], write(tape, name=f"{name}_{REGULAR}", title=titles[name]),
+                write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
+        else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
     prologue = _Writer(dialect, whole, places, {}, codes).prologue(constants)
-    return Program(functions, prologue, len(constants), tuple(codes))
+    return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole))
+
+
+def _either(name: str, title: str, regular: Function, otherwise: Function) -> Function:
+    """A function that is tried in one way first."""
+    groups = {*regular.arguments, *otherwise.arguments}
+    return Function(name, title, regular.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), regular.operations,
+                    regular.longest_chain, regular=regular, otherwise=otherwise)
+
+
+def _kernels(tape: Tape) -> dict[str, tuple[int, ...]]:
+    sizes: dict[str, tuple[int, ...]] = {}
+    for node in tape.steps:
+        if node.op == "call":
+            kernel = node.args[0]
+            sizes[kernel.name] = tuple(map(max, zip(kernel.sizes, sizes.get(kernel.name, kernel.sizes), strict=True)))
+    return dict(sorted(sizes.items()))
 
 
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
@@ -156,6 +189,7 @@ class _Writer:
         self.results: set[Node] = set()
         self.groups: set[str] = set()
         self.n_unnamed = 0
+        self.n_calls = 0
 
     def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]]) -> Part:
         """Statements for the steps of `body`, of which `entries` are used afterwards."""
@@ -277,6 +311,9 @@ class _Writer:
             lines = self._read(nodes)
             for node in nodes:
                 named = node in self.names and node not in self.results
+                if node.op == "call":
+                    lines += self._call(node)
+                    continue
                 value = self.printer.operation(node)
                 if self.uses[node] <= 1 and not named and node not in self.checks and len(value) <= _INLINE_LENGTH:
                     self.text[node] = value
@@ -286,6 +323,22 @@ class _Writer:
             if lines:
                 sections.append(Section(title, tuple(lines)))
         return sections
+
+    # -- numeric algorithms
+
+    def _call(self, node: Node) -> list[str]:
+        """The statements that call one; its node stands for the array of results."""
+        kernel, *values = node.args
+        way = self.dialect.call
+        if way is None:
+            raise SymdynError(f"the equations call the numeric algorithm {kernel.name}, which the backend {self.dialect.name} "
+                              "does not have; add [call] to its dialect.toml, and the algorithm to its templates")
+        self.n_calls += 1
+        self.text[node] = identifier(f"solved{self.n_calls}", self.taken)
+        arguments = fill(", ".join(map(self.printer.text, values)), 116, subsequent_indent="    ", break_long_words=False)
+        return way.take.format(name=self.text[node], function=kernel.name, sizes=", ".join(map(str, kernel.sizes)),
+                               arguments=arguments, n_in=len(values), n_out=kernel.n_out,
+                               code=self.codes[self.checks[node]]).strip().split("\n")
 
     def _name(self, node: Node) -> str:
         known = self.names.get(node)
@@ -301,6 +354,7 @@ class _Writer:
 def _checks(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
     """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
     divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
+    divisors.update(n for n in steps if n.op == "call")
     return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
 
 

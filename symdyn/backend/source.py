@@ -18,10 +18,13 @@ from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.program import Function, Part, Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.errors import SymdynError
+from symdyn.tape.kernels import MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Tape
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
            "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c"}
+# What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
+CORRECTIONS = ("position_correction", "velocity_correction", "length")
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -31,6 +34,8 @@ class Content:
 
     groups   names in the groups q, u, z, ud, inputs, p, in order; units: name -> unit; defaults: name -> number
     outputs  user outputs: (name, shape) in the order of the function `outputs`
+    unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
+    otherwise     tapes by function name for where the first ones fail
     """
 
     name: str
@@ -43,6 +48,8 @@ class Content:
     initial: Mapping[str, float]
     outputs: Sequence[tuple[str, tuple[int, ...]]] = ()
     notes: Sequence[str] = ()
+    unit_groups: Sequence[Sequence[str]] = ()
+    otherwise: Mapping[str, Tape] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -95,7 +102,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
-    program = build(dialect, content.tapes, content.titles, places)
+    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise)
     context = _context(content, program, dialect, standalone, integrator and "rhs" in content.tapes)
     files = {}
     wanted = dialect.files or {}
@@ -128,7 +135,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
     # A file with the name of a standard module would be imported in its place by whatever runs beside it.
     name = identifier(content.name, set(sys.stdlib_module_names))
-    calls = {f.name: ", ".join([*f.arguments, "out"]) for f in program.functions}
+    written = [way for f in program.functions for way in (f, f.regular, f.otherwise) if way is not None]
+    calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
     reference = make_reference(content.tapes, groups, content.defaults, calls) if standalone else None
     uses = {f.name: f.arguments for f in program.functions}
 
@@ -151,8 +159,16 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
                    "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes['inputs']}"}
         return ", ".join([strided.get(g) or state(g, "x") for g in f.arguments] + [f"frame->out + i * {f.size}"])
 
-    def field_argument(g: str) -> str:
-        return f"problem->{g}" if g in ("p", "c") else state(g, "x")
+    def field_call(function: str, result: str) -> str:
+        """Arguments of a call from the integrator, at t and x."""
+        return ", ".join([f"problem->{g}" if g in ("p", "c") else state(g, "x") for g in uses.get(function, ())] + [result])
+
+    projection = None
+    if all(n in uses for n in CORRECTIONS):
+        projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
+                      "position_call": field_call(CORRECTIONS[0], "out"), "velocity_call": field_call(CORRECTIONS[1], "out"),
+                      "needs_inputs": any("inputs" in uses[n] for n in CORRECTIONS),
+                      "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]]}
 
     metadata = {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
@@ -167,7 +183,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "n_c": program.n_c, "operations": {f.name: f.count for f in program.functions},
         "arguments": {f.name: list(f.arguments) for f in program.functions},
     }
-    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*program.functions, program.prologue)])
+    text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, program.prologue)])
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
         "hash": hashlib.sha256(text.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
@@ -175,11 +191,15 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
         "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
-        "uses_parts": any(f.parts for f in program.functions), "rows_call": rows_call, "shape_text": _shape_text,
+        "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
+        "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
-        "uses_sincos": "symdyn_sincos(" in text,
+        "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels,
+        "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
-        "field_call": ", ".join([field_argument(g) for g in uses.get("rhs", ())] + ["xd"]),
+        "field_call": field_call("rhs", "xd"), "projection": projection,
+        "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
+        "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),
     }
 

@@ -15,7 +15,7 @@ import numpy as np
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.vectors import cross, dot, zeros
-from symdyn.tape.node import is_zero
+from symdyn.tape.node import Node, is_zero
 
 
 def mass_matrix(tree: Tree) -> np.ndarray:
@@ -67,33 +67,45 @@ class Factors:
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x with M x = right, (n,)."""
-        n = len(self.inverse_D)
-        x = np.array(right, dtype=object)
-        for k in reversed(range(n)):
+        return self.outwards(self.inwards(right))
+
+    def inwards(self, right: np.ndarray) -> np.ndarray:
+        """y with L^T y = right, (n,)."""
+        y = np.array(right, dtype=object)
+        for k in reversed(range(len(y))):
             for i in range(k):
-                x[i] = x[i] - self.L[k, i] * x[k]
-        for k in range(n):
+                y[i] = y[i] - self.L[k, i] * y[k]
+        return y
+
+    def outwards(self, y: np.ndarray) -> np.ndarray:
+        """x with D L x = y, (n,)."""
+        x = np.array(y, dtype=object)
+        for k in range(len(x)):
             x[k] = x[k] * self.inverse_D[k]
             for i in range(k):
                 x[k] = x[k] - self.L[k, i] * x[i]
         return x
 
 
-def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str]) -> Factors:
+def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str], letters: str = "", least: Any = 0) -> Factors:
     """L^T D L of a symmetric positive definite matrix, from the last row to the first.
 
     reasons   what it means if the pivot of a row is not positive when the code runs
+    letters   put before the names of the factors
+    least     a pivot must be above this part of the diagonal entry that it came from
     """
     n = len(M)
     A = np.array(M, dtype=object)
     L = zeros(n, n)
     inverse: list[Any] = [0] * n
     for k in reversed(range(n)):
-        algebra.name(f"D{k + 1}", A[k, k])
-        algebra.positive(A[k, k], reasons[k])
-        inverse[k] = 0 if is_zero(A[k, k]) else algebra.name(f"iD{k + 1}", 1 / A[k, k])
+        pivot = algebra.name(f"{letters}D{k + 1}", A[k, k])
+        if least and isinstance(pivot, Node) and pivot is not M[k, k]:
+            pivot = algebra.divisor(pivot, least * M[k, k], reasons[k])
+        algebra.positive(pivot, reasons[k])
+        inverse[k] = 0 if is_zero(pivot) else algebra.name(f"i{letters}D{k + 1}", 1 / pivot)
         for i in range(k):
-            L[k, i] = algebra.name(f"L{k + 1}_{i + 1}", A[k, i] * inverse[k])
+            L[k, i] = algebra.name(f"{letters}L{k + 1}_{i + 1}", A[k, i] * inverse[k])
         for i in range(k):
             for j in range(i + 1):
                 A[i, j] = A[i, j] - L[k, i] * A[k, j]

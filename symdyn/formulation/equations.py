@@ -44,6 +44,8 @@ class Equations:
     again        derives the same equations on a new tape, so that files do not depend on what was recorded before
     frames       axes that quantities are formed in: "body", or "parallel" where links keep those of the link before
     candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
+    constraints  names of the constraint rows; holonomic: whether each holds positions; joints: those in `reactions`
+    otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     identification   what records regressors and base parameters; None without bodies
     """
 
@@ -60,6 +62,10 @@ class Equations:
     simplify_seconds: float = 10.0
     frames: str = "body"
     candidates: tuple[Any, ...] = ()
+    constraints: tuple[str, ...] = ()
+    holonomic: tuple[bool, ...] = ()
+    joints: tuple[str, ...] = ()
+    otherwise: Equations | None = None
     identification: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[str, Any] = field(default_factory=dict)

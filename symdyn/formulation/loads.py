@@ -21,19 +21,27 @@ from symdyn.tape.node import is_zero
 class Applied:
     """What acts on a tree: a wrench (f, n about the origin, link axes) for each link, a force for each joint speed.
 
-    anything   False if there is no load at all
+    poses    of the bodies; bodies: the same wrenches body by body, about the origins and in the axes of their links
     """
 
     wrenches: list[tuple[np.ndarray, np.ndarray]]
     joint: np.ndarray
-    anything: bool = False
+    poses: tuple[Pose, ...]
+    bodies: list[tuple[np.ndarray, np.ndarray]]
 
     def add(self, pose: Pose, f: np.ndarray, n: np.ndarray) -> None:
         """Add a wrench about the link's origin, link axes."""
-        self.anything = True
+        self.at_body(pose, f, n)
         if pose.link != GROUND:
             force, moment = self.wrenches[pose.link]
             self.wrenches[pose.link] = (force + f, moment + n)
+
+    def at_body(self, pose: Pose, f: np.ndarray, n: np.ndarray) -> None:
+        """Add it to the body alone; the ground's is dropped."""
+        for k, own in enumerate(self.poses):
+            if own is pose:
+                force, moment = self.bodies[k]
+                self.bodies[k] = (force + f, moment + n)
 
 
 class Loads:
@@ -46,7 +54,8 @@ class Loads:
 
     def applied(self, conservative: bool = True, other: bool = True) -> Applied:
         """All loads but gravity; springs are the conservative ones, everything else is not."""
-        result = Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)))
+        result = Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)), self.tree.poses,
+                         [(zeros(3), zeros(3)) for _ in self.tree.poses])
         for load in self.model.loads:
             with self.algebra.section(f"load {load.label}"):
                 if isinstance(load, SpringDamper):
@@ -94,7 +103,6 @@ class Loads:
         joint = load.joint
         for link in self.tree.links:
             if link.joint is joint or link.joint.name == joint:
-                result.anything = True
                 for place, value in zip(link.speeds, load.values, strict=True):
                     result.joint[place] = result.joint[place] + self.algebra.expression(value)
 

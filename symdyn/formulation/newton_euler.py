@@ -50,27 +50,35 @@ def outward(tree: Tree, w_dot: Vector, a_0: np.ndarray) -> list[LinkMotion]:
 
     With a_0 = -gravity the weight is part of the inertial forces.
     """
-    algebra = tree.algebra
-    nothing = zeros(3)
-    base = LinkMotion(nothing, nothing, a_0, zeros(3, 3), zeros(3, 3))
     motions: list[LinkMotion] = []
     for k, link in enumerate(tree.links):
-        with algebra.section(f"link {link.name}: velocity and acceleration"):
-            before = base if link.parent == GROUND else motions[link.parent]
-            E = link.R.T
-            joint_omega, joint_v = _times(link.S, tree.w[link.speeds.start:link.speeds.stop])
-            joint_alpha, joint_a = _times(link.S, w_dot[link.speeds.start:link.speeds.stop])
-            carried = E @ before.omega
-            omega = carried + joint_omega
-            alpha = E @ before.alpha + (joint_alpha + link.c[:3] + cross(carried, joint_omega))
-            a = E @ before.at(link.r) + (joint_a + link.c[3:] + 2 * cross(carried, joint_v))
-            algebra.vector(f"w{k + 1}", omega)
-            algebra.vector(f"al{k + 1}", alpha)
-            algebra.vector(f"a{k + 1}", a)
-            U, P = rates_matrix(omega, alpha)
-            algebra.vector(f"U{k + 1}", U)
-            motions.append(LinkMotion(omega, alpha, a, U, P))
+        before = base_motion(a_0) if link.parent == GROUND else motions[link.parent]
+        motions.append(carried_on(tree, k, before, w_dot))
     return motions
+
+
+def base_motion(a_0: np.ndarray) -> LinkMotion:
+    """A base that does not turn, with the acceleration a_0 (3,)."""
+    return LinkMotion(zeros(3), zeros(3), a_0, zeros(3, 3), zeros(3, 3))
+
+
+def carried_on(tree: Tree, k: int, before: LinkMotion, w_dot: Vector) -> LinkMotion:
+    """Motion of link k from that of the link before, for joint accelerations w_dot (n_w,)."""
+    algebra, link = tree.algebra, tree.links[k]
+    with algebra.section(f"link {link.name}: velocity and acceleration"):
+        E = link.R.T
+        joint_omega, joint_v = _times(link.S, tree.w[link.speeds.start:link.speeds.stop])
+        joint_alpha, joint_a = _times(link.S, w_dot[link.speeds.start:link.speeds.stop])
+        carried = E @ before.omega
+        omega = carried + joint_omega
+        alpha = E @ before.alpha + (joint_alpha + link.c[:3] + cross(carried, joint_omega))
+        a = E @ before.at(link.r) + (joint_a + link.c[3:] + 2 * cross(carried, joint_v))
+        algebra.vector(f"w{k + 1}", omega)
+        algebra.vector(f"al{k + 1}", alpha)
+        algebra.vector(f"a{k + 1}", a)
+        U, P = rates_matrix(omega, alpha)
+        algebra.vector(f"U{k + 1}", U)
+        return LinkMotion(omega, alpha, a, U, P)
 
 
 def inertial_wrench(inertia: Inertia, motion: LinkMotion) -> tuple[np.ndarray, np.ndarray]:

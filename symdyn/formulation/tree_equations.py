@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import sympy as sp
 
@@ -28,23 +29,32 @@ def derive_tree(model: Model, formulation: str, frames: str, derivation: type[Tr
     frames   "body": every link in its own axes; "parallel": in those of the link before where axes stay parallel
     Raises ModelError for constraints and for speeds that move nothing, SymdynError for unknown frames.
     """
-    if frames not in FRAMES:
-        raise SymdynError(f"frames {frames!r} asked for; there are {' and '.join(map(repr, FRAMES))}")
     if model.constraints or model.loops:
         count = len(model.constraints) + len(model.loops)
-        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: remove "
-                          "them, or let joints take expressions of fewer coordinates"], model.name)
-    recorder = Recorder()
-    algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
-    tree = build(model, algebra, frames == "parallel")
-    quantities = derivation(tree)
+        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: use "
+                          "system.augmented(), or let joints take expressions of fewer coordinates"], model.name)
+    quantities = derivation(tree_of(model, frames))
     quantities.demand_inertia()
+    return tree_result(quantities, formulation, result, partial(derive_tree, model, formulation, frames, derivation, result))
+
+
+def tree_of(model: Model, frames: str) -> Tree:
+    """The tree of a model on a tape of its own. Raises SymdynError for unknown frames."""
+    if frames not in FRAMES:
+        raise SymdynError(f"frames {frames!r} asked for; there are {' and '.join(map(repr, FRAMES))}")
+    recorder = Recorder()
+    return build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), frames == "parallel")
+
+
+def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], again: Callable[[], E], **more: Any) -> E:
+    """The equations that hold the quantities of a tree; again: derives them anew."""
+    model, tree, algebra = quantities.model, quantities.tree, quantities.algebra
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
                       model.parameters, model.defaults, model.initial, model.units, model.duration)
-    return result(model.name, formulation, model.planar, symbols, recorder, algebra.leaves, quantities.quantities(),
-                  tuple(_notes(model, tree) + quantities.notes), _unit_groups(model),
-                  partial(derive_tree, model, formulation, frames, derivation, result),
-                  frames="parallel" if tree.parallel else "body", identification=quantities.identification)
+    return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, quantities.quantities(),
+                  tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
+                  frames="parallel" if tree.parallel else "body", identification=quantities.identification,
+                  joints=quantities.reacting, **more)
 
 
 def _notes(model: Model, tree: Tree) -> list[str]:

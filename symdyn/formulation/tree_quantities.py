@@ -14,6 +14,7 @@ from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.loads import Loads
 from symdyn.formulation.motion import Motion
 from symdyn.formulation.newton_euler import inverse_dynamics, inward, outward
+from symdyn.formulation.reactions import reactions
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.model.bodies import Point
 from symdyn.model.orientation import EulerAngles
@@ -37,6 +38,11 @@ class TreeQuantities(Motion):
         self.identification = Identification(tree, self.speed_rates)
         self.notes: list[str] = []
 
+    @property
+    def reacting(self) -> tuple[str, ...]:
+        """Names of the joints in the rows of `reactions`."""
+        return tuple(j.name for j in self.model.joints)
+
     def demand_inertia(self) -> None:
         """Raise ModelError for speeds that move nothing at any state."""
         demand_mass_matrix(self.model, self.algebra.recorder, self.recall("M_tilde"))
@@ -45,7 +51,7 @@ class TreeQuantities(Motion):
         """name -> function that records it."""
         own = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde, "J": self.J, "Jdot": self.Jdot,
                "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
-               "energy": self.energy, "power": self.power, "power_x": self.power_x,
+               "reactions": self.reactions, "energy": self.energy, "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         return {**super().quantities(), **own, **self.identification.quantities()}
 
@@ -108,6 +114,20 @@ class TreeQuantities(Motion):
             rows.append([*self.kinematics.position(pose, zeros(3)), *self.kinematics.rotation(pose).ravel()])
         return np.array(rows, dtype=object).reshape(-1, 12)
 
+    def reactions(self) -> np.ndarray:
+        """Force and moment of each joint on its child, at its point on the child, n-frame, (n_joints, 6)."""
+        found = self.all_reactions()
+        return np.array([found[name] for name in self.reacting], dtype=object).reshape(-1, 6)
+
+    def all_reactions(self) -> dict[str, np.ndarray]:
+        """Joint name -> reaction."""
+        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations())
+
+    def joint_accelerations(self) -> np.ndarray:
+        """w_dot, (n_w,)."""
+        ud = self.recall("accelerations")
+        return self.tree.D @ ud + self.tree.b if len(ud) and len(self.tree.w) else self.tree.b
+
     def energy(self) -> np.ndarray:
         """Kinetic energy; potential energy of gravity and springs, J."""
         with self.algebra.section("energy"):
@@ -123,7 +143,7 @@ class TreeQuantities(Motion):
                 total = inner(forces, self.tree.w)
             if any(not is_zero(v) for v in self.tree.w_t):
                 applied = self.loads.applied()
-                w_dot = self.tree.D @ self.recall("accelerations") + self.tree.b
+                w_dot = self.joint_accelerations()
                 tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches) - applied.joint
                 total = total + inner(tau, self.tree.w_t)
             return total
@@ -158,7 +178,7 @@ class TreeQuantities(Motion):
         elif point.quantity == "bias_acceleration":
             rows = kinematics.acceleration(pose, at, kinematics.reference)
         else:
-            w_dot = self.tree.D @ self.recall("accelerations") + self.tree.b
+            w_dot = self.joint_accelerations()
             rows = kinematics.acceleration(pose, at, outward(self.tree, w_dot, zeros(3)))[:3]
         if self.model.planar:
             return rows[:2] if rows.shape == (3,) else rows[[0, 1, 5]]

@@ -18,6 +18,7 @@ from symdyn.model.bodies import Body, Point
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint
 from symdyn.model.loads import Force, JointForce
+from symdyn.model.loop_check import constraint_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.record import Model, joint_speeds
@@ -33,7 +34,7 @@ def check(system: System) -> Model:
 
     Raises ModelError that lists every fault; warns (ModelWarning) of inertias that no real body has.
     """
-    return _Checker(system).model()
+    return _Checker(with_carriers(system)).model()
 
 
 class _Checker:
@@ -55,9 +56,10 @@ class _Checker:
             self.doubts += doubts
         for joint in [*self.joints, *s.loops]:
             self.faults.extend(joint.faults)
+        self.faults += loop_faults(s.loops, {str(j.name): j for j in self.joints}, self._resolve)
         order = self._tree()
         if s.planar:
-            self.faults += plane_faults([*self.joints, *s.loops], s.ground_motion)
+            self.faults += plane_faults([*self.joints, *(j for j in s.loops if isinstance(j, Joint))], s.ground_motion)
         self._coordinates()
         self._symbols()
         self._loads()
@@ -88,6 +90,7 @@ class _Checker:
         moving = [] if s.ground_motion is None else [s.ground_motion.name]
         for kind, names in (("bodies", ["ground", *[b.name for b in s.bodies]]),
                             ("joints", [*moving, *[j.name for j in [*self.joints, *s.loops]]]),
+                            ("constraints", [c.name for c in s.constraints]),
                             ("outputs", [o.name for o in s.outputs]), ("states", [z.symbol.name for z in s.states]),
                             ("loads", [load.label for load in s.loads])):
             for name, count in Counter(map(_hashable, names)).items():
@@ -107,8 +110,6 @@ class _Checker:
             if not isinstance(name, str) or not NAME.fullmatch(name):
                 self.faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
                                    "_ . , : + - * / ^ ' # % and brackets")
-
-    # -- bodies
 
     # -- tree
 
@@ -143,9 +144,6 @@ class _Checker:
         doubtful: set[int] = set()
         if not s.bodies:
             self.faults.append("the system has no bodies; add one with add_body and join it with add_joint")
-        for joint in s.loops:
-            self._resolve(joint.parent, f"joint {joint.name!r}: parent")
-            self._resolve(joint.child, f"joint {joint.name!r}: child")
         for joint in self.joints:
             parent = self._resolve(joint.parent, f"joint {joint.name!r}: parent")
             child = self._resolve(joint.child, f"joint {joint.name!r}: child")
@@ -264,6 +262,7 @@ class _Checker:
                 else:
                     parameters[symbol] = None
         states = {z.symbol for z in s.states}
+        self.faults += constraint_faults(s.constraints, moving - states - {time}, states, self.speeds)
         for joint in self.joints:
             for q in joint.coordinates:
                 rates = [] if isinstance(q, Coordinate) else [
@@ -364,7 +363,6 @@ class _Checker:
             self.faults.append(f"{what} is {value!r}; pass a finite number")
             return None
         return number
-
 
 
 def _symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.model.bodies import Body
+from symdyn.model.closures import Rod
 from symdyn.model.joints import Custom, Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
 
@@ -55,7 +56,7 @@ def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
             if joint.transform is not None and not joint.transform.in_plane:
                 faults.append(f"{where} (custom): its transform leaves the x-y plane, but the system is planar; turn about z "
                               "and move in x and y only, or make the system spatial: planar=False")
-        elif not isinstance(joint, (Revolute, Prismatic, Planar, Fixed)):
+        elif not isinstance(joint, (Revolute, Prismatic, Planar, Fixed, Rod)):
             faults.append(f"{where} is {joint.kind}, but the system is planar; use Revolute, Prismatic, Planar or "
                                "Fixed, or make the system spatial: planar=False")
         elif isinstance(joint, Revolute) and any(abs(numeric(e)) > 1e-9 for e in joint.axis[:2]):

@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from symdyn.model.bodies import Body
+from symdyn.model.closures import Constraint, Gear
 from symdyn.model.joints import Joint
 
 
@@ -33,6 +34,7 @@ class Model:
     """A checked mechanism.
 
     bodies        in the order they were added, without the ground
+    loops         joints that close loops, rods and gears; constraints: by expression
     joints        parents before children; joint k moves `bodies[children[k]]` relative to parent index, -1 the ground
     coordinates   independent ones, q; speeds u; rates: symbol of each coordinate's derivative -> its coordinate
     parameters, inputs   symbols in the order of first use
@@ -51,8 +53,8 @@ class Model:
     loads: tuple[Any, ...]
     outputs: tuple[NamedOutput, ...]
     states: tuple[State, ...]
-    constraints: tuple[sp.Expr, ...]
-    loops: tuple[Joint, ...]
+    constraints: tuple[Constraint, ...]
+    loops: tuple[Joint | Gear, ...]
     coordinates: tuple[sp.Symbol, ...]
     speeds: tuple[sp.Symbol, ...]
     parameters: tuple[sp.Symbol, ...]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import sympy as sp
 
 from symdyn.model.bodies import Body, Point
 from symdyn.model.check import check
+from symdyn.model.closures import Constraint, Gear
 from symdyn.model.faults import Faults
 from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
@@ -17,11 +18,13 @@ from symdyn.model.record import Model, NamedOutput, State
 from symdyn.model.symbols import Coordinate, as_coordinate
 
 if TYPE_CHECKING:
+    from symdyn.formulation.augmented_equations import AugmentedEquations
     from symdyn.formulation.embedding import EmbeddedEquations
     from symdyn.formulation.motion_equations import MotionEquations
     from symdyn.formulation.recursion import RecursiveEquations
 
 ZERO = (0, 0, 0)
+Closure = TypeVar("Closure", Joint, Gear)
 
 
 class System:
@@ -53,8 +56,8 @@ class System:
         self.loads: list[Any] = []
         self.outputs: list[NamedOutput] = []
         self.states: list[State] = []
-        self.constraints: list[sp.Expr] = []
-        self.loops: list[Joint] = []
+        self.constraints: list[Constraint] = []
+        self.loops: list[Joint | Gear] = []
         self.ground_motion: Joint | None = None
         self.extra_coordinates: list[sp.Symbol] = []
         self.defaults: dict[Any, float] = {}
@@ -92,10 +95,13 @@ class System:
             self.joints.append(joint)
         return joint
 
-    def close_loop(self, joint: Joint) -> Joint:
-        """A joint between two bodies that are already in the tree: it becomes constraints."""
-        if not isinstance(joint, Joint):
-            self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...)")
+    def close_loop(self, joint: Closure) -> Closure:
+        """A joint between two bodies that are already in the tree, an sd.Rod, or an sd.Gear: it becomes constraints.
+
+        A joint's coordinates do not become coordinates of the system, except those of Helical and Custom joints.
+        """
+        if not isinstance(joint, (Joint, Gear)):
+            self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...), an sd.Rod or an sd.Gear")
         else:
             self.loops.append(joint)
         return joint
@@ -177,9 +183,10 @@ class System:
             taken = Coordinate(f"state_{len(self.states) + 1}")
         self.states.append(State(taken, self._faults.expression(rate, f"rate of state {symbol}")))
 
-    def add_constraint(self, expression: Any) -> None:
+    def add_constraint(self, expression: Any, name: str = "") -> None:
         """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
-        self.constraints.append(self._faults.expression(expression, f"constraint {len(self.constraints) + 1}"))
+        label = name or f"constraint_{len(self.constraints) + 1}"
+        self.constraints.append(Constraint(label, self._faults.expression(expression, label)))
 
     # -- what comes of it
 
@@ -207,6 +214,20 @@ class System:
         from symdyn.formulation.recursion import recursive
 
         return recursive(self.check(), frames)
+
+    def augmented(self, coordinates: str = "relative", orientation: Any = None, frames: str = "body") -> AugmentedEquations:
+        """The augmented equations M u_dot + C_r^T lam = F - k, C_r u_dot = F_d with multipliers lam.
+
+        coordinates   "relative": the tree as it is, constraints close its loops; "absolute": every body has coordinates of
+                      its own (planar x, y, theta; spatial x, y, z of its origin and its orientation in the n-frame), and every
+                      joint becomes constraints
+        orientation   of the bodies in absolute coordinates: EulerParameters(), the default, or EulerAngles(...)
+        frames        as for `embedding`
+        Raises ModelError with every fault found, and for constraints that cannot hold or move nothing.
+        """
+        from symdyn.formulation.augmented import augment
+
+        return augment(self.check(), coordinates, orientation, frames)
 
     def equations(self, tune: bool = False) -> MotionEquations:
         """The equations in the formulation that computes accelerations in the least predicted time.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.bodies import Point
+from symdyn.model.closures import Gear
 from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.record import joint_speeds
@@ -26,7 +27,9 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
     yield "gravity", s.gravity, True
     for body in s.bodies:
         yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
-    for joint in [*joints, *s.loops]:
+    for gear in (g for g in s.loops if isinstance(g, Gear)):
+        yield f"gear {gear.name!r}", [gear.ratio, gear.offset], True
+    for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:
         yield f"joint {joint.name!r}", joint.constants, True
         yield (f"joint {joint.name!r}: coordinates",
                [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
@@ -50,8 +53,8 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
             yield f"output {output.name!r}", value if isinstance(value, tuple) else [value], False
     for state in s.states:
         yield f"rate of state {state.symbol}", [state.rate], False
-    for k, constraint in enumerate(s.constraints):
-        yield f"constraint {k + 1}", [constraint], False
+    for constraint in s.constraints:
+        yield constraint.name, [constraint.expression], False
 
 
 def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> dict[sp.Symbol, str]:

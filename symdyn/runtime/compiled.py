@@ -11,7 +11,8 @@ import numpy as np
 
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.outcome import Outcome, Request
-from symdyn.runtime.stops import describe_stop, nearly_singular, with_last
+from symdyn.runtime.stabilization import Corrections, not_converged
+from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 PIECE = 20_000
 STEPS_AT_ONCE = 4096
 _DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
+_PROJECTION_FAILED = -6
 _INPUT_STOPPED = 100_000
 _InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
                                   ctypes.POINTER(ctypes.c_double))
@@ -30,7 +32,9 @@ class Problem(ctypes.Structure):
     """Parameters, constants and inputs of a run; see `problem` in the generated source."""
 
     _fields_ = [("p", ctypes.c_void_p), ("c", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("n_table", ctypes.c_long),
-                ("table_t", ctypes.c_void_p), ("table", ctypes.c_void_p), ("function", _InputFunction)]
+                ("table_t", ctypes.c_void_p), ("table", ctypes.c_void_p), ("function", _InputFunction),
+                # only in units that can project; the others do not read as far
+                ("project", ctypes.c_int), ("length", ctypes.c_double)]
 
 
 class _Run:
@@ -45,10 +49,13 @@ class _Run:
         size.restype = ctypes.c_long
         self.memory = ctypes.create_string_buffer(size() + 64)
         self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
-        self.p, self.c = np.zeros(max(1, len(request.p))), np.zeros(max(1, unit.metadata["n_c"]))
-        self.p[:len(request.p)] = request.p
+        self.request = request
+        self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, unit.metadata["n_c"]))
+        self.p[:len(request.field_p)] = request.field_p
         unit.prologue(self.p, self.c)
         self.problem = Problem(self.p.ctypes.data, self.c.ctypes.data)
+        self.problem.project = int(request.stabilization.way == "projection")
+        self.problem.length = request.stabilization.length
         self.kept: list[Any] = [request.x0, request.atol]
         self._inputs(request)
         span = np.array([*request.span, request.rtol, request.first_step, request.max_step])
@@ -96,7 +103,8 @@ class _Run:
             return int(self.unit.function(name)(self.address, *arguments, ctypes.byref(self.written)))
 
     def report(self) -> np.ndarray:
-        out = np.zeros(8 + 2 * self.n_x)
+        """See `simulation_report` in the generated source."""
+        out = np.zeros(8 + 2 * self.n_x + 6)
         self.unit.function("simulation_report")(self.address, ctypes.c_void_p(out.ctypes.data))
         return out
 
@@ -151,7 +159,9 @@ def run_compiled(module: Module, request: Request, bar: Any = None, field: str =
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
     if not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
-    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds)
+    dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
+    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds,
+                   Corrections(dq, du, int(n_corrected), int(n_corrections)))
 
 
 def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
@@ -162,12 +172,29 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
     if stopped:
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _FIELD_FAILED:
-        return describe_stop(metadata, report[7], report[8 + n:], run.unit.reason(int(report[5])))
+        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], run.unit.reason(int(report[5])))
     if status == _NOT_FINITE:
         bad = int(report[6])
         name = metadata["x"][bad] if 0 <= bad < n else "the state"
-        return describe_stop(metadata, report[7], report[8 + n:], f"the derivative of {name} is not finite")
+        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], f"the derivative of {name} is not finite")
+    own, p = module.metadata["sizes"], run.request.p
+    if status == _PROJECTION_FAILED:
+        x_fail = report[8 + n:8 + 2 * n]
+        why = lost_rank(module, report[7], x_fail[:own["x"]], p, run.request.x0[:own["x"]], run.request.span[0])
+        return describe_stop(metadata, report[7], x_fail, f"no way back onto the constraints: {_off(module, run, report)}{why}")
     if status == _STEP_TOO_SMALL:
-        why = nearly_singular(module, t, x[:module.metadata["sizes"]["x"]], run.p[:module.metadata["sizes"]["p"]])
+        why = nearly_singular(module, t, x[:own["x"]], p) + lost_rank(module, t, x[:own["x"]], p,
+                                                                      run.request.x0[:own["x"]], run.request.span[0])
         return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
     return describe_stop(metadata, t, x, f"the integrator refused (status {status})")
+
+
+def _off(module: Module, run: _Run, report: np.ndarray) -> str:
+    """Why a projection failed."""
+    rows, reason, worst = module.metadata["constraints"], int(report[5]), int(report[6])
+    if reason:
+        return run.unit.reason(reason)
+    if 0 <= worst < len(rows):
+        residual, of_speeds = report[12 + 2 * run.n_x:14 + 2 * run.n_x]
+        return not_converged(rows[worst], residual, bool(of_speeds))
+    return "the correction would go further than half the step"

@@ -81,7 +81,7 @@ class Module:
         evaluator = self._evaluator(name, params)
         state = self._rows(x, "x", "x")
         free = self._rows(inputs, "inputs", "inputs")
-        acceleration = self._rows(ud, "ud", "u")
+        acceleration = self._rows(ud, "ud", "ud", self._unit(name).metadata)
         try:
             times = np.asarray(t, dtype=float)
         except (TypeError, ValueError):
@@ -156,6 +156,37 @@ class Module:
         """Parameters in order, (n_p,)."""
         return take(params, self.metadata["parameters"], "parameters", self._defaults, self.name)
 
+    # -- constraints
+
+    def consistent(self, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
+                   keep: Sequence[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """A state that fulfils the constraints: q (n_q,) and u (n_u,) near the guess, by the smallest change of both.
+
+        q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. Of several
+                solutions (branches) the guess decides
+        keep    coordinates and speeds, by name or symbol, that stay as given
+        The change is the smallest in the metric of the mass matrix, as that of the projection in `simulate`. Raises
+        ArgumentError with the residual of every constraint that is left where there is no solution nearby.
+        """
+        from symdyn.runtime.consistent import consistent
+
+        return consistent(self, q, u, params, t, keep)
+
+    def rank(self, q: Any, params: Any = None, t: Any = 0.0) -> Any:
+        """Number of independent constraints: rank of the scaled Jacobian C_scale C_r, of one state or rows of states.
+
+        Columns of angular velocities are divided by the mechanism's length; singular values below 1e-8 of the largest are zero.
+        """
+        from symdyn.runtime.constraints import rank
+
+        return rank(self, t, self._state(q), self.parameters(params))
+
+    def unique(self, q: Any, params: Any = None, t: Any = 0.0) -> np.ndarray:
+        """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`."""
+        from symdyn.runtime.constraints import unique
+
+        return unique(self, t, self._state(q), self.parameters(params))
+
     # -- motion
 
     def simulate(self, t: Any = None, q: Any = None, u: Any = None, params: Any = None, **options: Any) -> Solution:
@@ -205,7 +236,9 @@ class Module:
         if name not in self._units:
             with self._lock:  # the derivation behind it is for one thread at a time
                 if name not in self._units:
-                    self._units[name] = self._provider(name)
+                    beside = self._units.get("rhs")  # what an integration needs besides is in the same unit
+                    shared = beside is not None and name in beside.metadata["shapes"]
+                    self._units[name] = beside if beside is not None and shared else self._provider(name)
         return self._units[name]
 
     def _evaluator(self, name: str, params: Any) -> Evaluator:
@@ -235,11 +268,12 @@ class Module:
             raise ArgumentError(f"{self.name}: q has {len(q)} rows and u has {len(u)}; give the same number")
         return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, np.zeros(sizes["z"]))], axis=1)
 
-    def _rows(self, values: Any, what: str, group: str) -> np.ndarray:
-        """One row or rows of numbers of a group; nothing stands for zeros."""
-        wanted = self.metadata["sizes"][group]
+    def _rows(self, values: Any, what: str, group: str, metadata: Mapping[str, Any] | None = None) -> np.ndarray:
+        """One row or rows of numbers of a group; nothing stands for zeros. Accelerations go by the names of the speeds."""
+        about = metadata or self.metadata
+        wanted = about["sizes"][group]
+        names = about["u" if what == "ud" and wanted == about["sizes"]["u"] else group]
         if isinstance(values, Mapping):
-            names = self.metadata["u" if what == "ud" else group]
             return take(values, names, what, dict.fromkeys(names, 0.0), self.name)
         try:
             array = np.asarray(values if values is not None else "", dtype=float)
@@ -251,7 +285,7 @@ class Module:
             return np.zeros(wanted)
         if array.ndim not in (1, 2) or array.shape[-1] != wanted:
             raise ArgumentError(f"{self.name}: {what} has the shape {array.shape}, needed are {wanted} numbers a state: "
-                                f"{', '.join(self.metadata['u' if what == 'ud' else group])}")
+                                f"{', '.join(names)}")
         return array
 
     def __repr__(self) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.stabilization import Corrections, Stabilization
 
 
 @dataclass(frozen=True)
@@ -14,6 +15,7 @@ class Request:
     """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator.
 
     n_state   entries of x0 that are the mechanism's state; one more may be the work of the loads
+    stabilization   what keeps the state on its constraints
     """
 
     span: tuple[float, float]
@@ -27,6 +29,12 @@ class Request:
     first_step: float
     max_steps: int | None
     n_state: int
+    stabilization: Stabilization = field(default_factory=Stabilization)
+
+    @property
+    def field_p(self) -> np.ndarray:
+        """Parameters of the right-hand side: Baumgarte's gain is one more."""
+        return np.append(self.p, self.stabilization.gain) if self.stabilization.way == "baumgarte" else self.p
 
     def with_work(self) -> Request:
         """The same with one more state, the work of the loads, under the largest absolute tolerance."""
@@ -46,3 +54,4 @@ class Outcome:
     n_rejected: int
     n_evaluations: int
     seconds: float | None = None
+    corrections: Corrections = field(default_factory=Corrections)

@@ -9,7 +9,8 @@ import numpy as np
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome, Request
-from symdyn.runtime.stops import describe_stop, nearly_singular, with_last
+from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector
+from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -17,22 +18,37 @@ if TYPE_CHECKING:
 _SCIPY = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
-def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
-    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
+def solver_class_of(module: Module, method: Any) -> Any:
+    """SciPy's class by name, or the class that was given; raises ArgumentError for another method."""
     from scipy import integrate
 
     if isinstance(method, str):
         if method not in _SCIPY:
             raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
-                                f"{', '.join(_SCIPY)}, or pass an OdeSolver class")
-        solver_class = getattr(integrate, method)
-    elif isinstance(method, type) and issubclass(method, integrate.OdeSolver):
-        solver_class = method
-    else:
-        raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
+                                f"{', '.join(_SCIPY)}, ggl (with constraints), or pass an OdeSolver class")
+        return getattr(integrate, method)
+    if isinstance(method, type) and issubclass(method, integrate.OdeSolver):
+        return method
+    raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
+
+
+def takes_changed_states(solver_class: Any) -> bool:
+    """Whether a solver goes on from y and f alone, so that both may be changed after a step: one-step methods do."""
+    from scipy.integrate import Radau
+    from scipy.integrate._ivp.rk import RungeKutta
+
+    return issubclass(solver_class, (RungeKutta, Radau))
+
+
+def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
+    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
+    from scipy import integrate
+
+    solver_class = solver_class_of(module, method)
     bound = module.bind(request.p)
     evaluator = module.unit(field_name).evaluator("rhs")
-    evaluator.set_params(request.p)
+    evaluator.set_params(request.field_p)
+    projector = Projector(module, request.p) if request.stabilization.way == "projection" else None
     n_state = request.n_state
     free: Inputs = request.inputs
     n_in = len(free.constant)
@@ -63,7 +79,8 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         bordered[n_state, :n_state] = module.evaluate("power_x", s, state, request.p, inputs)
         return bordered
 
-    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA):
+    exact = request.stabilization.way != "baumgarte" and "jacobian_x" in module.functions
+    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and exact:
         options["jac"] = jacobian
 
     def field(s: float, x: np.ndarray) -> np.ndarray:
@@ -83,9 +100,11 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
     solver: Any = None
     try:
         with np.errstate(all="ignore"):
-            if not np.isfinite(field(t0, request.x0)).all():  # SciPy would look for a first step for ever
+            if projector is not None:
+                xs[0] = state = projector(t0, request.x0)
+            if not np.isfinite(field(t0, state)).all():  # SciPy would look for a first step for ever
                 raise EvaluationError(trouble[-1])
-            solver = solver_class(field, t0, request.x0, t_end, **options)
+            solver = solver_class(field, t0, state, t_end, **options)
             while solver.status == "running":
                 before = solver.t
                 note = solver.step()
@@ -93,18 +112,27 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                     message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
                         module, here, state[:n_state], request.p) if note else "the state is not finite"
                     break
+                trouble.clear()
+                # The polynomial of the step ends where the step did, before the projection.
+                passed = pending and (pending[0] - solver.t) * solver.direction < 0
+                dense = solver.dense_output() if passed else None
+                if projector is not None:
+                    tolerated = request.atol + request.rtol * np.abs(solver.y)
+                    projected, moved = projector.step(float(solver.t), solver.y, tolerated)
+                    if moved:
+                        solver.f = solver.fun(solver.t, projected)
+                    solver.y = projected
                 accepted += 1
                 here, state = float(solver.t), solver.y.copy()
-                trouble.clear()
                 if request.times is None:
                     ts.append(solver.t)
                     xs.append(state)
-                else:
-                    dense = None
-                    while pending and (pending[0] - solver.t) * solver.direction <= 0:
-                        dense = dense or solver.dense_output()
-                        xs.append(state if pending[0] == solver.t else dense(pending[0]))
-                        ts.append(pending.pop(0))
+                while pending and (pending[0] - solver.t) * solver.direction <= 0:
+                    if pending[0] == solver.t or dense is None:
+                        xs.append(state)
+                    else:
+                        xs.append(projector(pending[0], dense(pending[0])) if projector else dense(pending[0]))
+                    ts.append(pending.pop(0))
                 if bar is not None:
                     bar.update(abs(solver.t - before))
                 if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
@@ -112,6 +140,8 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                     break
     except KeyboardInterrupt:
         interrupted, message = True, "interrupted"
+    except ProjectionFailed as error:
+        message = str(error) + lost_rank(module, here, state[:n_state], request.p, request.x0[:n_state], t0)
     except (ValueError, ArithmeticError) as error:
         if error in raised:
             raise
@@ -124,4 +154,5 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
     if not done:
         t, x = with_last(t, x, here, state)
     return Outcome(t, x, done, message or "reached the end", interrupted, accepted, 0,
-                   int(solver.nfev) if solver is not None else 0)
+                   int(solver.nfev) if solver is not None else 0,
+                   corrections=projector.corrections if projector is not None else Corrections())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,10 +12,12 @@ import numpy as np
 from symdyn.errors import ArgumentError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.arguments import take
 from symdyn.runtime.compiled import run_compiled
+from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.inputs import take_inputs
-from symdyn.runtime.outcome import Request
-from symdyn.runtime.scipy_run import run_scipy
+from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
+from symdyn.runtime.stabilization import Stabilization, choose, chosen_gain
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -22,12 +25,14 @@ if TYPE_CHECKING:
 N_POINTS = 1001
 # What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
 SMALLEST_RTOL = 1e-15
+# Steps of the trial run that Baumgarte's gain is chosen by.
+TRIAL_STEPS = 100
 
 
 def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
-             progress: bool = False, work: bool = False) -> Solution:
+             progress: bool = False, work: bool = False, stabilization: Any = None) -> Solution:
     """Integrate the motion.
 
     t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
@@ -37,10 +42,16 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
     rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 on; atol a number or (n_x,), default rtol
     method      "dop853" compiled (default with the C backend), or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or
-                an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian
+                an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian. With constraints also "ggl": the
+                stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit method (pip install 'symdyn[dae]')
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
     progress    show a bar (needs tqdm)
     work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
+    stabilization   what keeps constraints, and the norm of Euler parameters, to rounding or within the tolerances:
+                "projection": after every step, and at every output time, the smallest change in the metric of the mass
+                matrix that fulfils them; "baumgarte", or ("baumgarte", a): C_ddot + 2 a C_dot + a^2 C = 0 instead of
+                C_ddot = 0, unless given with a = 1/(twenty mean steps of a short run without); "none".
+                Default: projection, with methods that build on several steps (BDF, LSODA) baumgarte
 
     Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
     and why, and a SimulationWarning is given. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
@@ -56,22 +67,23 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     request = Request(span, None if every else times, start, p, free, *_tolerances(module, rtol, atol),
                       _positive(module, max_step, "max_step"), _positive(module, first_step, "first_step"), max_steps,
                       len(start))
-    field = "rhs"
-    if work:
-        if "power" not in metadata["functions"]:
-            raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
-        field, request = "rhs_work", request.with_work()
+    if work and "power" not in metadata["functions"]:
+        raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or ("dop853" if module.backend == "c" else "DOP853")
+    if method == "dop853" and module.backend != "c":
+        raise ArgumentError(f"{module.name}: the compiled integrator 'dop853' needs the C backend; this module "
+                            f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
+    check_start(module, span[0], start, p)
+    if method == "ggl":
+        from symdyn.runtime.dae_run import check_ggl
+
+        check_ggl(module, start, p, span[0], stabilization, work)
+    else:
+        request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
     bar = _bar(module, span) if progress else None
     begun = clock.perf_counter()
     try:
-        if method == "dop853":
-            if module.backend != "c":
-                raise ArgumentError(f"{module.name}: the compiled integrator 'dop853' needs the C backend; this module "
-                                    f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
-            outcome = run_compiled(module, request, bar, field)
-        else:
-            outcome = run_scipy(module, request, method, bar, field)
+        outcome = _run(module, request.with_work() if work else request, method, bar)
     finally:
         if bar is not None:
             bar.close()
@@ -84,21 +96,40 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     return solution
 
 
+def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
+    if method == "ggl":
+        from symdyn.runtime.dae_run import run_ggl
+
+        return run_ggl(module, request, bar)
+    field = "rhs" + "_work" * (len(request.x0) > request.n_state) + "_baumgarte" * (request.stabilization.way == "baumgarte")
+    return run_compiled(module, request, bar, field) if method == "dop853" else run_scipy(module, request, method, bar, field)
+
+
+def _stabilization(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
+    """What keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
+    one_step = method == "dop853" or takes_changed_states(solver_class_of(module, method))
+    chosen = choose(module, asked, one_step, str(getattr(method, "__name__", method)), request.p)
+    if chosen.way != "baumgarte":
+        return chosen
+    if chosen.gain:
+        return chosen
+
+    def trial() -> np.ndarray:
+        done = _run(module, replace(request, times=None, max_steps=TRIAL_STEPS), method)
+        if done.interrupted:
+            raise KeyboardInterrupt
+        return done.t
+
+    return replace(chosen, gain=chosen_gain(trial, request.span))
+
+
 def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
     initial = module.metadata["initial"]
     parts = []
     for what, values in (("q", q), ("u", u), ("z", z)):
         names = module.metadata[what]
         parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
-    start = np.concatenate(parts)
-    for group in module.metadata.get("unit_groups", ()):
-        places = [module.metadata["x"].index(name) for name in group]
-        norm = float(np.linalg.norm(start[places]))
-        if abs(norm - 1) > 1e-6:
-            raise ArgumentError(f"{module.name}: initial q: {', '.join(group)} have the norm {norm:.6g}, not 1; Euler parameters "
-                                "are a unit vector: divide them by their norm")
-        start[places] /= norm
-    return start
+    return normalised(module, np.concatenate(parts))
 
 
 def _times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:

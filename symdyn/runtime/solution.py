@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import difflib
 import json
@@ -12,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome
+from symdyn.runtime.reactions import reaction, reactions
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -26,6 +29,7 @@ class Solution:
     t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
     success, message    whether the end was reached, and if not when, where and why
     n_steps, n_rejected, nfev   of the integrator; seconds: wall time of the call, integrator_seconds: inside compiled code
+    corrections   of projections onto the constraints: the largest of position and speed, how many, how much work
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
@@ -39,7 +43,9 @@ class Solution:
         self.integrator_seconds = outcome.seconds
         self.seconds = seconds
         self.params, self.method, self.backend = params, method, module.backend
+        self.corrections = outcome.corrections
         self._inputs = inputs
+        self._n_c = len(names(module))
 
     def __getitem__(self, name: Any) -> np.ndarray:
         """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...).
@@ -121,15 +127,48 @@ class Solution:
         """Origin and rotation (row by row) of every body's frame, n-frame, (n_t, n_b, 12)."""
         return self._rows("frames")
 
-    @property
-    def lam(self) -> np.ndarray:
-        """Multipliers (n_t, n_c); none in the embedded form."""
-        return np.zeros((len(self.t), 0))
+    # -- constraints
 
-    @property
+    @cached_property
+    def lam(self) -> np.ndarray:
+        """Multipliers of the constraints, (n_t, n_c), the least ones where they are not unique; the force is -C_r^T lam.
+
+        No columns without constraints; not a number where they cannot be computed.
+        """
+        return self.rows("lam") if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
     def constraint_violation(self) -> np.ndarray:
-        """(n_t, n_c); none in the embedded form."""
-        return np.zeros((len(self.t), 0))
+        """Residuals of the constraints relative to the mechanism's length, (n_t, n_c)."""
+        return position_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
+    def velocity_violation(self) -> np.ndarray:
+        """Residuals C_dot of the constraints relative to the largest speed of the motion, (n_t, n_c)."""
+        return velocity_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
+    def rank(self) -> np.ndarray:
+        """Number of independent constraints, (n_t,); see Module.rank."""
+        return rank(self.module, self.t, self.x, self.params) if self._n_c else np.zeros(len(self.t), dtype=int)
+
+    @cached_property
+    def unique(self) -> np.ndarray:
+        """Which multipliers the motion determines, (n_t, n_c) of bool; see Module.unique."""
+        return unique(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0), dtype=bool)
+
+    @cached_property
+    def reactions(self) -> dict[str, np.ndarray]:
+        """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6)."""
+        return reactions(self)
+
+    def reaction(self, joint: Any, frame: str = "ground") -> np.ndarray:
+        """Force and moment of one joint, by name or as the joint, (n_t, 6), in the axes of a frame.
+
+        frame   "ground", "parent", "child", or the name of a body
+        Raises ArgumentError for another joint or frame.
+        """
+        return reaction(self, joint, frame)
 
     def energy_error(self) -> float:
         """Largest |change of energy - work of the loads| over the larger of kinetic energy and range of potential energy.
@@ -171,18 +210,23 @@ class Solution:
                 arrays["energy"] = self.energy
             if self.module.metadata["inputs"]:
                 arrays["inputs"] = self.inputs
+            if self._n_c:
+                about["constraints"] = names(self.module)
+                arrays |= {"lam": self.lam, "constraint_violation": self.constraint_violation,
+                           "velocity_violation": self.velocity_violation}
+            arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
             np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
                      about=np.array(json.dumps(about)), **arrays)
         elif path.suffix == ".csv":
-            names = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
+            titles = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
             columns = [self.t, *self.x.T, *self.inputs.T]
             for name, rows in self.outputs.items():
                 flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
-                names += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
+                titles += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
                 columns += list(flat.T)
             with path.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)
-                writer.writerow(names)
+                writer.writerow(titles)
                 writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
         else:
             raise ArgumentError(f"cannot save to {path.name}: the ending must be .npz or .csv")
@@ -191,6 +235,21 @@ class Solution:
     @property
     def _sizes(self) -> Mapping[str, int]:
         return self.module.metadata["sizes"]  # type: ignore[no-any-return]
+
+    def rows(self, name: str) -> np.ndarray:
+        """A function of the module at every time, (n_t, ...); not a number where it cannot be evaluated."""
+        try:
+            return self._rows(name)
+        except EvaluationError:
+            return self._single_rows(name)
+
+    def _single_rows(self, name: str) -> np.ndarray:
+        found = np.full((len(self.t), *self.module.shape(name)), np.nan)
+        inputs = self.inputs
+        for k, (t, x) in enumerate(zip(self.t, self.x, strict=True)):
+            with contextlib.suppress(EvaluationError):
+                found[k] = self.module.evaluate(name, t, x, self.params, inputs[k])
+        return found
 
     def _rows(self, name: str) -> np.ndarray:
         if len(self.t) == 0:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import EvaluationError
+from symdyn.runtime.constraints import names, rank, scaled_jacobian
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 
 def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
     """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
-    if "mass_matrix" not in module.functions or not module.metadata["u"]:
-        return ""
+    if "mass_matrix" not in module.functions or not module.metadata["u"] or names(module):
+        return ""  # under constraints a singular mass matrix is nothing special
     try:
         M = module.evaluate("mass_matrix", t, x, p)
     except EvaluationError:
@@ -26,8 +27,26 @@ def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> s
     if values[0] > 1e-8 * values[-1]:
         return ""
     share = np.abs(vectors[:, 0])
-    names = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
-    return f"; the mass matrix is nearly singular there, along {', '.join(names)}"
+    along = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
+    return f"; the mass matrix is nearly singular there, along {', '.join(along)}"
+
+
+def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.ndarray, t0: float) -> str:
+    """What to add to a message where a run stopped: whether constraints depend on each other there, unlike at the start."""
+    if not names(module) or not np.isfinite(x).all():
+        return ""
+    try:
+        J = scaled_jacobian(module, t, x, p)
+        before = int(rank(module, t0, x0, p))
+    except (EvaluationError, np.linalg.LinAlgError):
+        return ""
+    U, values, _ = np.linalg.svd(J)
+    now = int((values > 1e-4 * values[0]).sum())
+    if now >= before:
+        return ""
+    share = np.abs(U[:, now:before]).max(axis=1)
+    among = ", ".join(name for name, s in zip(names(module), share, strict=True) if s > 0.1 * share.max())
+    return f"; the constraints nearly lose rank there ({now} instead of {before}): {among} nearly depend on each other"
 
 
 def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:

@@ -101,7 +101,7 @@ class CEvaluator:
         self.size = int(np.prod(self.shape))
         self.p, self.c = np.zeros(max(1, sizes["p"])), np.zeros(max(1, unit.metadata["n_c"]))
         self.t, self.x = np.zeros(1), np.zeros(sizes["x"])
-        self.ud, self.inputs = np.zeros(sizes["u"]), np.zeros(sizes["inputs"])
+        self.ud, self.inputs = np.zeros(sizes["ud"]), np.zeros(sizes["inputs"])
         self.out = np.zeros(self.size)
         self.result = self.out.reshape(self.shape)
         self.frame = Frame(1, *[a.ctypes.data for a in (self.t, self.x, self.ud, self.inputs, self.p, self.c, self.out)],
@@ -189,7 +189,7 @@ class PythonEvaluator:
     def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
         sizes = self.unit.metadata["sizes"]
         inputs = [0.0] * sizes["inputs"] if inputs is None else inputs
-        ud = [0.0] * sizes["u"] if ud is None else ud
+        ud = [0.0] * sizes["ud"] if ud is None else ud
         state = np.asarray(x, dtype=float)
         if state.ndim != 1:
             raise ValueError(f"one state has one dimension, found the shape {state.shape}")

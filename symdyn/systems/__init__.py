@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # name -> module:function; text only, so that listing the names imports no SymPy. No module may bear the name of a
 # function: loading it would put the module in the function's place.
-_CATALOGUE = {
+_TREES = {
     "pendulum": "pendulums:pendulum",
     "double_pendulum": "pendulums:double_pendulum",
     "n_link_pendulum": "pendulums:n_link_pendulum",
@@ -29,14 +29,35 @@ _CATALOGUE = {
     "two_link_arm": "arms:two_link_arm",
     "three_link_arm": "arms:three_link_arm",
     "puma560": "puma:puma560",
+    "flyball_governor": "governors:flyball_governor",
 }
+_CONSTRAINED = {
+    "pendulum_absolute": "absolute:pendulum_absolute",
+    "vehicle_on_track_absolute": "absolute:vehicle_on_track_absolute",
+    "vehicle_on_rotating_track_absolute": "absolute:vehicle_on_rotating_track_absolute",
+    "particle_on_moving_slope": "absolute:particle_on_moving_slope",
+    "four_bar": "linkages:four_bar",
+    "slider_crank": "linkages:slider_crank",
+    "n_four_bar": "linkages:n_four_bar",
+    "andrews_squeezer": "squeezers:andrews_squeezer",
+    "car_axis": "axles:car_axis",
+    "bricard": "spatial_loops:bricard",
+    "spatial_slider_crank": "spatial_loops:spatial_slider_crank",
+    "double_wishbone": "suspensions:double_wishbone",
+    "rolling_disc": "rolling:rolling_disc",
+    "skate": "rolling:skate",
+}
+_CATALOGUE = {**_TREES, **_CONSTRAINED}
 
 __all__ = [*_CATALOGUE, "get", "names"]
 
 
-def names() -> list[str]:
-    """The names of the catalogue."""
-    return list(_CATALOGUE)
+def names(constrained: bool | None = None) -> list[str]:
+    """The names of the catalogue.
+
+    constrained   True: of mechanisms with loops or constraints only; False: of trees only
+    """
+    return list(_CATALOGUE if constrained is None else _CONSTRAINED if constrained else _TREES)
 
 
 def get(name: str, **options: Any) -> System:

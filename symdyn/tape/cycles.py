@@ -64,6 +64,11 @@ def schedule(tape: Tape) -> Schedule:
         cores = [core for core in map(unsigned, node.args) if isinstance(core, Node)]
         earliest = max((ready.get(core, 0) for core in cores), default=0)
         kind = OPERATIONS[node.op].kind
+        if node.op == "call":  # nothing else goes on meanwhile
+            took = node.args[0].operations
+            ready[node] = max(earliest, finished[-1]) + took
+            finished += [ready[node]] * took
+            continue
         if node in fused or kind not in LATENCY:
             ready[node] = earliest
             continue

@@ -18,10 +18,16 @@ from symdyn.tape.tape import reachable
 
 def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any]) -> list[Any]:
     """The directional derivative of each entry along the seeds (node -> its derivative)."""
-    tangent: dict[Node, Any] = {}
+    tangent: dict[Any, Any] = {}
     for node in reachable(entries):
         if node in seeds:
             tangent[node] = seeds[node]
+            continue
+        if node.op == "item":
+            tangent[node] = tangent[node.args[0]][node.args[1]] if node.args[0] in tangent else 0
+            continue
+        if node.op == "call":
+            _call(recorder, node, tangent)
             continue
         moving = [k for k, a in enumerate(node.args) if isinstance(a, Node) and not is_zero(tangent.get(a, 0))]
         rule = OPERATIONS[node.op].partials if moving else None
@@ -35,11 +41,22 @@ def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any
     return [tangent.get(e, 0) if isinstance(e, Node) else 0 for e in entries]
 
 
+def _call(recorder: Recorder, node: Node, tangent: dict[Any, Any]) -> None:
+    """The derivatives of a numeric algorithm's results, as a list, unless nothing in it moves."""
+    kernel, *values = node.args
+    changes = [tangent.get(v, 0) if isinstance(v, Node) else 0 for v in values]
+    if not all(map(is_zero, changes)):
+        results = [recorder.item(node, k) for k in range(kernel.n_out)]
+        tangent[node] = kernel.tangents(recorder, values, results, changes)
+
+
 def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
     """The gradient of one entry by each node of `by`."""
     if not isinstance(entry, Node):
         return [0] * len(by)
     order = reachable([entry])
+    if any(node.op == "call" for node in order):
+        return [forward(recorder, [entry], {node: 1})[0] for node in by]
     wanted = set(by)
     active: set[Node] = set()
     for node in order:

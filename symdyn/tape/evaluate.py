@@ -39,6 +39,10 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
     for node in tape.steps:
         if node.op == "leaf":
             done[node] = context.mpf(values[node.args[1]])
+        elif node.op == "call":
+            done[node] = node.args[0].precise(context, [number(a) for a in node.args[1:]])
+        elif node.op == "item":
+            done[node] = done[node.args[0]][node.args[1]]
         else:
             try:
                 done[node] = functions[node.op](*[number(a) for a in node.args])
@@ -83,4 +87,5 @@ def _functions(context: Any) -> dict[str, Callable]:
         "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
         "neg": lambda a: -a,
     }
-    return {op: special[op] if op in special else getattr(context, row.mpmath) for op, row in OPERATIONS.items()}
+    return {op: special[op] if op in special else getattr(context, row.mpmath) for op, row in OPERATIONS.items()
+            if op in special or row.mpmath}

@@ -30,6 +30,10 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
         for node in tape.steps:
             if node.op == "leaf":
                 done[node] = np.asarray(values[node.args[1]], dtype=float)
+            elif node.op == "call":
+                done[node] = np.moveaxis(node.args[0].rows([number(a) for a in node.args[1:]]), -1, 0)
+            elif node.op == "item":
+                done[node] = done[node.args[0]][node.args[1]]
             else:
                 done[node] = _function(node.op)(*[number(a) for a in node.args])
     result = {}

@@ -17,7 +17,7 @@ Partials = Callable[[Any, Any, tuple], tuple]
 class Operation:
     """One row of the table.
 
-    kind       what it counts as: add, mul, div, sqrt, trig, function, compare or free
+    kind       what it counts as: add, mul, div, sqrt, trig, function, compare, kernel (see symdyn.tape.kernels) or free
     partials   (recorder, result, arguments) -> derivative by each argument; None where it is zero everywhere
     name       its name in NumPy's and mpmath's vocabulary (`numpy`, `mpmath`) and SymPy's (`sympy`)
     """
@@ -78,6 +78,8 @@ OPERATIONS: dict[str, Operation] = {
     "not": Operation("compare", None, "logical_not", "not_", "Not"),
     "select": Operation("compare", lambda r, y, a: (0, r.apply("select", a[0], 1, 0), r.apply("select", a[0], 0, 1)),
                         "where", "select", "Piecewise"),
+    "call": Operation("kernel", None, "", "", ""),
+    "item": Operation("free", None, "", "", ""),
     "pi": Operation("free", None, "pi", "pi", "pi"),
 }
 

@@ -15,6 +15,11 @@ _ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
 
 def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
     """Record the operation anew, with folding."""
+    if op == "call":
+        items = recorder.call(args[0], args[1:])
+        return items[0].args[0] if isinstance(items[0], Node) else items
+    if op == "item":
+        return recorder.item(*args)
     if op in _ARITHMETIC:
         return getattr(recorder, op)(*args)
     return recorder.apply(op, *args)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from math import isqrt
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.tape.kernels import Kernel
 from symdyn.tape.node import Node, exact
 from symdyn.tape.ops import OPERATIONS
 
@@ -236,6 +237,19 @@ class Recorder:
         if op not in OPERATIONS:
             raise ValueError(f"unknown operation {op!r}; known: {', '.join(OPERATIONS)}")
         return self._record(op, *args)
+
+    def call(self, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
+        """The results of a numeric algorithm."""
+        taken = [v if isinstance(v, Node) else exact(v) for v in values]
+        if not any(isinstance(v, Node) for v in taken):
+            return [exact(float(v)) for v in kernel.rows(taken)]
+        node = self._record("call", kernel, *taken)
+        self.checks.setdefault(node, kernel.reason)
+        return [self._record("item", node, k) for k in range(kernel.n_out)]
+
+    def item(self, results: Any, k: int) -> Any:
+        """One result of a call that was recorded, or folded into a list of numbers."""
+        return self._record("item", results, k) if isinstance(results, Node) else results[k]
 
     def sin(self, a: Any) -> Any:
         return self.apply("sin", a)

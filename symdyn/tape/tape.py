@@ -141,6 +141,8 @@ def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
 
 
 def _count(nodes: Iterable[Node]) -> dict[str, int]:
-    counter = Counter(OPERATIONS[n.op].kind for n in nodes)
+    counter: Counter[str] = Counter()
+    for node in nodes:
+        counter[OPERATIONS[node.op].kind] += node.args[0].operations if node.op == "call" else 1
     counter.pop("free", None)
     return dict(sorted(counter.items()))

@@ -25,7 +25,7 @@ TREES = 50
 KINEMATIC_TREES = 10
 
 CATALOGUE: dict[str, Callable[[], sd.System]] = {
-    **{name: getattr(sd.systems, name) for name in sd.systems.names()},
+    **{name: getattr(sd.systems, name) for name in sd.systems.names(constrained=False)},
     "vehicle_on_massless_track": lambda: sd.systems.vehicle_on_rotating_track(track_inertia=False),
     "prismatic_chain_3": lambda: sd.systems.prismatic_chain(n=3),
     "spatial_chain_12": lambda: sd.systems.spatial_chain(n=12),

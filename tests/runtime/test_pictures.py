@@ -185,7 +185,7 @@ def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
 # -- bodies
 
 
-@pytest.mark.parametrize("name, options", [*[(name, OPTIONS.get(name, {})) for name in systems.names()],
+@pytest.mark.parametrize("name, options", [*[(name, OPTIONS.get(name, {})) for name in systems.names(constrained=False)],
                                            ("puma560", {"convention": "modified"})])
 def test_bodies_are_drawn_rigid_and_joined(name: str, options: dict[str, Any]) -> None:
     drawing = Drawing.of(motion(name, **options))

@@ -17,7 +17,8 @@ _OWN: dict[str, Callable[..., Any]] = {
     "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
     "and": lambda a, b: a and b, "or": lambda a, b: a or b, "not": operator.not_,
     "select": lambda condition, a, b: a if condition else b, "pi": lambda: math.pi}
-_FUNCTIONS = {op: _OWN[op] if op in _OWN else getattr(math, row.mpmath) for op, row in OPERATIONS.items()}
+_FUNCTIONS = {op: _OWN[op] if op in _OWN else getattr(math, row.mpmath) for op, row in OPERATIONS.items()
+              if op in _OWN or row.mpmath}
 
 
 class Doubles:

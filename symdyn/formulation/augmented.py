@@ -1,0 +1,89 @@
+"""The augmented formulation of a system of bodies: constraints as rows, multipliers as unknowns.
+
+Source: lecture, chapters 3.4 and 6.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import ModelError, SymdynError
+from symdyn.formulation.absolute import OWN, in_absolute_coordinates
+from symdyn.formulation.absolute_start import absolute_start
+from symdyn.formulation.augmented_equations import AugmentedEquations
+from symdyn.formulation.constrained import Constrained
+from symdyn.formulation.constraints import Gathered
+from symdyn.formulation.contradictions import contradictions
+from symdyn.formulation.dependent_rows import ranks
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.reactions import reactions
+from symdyn.formulation.saddle_choice import choose
+from symdyn.formulation.tree import Tree
+from symdyn.formulation.tree_equations import tree_of, tree_result
+from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.model.record import Model
+
+COORDINATES = ("relative", "absolute")
+
+
+class ConstrainedTree(Constrained, TreeQuantities):
+    """A tree whose loops are closed by constraints."""
+
+    def __init__(self, tree: Tree, gathered: Gathered | None = None, kernel: bool = False,
+                 independent: tuple[int, ...] | None = None) -> None:
+        super().__init__(tree)
+        self.gathered = gathered or Gathered(tree)
+        self.rows = self.gathered.rows
+        self.kernel = kernel
+        self.independent = independent
+        if self.gathered.trivial:
+            self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
+
+    @property
+    def reacting(self) -> tuple[str, ...]:
+        names = (*super().reacting, *[c.joint.name for c in self.gathered.closures])
+        return tuple(n for n in names if not n.endswith((f"_{OWN}", "_closure")))
+
+    def all_reactions(self) -> dict[str, np.ndarray]:
+        lam = self.lam()
+        closed = {place for c in self.gathered.closures for place in c.places}
+        other = [k for k in range(len(self.rows)) if k not in closed]
+        along = -self.C_r()[other].T @ lam[other] if other else None
+        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along)
+
+    @cached_property
+    def length(self) -> Any:
+        return self.gathered.length()
+
+    @property
+    def angular(self) -> list[bool]:
+        return [self.model.units.get(u) == "rad/s" for u in self.model.speeds]
+
+
+def augment(model: Model, coordinates: str = "relative", orientation: Any = None, frames: str = "body") -> AugmentedEquations:
+    """The augmented equations of a checked model; see System.augmented."""
+    if coordinates not in COORDINATES:
+        raise SymdynError(f"coordinates {coordinates!r} asked for; there are {' and '.join(map(repr, COORDINATES))}")
+    again = partial(augment, model, coordinates, orientation, frames)
+    if coordinates == "absolute":
+        rewritten = in_absolute_coordinates(model, orientation)
+        model = replace(rewritten, initial={**rewritten.initial, **absolute_start(model, rewritten)})
+    tree = tree_of(model, frames)
+    gathered = Gathered(tree)
+    names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
+
+    def derivation(kernel: bool, independent: tuple[int, ...] | None) -> ConstrainedTree:
+        return ConstrainedTree(tree, gathered, kernel, independent)
+
+    def result(quantities: ConstrainedTree, otherwise: Equations | None) -> AugmentedEquations:
+        return tree_result(quantities, "augmented", AugmentedEquations, again, otherwise=otherwise, **names)
+
+    equations = choose(derivation, result, ranks)
+    faults = contradictions(equations.otherwise or equations) if gathered.rows else []
+    if faults:
+        raise ModelError(faults, model.name)
+    return equations

@@ -1,0 +1,224 @@
+"""Motion under constraints: M u_dot + C_r^T lam = F - k, C_r u_dot = F_d, and the corrections that keep it on its manifold.
+
+Source: lecture, chapters 3.4 and 6.3; projections: Garcia de Jalon and Bayo, Kinematic and Dynamic Simulation of Multibody
+Systems, section 6.5 (mass-orthogonal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.constraints import Row
+from symdyn.formulation.motion import Motion
+from symdyn.formulation.saddle import KernelSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
+from symdyn.spatial.vectors import inner, vector, zeros
+from symdyn.tape import node as kinds
+from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.kernels import DAMPED, SMOOTHED
+from symdyn.tape.node import is_zero
+from symdyn.tape.passes import substitute
+
+BAUMGARTE = "(baumgarte)"
+UNHELD = "a speed is held neither by mass nor by a constraint"
+
+
+class Constrained(Motion):
+    """Mixed in before a Motion: what constraints add to it.
+
+    rows          of the constraints; length: the mechanism's, m; angular: for each speed whether it is in rad/s
+    kernel        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
+                  singular mass matrices and dependent constraints, too
+    independent   places of rows that imply the others; None: all rows
+    """
+
+    rows: list[Row]
+    kernel = False
+    independent: tuple[int, ...] | None = None
+
+    @cached_property
+    def length(self) -> Any:
+        raise NotImplementedError
+
+    @property
+    def angular(self) -> list[bool]:
+        raise NotImplementedError
+
+    def quantities(self) -> dict[str, Callable[[], Any]]:
+        """name -> function that records it."""
+        own: dict[str, Callable[[], Any]] = {
+            "C": lambda: vector(*[r.value for r in self.rows]), "C_r": self.C_r, "C_t": self.C_t, "C_dot": self.C_dot,
+            "F_d": self.F_d, "lam": self.lam, "matrix": self.matrix, "right_side": self.right_side,
+            "C_scale": self.C_scale, "length": lambda: self.length, "N": self.N,
+            "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
+            "rhs_baumgarte": self.rhs_baumgarte, "residual": self.residual}
+        return {**super().quantities(), **own}
+
+    # -- rows
+
+    def C_r(self) -> np.ndarray:
+        return np.array([r.jacobian for r in self.rows], dtype=object).reshape(len(self.rows), len(self.speeds))
+
+    def C_dot(self) -> np.ndarray:
+        return vector(*[r.rate for r in self.rows])
+
+    def C_t(self) -> np.ndarray:
+        """C_dot at u = 0."""
+        still = {self.algebra.leaves[u]: 0 for u in self.speeds}
+        return vector(*substitute(tuple(r.rate for r in self.rows), still, self.algebra.recorder))
+
+    def F_d(self) -> np.ndarray:
+        with self.algebra.section("F_d"):
+            return self.algebra.name("F_d", vector(*[-r.remaining for r in self.rows]))
+
+    def C_scale(self) -> np.ndarray:
+        """What makes every row a length, m; rows of unknown unit are divided by their gradient."""
+        with self.algebra.section("scale of the constraints"):
+            known = {"m": 1, "rad": self.length}
+            return vector(*[known[r.unit] if r.unit in known else self._by_gradient(r) for r in self.rows])
+
+    def _by_gradient(self, row: Row) -> Any:
+        apply = self.algebra.recorder.apply
+        entries = [e / self.length if turning else e for e, turning in zip(row.jacobian, self.angular, strict=True)]
+        square = inner(entries, entries)
+        if not isinstance(square, kinds.Node):
+            return 1 / self.algebra.sqrt(square)
+        size = self.algebra.sqrt(apply("select", apply("gt", square, 0), square, 1))
+        return 1 / size
+
+    # -- accelerations and multipliers
+
+    def saddle(self) -> SaddleSolver:
+        """What solves M x + C_r^T lam = f, C_r x = d."""
+        return self._solver(SMOOTHED)
+
+    def corrector(self) -> SaddleSolver:
+        """The same for corrections."""
+        return self._solver(DAMPED) if self.kernel else self.recall("saddle")  # type: ignore[no-any-return]
+
+    def _solver(self, smoothed: float) -> SaddleSolver:
+        if self.kernel:
+            return KernelSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), UNHELD,
+                                smoothed)
+        if self.independent is None:
+            return RangeSolver(self.algebra, self.recall("solver"), self.C_r(), [r.name for r in self.rows])
+        kept = list(self.independent)
+        inner = RangeSolver(self.algebra, self.recall("solver"), self.C_r()[kept], [self.rows[k].name for k in kept])
+        return SubsetSolver(inner, kept, len(self.rows))
+
+    def _columns(self) -> list[Any]:
+        return [1 / self.length if turning else 1 for turning in self.angular]
+
+    def solution(self) -> tuple[np.ndarray, np.ndarray]:
+        """u_dot and lam."""
+        right, saddle, F_d = -self.recall("bias"), self.recall("saddle"), self.recall("F_d")
+        with self.algebra.section("accelerations and multipliers"):
+            ud, lam = saddle.solve(right, F_d)
+            return self.algebra.name("ud", ud), self.algebra.name("lam", lam)
+
+    def accelerations(self) -> np.ndarray:
+        return self.recall("solution")[0]  # type: ignore[no-any-return]
+
+    def lam(self) -> np.ndarray:
+        """Multipliers, (n_c,); where rows depend on the others those of least norm after scaling."""
+        if self.independent is not None:
+            left = -self.recall("bias") - self.recall("M_tilde") @ self.accelerations()
+            return least_multipliers(self.algebra, self.C_r(), self.C_scale(), self._columns(), left, UNHELD)
+        return self.recall("solution")[1]  # type: ignore[no-any-return]
+
+    def matrix(self) -> np.ndarray:
+        n_c = len(self.rows)
+        C_r = self.C_r()
+        return np.block([[self.recall("M_tilde"), C_r.T], [C_r, zeros(n_c, n_c)]])
+
+    def right_side(self) -> np.ndarray:
+        return np.concatenate([-self.recall("bias"), self.F_d()])
+
+    def jacobian(self, by: Any) -> np.ndarray:
+        """d x_dot / d by, exact, differentiated implicitly: the matrix is not, only what it multiplies."""
+        recorder = self.algebra.recorder
+        ud, lam, saddle = self.accelerations(), self.recall("solution")[1], self.recall("saddle")
+        with self.algebra.section("Jacobian"):
+            held = [recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
+            C_r = self.C_r()
+            residual = [*(self.inverse_dynamics() + C_r.T @ vector(*held)), *(C_r @ self.speed_rates - self.F_d())]
+            derivatives = jacobian(recorder, residual, by)
+            at = dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
+            derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
+            n_u = len(ud)
+            columns = [saddle.solve(-derivatives[:n_u, j], -derivatives[n_u:, j])[0] for j in range(len(by))]
+            middle = np.array(columns, dtype=object).T.reshape(n_u, len(by))
+            top = jacobian(recorder, self.rates, by, "forward")
+            bottom = jacobian(recorder, self.state_rates(), by, "forward")
+            return np.vstack([top, middle, bottom])
+
+    # -- staying on the manifold
+
+    def N(self) -> np.ndarray:
+        """q_dot = N u + n_t, (n_q, n_u)."""
+        return jacobian(self.algebra.recorder, self.rates, self._leaves(self.speeds), "forward")
+
+    def position_correction(self) -> np.ndarray:
+        """[C as lengths; dq]: one Newton step to C = 0, the smallest change in the mass metric, dq = N dv, C_r dv = -C."""
+        saddle, scale = self.recall("corrector"), self.C_scale()
+        with self.algebra.section("correction of the coordinates"):
+            values = vector(*[r.value for r in self.rows])
+            dv = saddle.solve(zeros(len(self.speeds)), -values)[0]
+            along = dict(zip(self._leaves(self.speeds), dv, strict=True))
+            dq = forward(self.algebra.recorder, self.rates, along)
+            return vector(*(values * scale), *dq)
+
+    def velocity_correction(self) -> np.ndarray:
+        """[C_dot as lengths by time; du]: the smallest change in the mass metric that makes C_dot = 0."""
+        saddle, scale = self.recall("corrector"), self.C_scale()
+        with self.algebra.section("correction of the speeds"):
+            rates = self.C_dot()
+            du = saddle.solve(zeros(len(self.speeds)), -rates)[0]
+            return vector(*(rates * scale), *du)
+
+    def rhs_baumgarte(self) -> np.ndarray:
+        """x_dot with F_d - 2 a C_dot - a^2 C in place of F_d; a is one more parameter, 1/s."""
+        a = self.algebra.recorder.leaf(BAUMGARTE, kinds.PARAMETER)
+        right, saddle = -self.recall("bias"), self.recall("saddle")
+        with self.algebra.section("Baumgarte's stabilization"):
+            pulled = vector(*[f - 2 * a * r.rate - a * a * r.value for f, r in zip(self.F_d(), self.rows, strict=True)])
+            ud = saddle.solve(right, pulled)[0]
+        return vector(*self.rates, *ud, *self.state_rates())
+
+    def residual(self) -> np.ndarray:
+        """Residual of the stabilized index-2 form of Gear, Gupta and Leimkuhler (1985), for q_dot, u_dot, z_dot, lam, mu.
+
+        q_dot = N (u + C_r^T mu) + n_t, M u_dot + k - F + C_r^T lam = 0, z_dot = rate, C = 0, C_dot = 0. Rows of velocity
+        constraints have mu = 0 in place of C = 0. With Lam, Mu as states and lam, mu as their derivatives the index is 1.
+        """
+        recorder, leaves = self.algebra.recorder, self.algebra.leaves
+        made = [recorder.leaf(name, kinds.ACCELERATION) for name in
+                residual_names(self.coordinates, self.speeds, [z for z, _ in self.states], len(self.rows))]
+        n_q, n_u, n_z, n_c = len(self.coordinates), len(self.speeds), len(self.states), len(self.rows)
+        qd, ud, zd = made[:n_q], made[n_q:n_q + n_u], made[n_q + n_u:n_q + n_u + n_z]
+        lam, mu = made[n_q + n_u + n_z:][:n_c], made[n_q + n_u + n_z + n_c:]
+        C_r = self.C_r()
+        tied = vector(*[m if r.holonomic else 0 for m, r in zip(mu, self.rows, strict=True)])
+        moved = C_r.T @ tied if n_c else zeros(n_u)
+        shift = forward(recorder, self.rates, dict(zip([leaves[u] for u in self.speeds], moved, strict=True)))
+        at = dict(zip(self.speed_rates, ud, strict=True))
+        tau = substitute(tuple(self.inverse_dynamics()), at, recorder)
+        first = [a - b - c for a, b, c in zip(qd, self.rates, shift, strict=True)]
+        second = [a + b for a, b in zip(tau, C_r.T @ vector(*lam) if n_c else zeros(n_u), strict=True)]
+        third = [a - b for a, b in zip(zd, self.state_rates(), strict=True)]
+        held = [r.value if r.holonomic else m for r, m in zip(self.rows, mu, strict=True)]
+        return vector(*first, *second, *third, *held, *self.C_dot())
+
+
+def residual_names(coordinates: Any, speeds: Any, states: Any, n_c: int) -> list[str]:
+    """Names of what the residual takes in the group ud: q_dot, u_dot, z_dot, lam, mu."""
+    return [*[f"d_{q.name}" for q in coordinates], *[f"d_{u.name}" for u in speeds], *[f"d_{z.name}" for z in states],
+            *[f"lambda_{k + 1}" for k in range(n_c)], *[f"mu_{k + 1}" for k in range(n_c)]]
+
+
+def trivially(values: Any) -> bool:
+    """Whether all of them are zero by structure."""
+    return all(is_zero(v) for v in values)

@@ -1,0 +1,163 @@
+"""The constraints of a mechanism as rows: C = 0 or A u + b = 0, their Jacobian in the speeds, and F_d of C_r u_dot = F_d.
+
+F_d = -(d/dt C_r) u - (d/dt C_t): of joints from the recursion of accelerations with u_dot = 0, of expressions by
+differentiating the tape by time, first everything by the chain rule and numbers afterwards.
+Source: lecture, chapters 3.4 and 6.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.errors import ModelError
+from symdyn.formulation.closures import ClosureRow, closure_rows
+from symdyn.formulation.loads import Loads
+from symdyn.formulation.relative import End, Relative, common_link
+from symdyn.formulation.tree import Tree
+from symdyn.model.closures import Constraint, Gear, Rod
+from symdyn.model.joints import Joint
+from symdyn.model.symbols import Coordinate
+from symdyn.spatial.vectors import dot, inner, vector, zeros
+from symdyn.tape.differentiate import forward
+from symdyn.tape.node import PARAMETER, Node, is_zero
+
+
+@dataclass(frozen=True)
+class Row:
+    """One constraint.
+
+    value      C, 0 of a velocity constraint; jacobian (n_u,); rate: C_dot; remaining: C_ddot with u_dot = 0
+    unit       "m" or "rad" of the value, "" if unknown
+    holonomic  whether it holds positions
+    """
+
+    name: str
+    value: Any
+    jacobian: np.ndarray
+    rate: Any
+    remaining: Any
+    unit: str = ""
+    holonomic: bool = True
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A joint that closes a loop: its ends seen from the base link, its rows, and the places of these among all rows."""
+
+    joint: Joint
+    base: int
+    seen: Relative
+    parent: End
+    child: End
+    rows: tuple[ClosureRow, ...]
+    places: tuple[int, ...]
+
+
+class Gathered:
+    """Rows and closures of a tree, in the order of declaration: loops, then expressions; what holds by structure is left out.
+
+    trivial   names of rows that hold by structure, at every state
+    Raises ModelError for rows that nothing can fulfil or that move nothing.
+    """
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree, self.model, self.algebra = tree, tree.model, tree.algebra
+        self.rows: list[Row] = []
+        self.closures: list[Closure] = []
+        self.trivial: list[str] = []
+        self.faults: list[str] = []
+        self._seen: dict[int, Relative] = {}
+        loads = Loads(tree)
+        for loop in self.model.loops:
+            with self.algebra.section(f"constraints of {loop.kind} {loop.name}"):
+                if isinstance(loop, Gear):
+                    self._gear(loop)
+                else:
+                    self._closure(loop, loads)
+        for constraint in self.model.constraints:
+            with self.algebra.section(f"constraint {constraint.name}"):
+                self._add(expression_row(self.algebra, constraint, self.model.coordinates, tree.rates, self.model.speeds))
+        if self.faults:
+            raise ModelError(self.faults, self.model.name)
+
+    def length(self) -> Any:
+        """The mechanism's length, m: root of the sum of squares of all distances of joints and of centres of mass, else 1 m."""
+        a = self.algebra
+        with a.section("length of the mechanism"):
+            total: Any = 0
+            joints = [*self.model.joints, *(j for j in self.model.loops if isinstance(j, Joint))]
+            for point in [p for j in joints for p in (j.parent_point, j.child_point)]:
+                total = total + dot(*(2 * [a.constants(point)]))
+            for rod in (j for j in joints if isinstance(j, Rod)):
+                total = total + a.expression(rod.length) ** 2
+            if is_zero(total):
+                for body in self.model.bodies:
+                    total = total + dot(*(2 * [a.constants(body.com)]))
+            return 1 if is_zero(total) else a.name("length", a.sqrt(total))
+
+    # -- each kind
+
+    def _closure(self, joint: Joint, loads: Loads) -> None:
+        a = self.algebra
+        poses = loads.pose(joint.parent), loads.pose(joint.child)
+        base = common_link(self.tree, *(pose.link for pose in poses))
+        seen = self._seen.setdefault(base, Relative(self.tree, base))
+        P, Q = (seen.end(pose, a.constants(point), a.matrix(rotation)) for pose, point, rotation in
+                zip(poses, (joint.parent_point, joint.child_point), (joint.parent_rotation, joint.child_rotation), strict=True))
+        kept, places = [], []
+        for row in closure_rows(a, joint, P, Q, self.model.planar):
+            along = row.along(P, Q)
+            jacobian = along if self.tree.plain else along @ self.tree.D if len(along) else zeros(len(self.model.speeds))
+            unit = "m" if row.length else "rad"
+            full = Row(row.label, row.value, jacobian, inner(along, self.tree.w), row.remaining(P, Q), unit)
+            if self._add(full):
+                kept.append(row)
+                places.append(len(self.rows) - 1)
+        self.closures.append(Closure(joint, base, seen, P, Q, tuple(kept), tuple(places)))
+
+    def _gear(self, gear: Gear) -> None:
+        joints = {j.name: j for j in self.model.joints}
+        a, b = (joints[end] if isinstance(end, str) else end for end in (gear.joint_a, gear.joint_b))
+        expression = b.coordinates[0] - gear.ratio * a.coordinates[0] - gear.offset
+        row = expression_row(self.algebra, Constraint(gear.name, expression), self.model.coordinates, self.tree.rates,
+                             self.model.speeds)
+        self._add(row)
+
+    def _add(self, row: Row) -> bool:
+        """Take a row, unless it holds by structure."""
+        if any(not is_zero(e) for e in row.jacobian):
+            self.rows.append(row)
+            return True
+        if is_zero(row.value) and is_zero(row.rate):
+            self.trivial.append(row.name)
+            return False
+        what = row.value if row.holonomic else row.rate
+        if not isinstance(what, Node):
+            self.faults.append(f"{row.name} demands {float(what):.6g} = 0, which no motion of the system changes: it contradicts "
+                               "the other joints; remove it, or correct the points and axes")
+        elif what.mask & ~PARAMETER:
+            self.faults.append(f"{row.name} holds what is prescribed as a function of time: no coordinate of the system is in "
+                               "it; remove it, or replace the prescribed motion by a coordinate")
+        else:
+            self.faults.append(f"{row.name} is an equation between parameters alone, which no motion of the system changes; "
+                               "remove it, or choose points and axes so that it holds by itself")
+        return False
+
+
+def expression_row(algebra: Any, constraint: Constraint, coordinates: Sequence[sp.Symbol], rates: Sequence[Any],
+                   speeds: Sequence[sp.Symbol]) -> Row:
+    """The row of an expression in coordinates and t, or with speeds, linear in them."""
+    by_time = algebra.by_time(coordinates, rates)
+    recorder = algebra.recorder
+    value = algebra.expression(constraint.expression)
+    moving = {*speeds, *[q.dot for q in coordinates if isinstance(q, Coordinate)]}
+    holonomic = not constraint.expression.free_symbols & moving
+    rate = forward(recorder, [value], by_time)[0] if holonomic else value
+    jacobian = vector(*[forward(recorder, [rate], {algebra.leaves[u]: 1})[0] for u in speeds])
+    remaining = forward(recorder, [rate], by_time)[0]
+    return Row(constraint.name, value if holonomic else 0, jacobian, rate, remaining, "", holonomic)

@@ -1,0 +1,138 @@
+"""Constraints that nothing can fulfil, or that hold nothing, found in numbers at random states: for what holds at every state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.tape.floats import evaluate_rows
+
+STATES = 12
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """At random states: C (s, n_c), C_r (s, n_c, n_u), C_t (s, n_c), M (s, n_u, n_u)."""
+
+    C: np.ndarray
+    C_r: np.ndarray
+    C_t: np.ndarray
+    M: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Conflict:
+    """Row k and the rows it is a combination of demand defect = 0; of positions, or of speeds."""
+
+    k: int
+    others: tuple[int, ...]
+    defect: float
+    of: str
+
+
+def contradictions(equations: Equations) -> list[str]:
+    """What is wrong with the constraints at every state, in sentences.
+
+    Parameters take their defaults, else random numbers; what shows with some of these numbers only is not told.
+    """
+    symbols = equations.symbols
+    numbers = {p.name: float(v) for p, v in symbols.defaults.items()}
+    free = [p.name for p in symbols.parameters if p.name not in numbers]
+    draws = [d for seed in range(2 if free else 1) if (d := _draw(equations, numbers, free, seed)) is not None]
+    if not draws:
+        return []
+    names = equations.constraints
+    faults = []
+    empty = [k for k in range(len(names)) if all(np.abs(d.C_r[:, k]).max() <= TOLERANCE for d in draws)]
+    faults += [f"{names[k]} holds nothing: its derivatives by all coordinates and speeds vanish at every state; remove it, or "
+               "correct it" for k in empty]
+    kept = [k for k in range(len(names)) if k not in empty]
+    first, *others = [_conflicts(d, kept, equations.holonomic) for d in draws]
+    for conflict in first:
+        if all(any(_same(conflict, c) for c in found) for found in others):
+            listed = ", ".join(names[j] for j in conflict.others)
+            faults.append(f"{names[conflict.k]} contradicts {listed}: together they demand {conflict.defect:.6g} = 0 of the "
+                          f"{conflict.of}{'' if free or not symbols.parameters else ' with the numbers in defaults'}; remove or "
+                          "correct one of them")
+    loose = [_loose(d) for d in draws]
+    if all(entries is not None for entries in loose):
+        found = sorted(set.intersection(*[entries for entries in loose if entries is not None]))
+        if found:
+            faults.append(f"{', '.join(symbols.speeds[j].name for j in found)}: neither mass nor a constraint holds "
+                          f"{'this speed' if len(found) == 1 else 'a motion of these speeds'}; give it mass, a constraint, or "
+                          "leave out the coordinate")
+    return faults
+
+
+def _draw(equations: Equations, numbers: Mapping[str, float], free: Sequence[str], seed: int) -> _Draw | None:
+    """The same states for every seed, other numbers for the free parameters; None where hardly any state is defined."""
+    symbols = equations.symbols
+    stream = np.random.default_rng(7)
+    values: dict[str, Any] = {"t": 0.37, **numbers}
+    for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
+        values |= {s.name: stream.uniform(0.5, 1.5, STATES) for s in group}
+    other = np.random.default_rng(11 + seed)
+    values |= {name: other.uniform(0.5, 1.5) for name in free}
+    found = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
+    arrays = [found[name] for name in ("C", "C_r", "C_t", "M_tilde")]
+    defined = np.all([np.isfinite(a.reshape(STATES, -1)).all(axis=1) for a in arrays], axis=0)
+    return _Draw(*[a[defined] for a in arrays]) if defined.sum() > STATES // 2 else None
+
+
+def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> list[_Conflict]:
+    """Rows that are the same combination of others at all states, but for a constant that is not zero."""
+    order = sorted(kept, key=lambda k: not holonomic[k])
+    gradients = {k: draw.C_r[:, k].ravel() for k in order}
+    independent: list[int] = []
+    found = []
+    for k in order:
+        gradient = gradients[k]
+        if not independent:
+            independent.append(k)
+            continue
+        A = np.array([gradients[j] / np.linalg.norm(gradients[j]) for j in independent]).T
+        factors = np.linalg.lstsq(A, gradient, rcond=1e-12)[0]
+        if np.linalg.norm(A @ factors - gradient) > TOLERANCE * np.linalg.norm(gradient):
+            independent.append(k)
+            continue
+        used = [(j, f / np.linalg.norm(gradients[j])) for j, f in zip(independent, factors, strict=True)
+                if abs(f) > TOLERANCE * np.linalg.norm(gradient)]
+        others = tuple(j for j, _ in used)
+        tests = [(draw.C_t, "speeds")]
+        if all(holonomic[j] for j in (k, *others)):
+            tests.insert(0, (draw.C, "positions"))
+        for values, of in tests:
+            defect = values[:, k] - sum(f * values[:, j] for j, f in used)
+            size = max(np.abs(f * values[:, j]).max() for j, f in [(k, 1.0), *used])
+            if np.abs(defect).min() > TOLERANCE * size and np.ptp(defect) <= TOLERANCE * size:
+                found.append(_Conflict(k, others, float(defect[0]), of))
+                break
+    return found
+
+
+def _same(a: _Conflict, b: _Conflict) -> bool:
+    return (a.k, a.others, a.of) == (b.k, b.others, b.of) and abs(a.defect - b.defect) <= TOLERANCE * abs(a.defect)
+
+
+def _loose(draw: _Draw) -> set[int] | None:
+    """Speeds that take part in a motion without mass that the constraints leave at every state; None if there is none."""
+    common: set[int] | None = None
+    for M, C_r in zip(draw.M, draw.C_r, strict=True):
+        Vt = np.linalg.svd(C_r)[2]
+        sizes = np.linalg.svd(C_r, compute_uv=False)
+        free = Vt[int((sizes > TOLERANCE * sizes.max(initial=0.0)).sum()):].T
+        if not free.shape[1]:
+            return None
+        values, vectors = np.linalg.eigh(free.T @ M @ free)
+        null = np.abs(values) <= TOLERANCE * max(np.abs(M).max(), 1e-300)
+        if not null.any():
+            return None
+        entries = np.abs(free @ vectors[:, null]).max(axis=1)
+        places = {int(j) for j in np.flatnonzero(entries > 1e-6)}
+        common = places if common is None else common | places
+    return common

@@ -1,0 +1,160 @@
+"""Checks of equations given by hand: coordinates, columns of expressions, the mass, numbers, and which symbol stands for what."""
+
+from __future__ import annotations
+
+import keyword
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.formulation.algebra import TapeAlgebra
+from symdyn.formulation.equations import Symbols
+from symdyn.model.faults import Faults
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_coordinate, take_over, time
+from symdyn.tape import node as kinds
+from symdyn.tape.recorder import Recorder
+
+
+@dataclass(frozen=True)
+class Part:
+    """Expressions and what they may use besides parameters; moving: coordinates and t."""
+
+    what: str
+    expressions: Sequence[sp.Expr]
+    moving: bool = True
+    speeds: bool = False
+    inputs: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """In words."""
+        if not self.moving:
+            return "parameters only"
+        return "coordinates, speeds and t" if self.speeds else "coordinates and t"
+
+
+class ByHand:
+    """Coordinates of equations by hand; fills `faults` while it takes over what is given for them."""
+
+    def __init__(self, coordinates: Any, name: Any) -> None:
+        self.faults = Faults()
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+            self.faults.append(f"name is {name!r}; pass an identifier such as 'pendulum', it names files and functions")
+        given = list(coordinates) if hasattr(coordinates, "__iter__") else [coordinates]
+        if not given:
+            self.faults.append("there are no coordinates; pass symbols made with sd.coordinates")
+        q = [as_coordinate(c) for c in given]
+        self.faults += [f"coordinate {c} is no symbol; make it with sd.coordinates" for c in q if not isinstance(c, Coordinate)]
+        self.faults += [f"coordinate {c} is given {n} times" for c, n in Counter(map(str, q)).items() if n > 1]
+        self.q = [c for c in q if isinstance(c, Coordinate)]
+        self.n = len(q)
+        # A plain symbol that is given as a coordinate is one in the expressions, too.
+        self._same = {old: new for old, new in zip(given, q, strict=True) if isinstance(new, Coordinate) and old is not new}
+
+    def expression(self, value: Any, what: str) -> sp.Expr:
+        """A scalar expression in the coordinates."""
+        return self.faults.expression(value, what).xreplace(self._same)
+
+    def column(self, values: Any, what: str, labels: Sequence[str] = ()) -> list[sp.Expr]:
+        """Expressions from a list, an array or a column; labels: of the entries, in messages."""
+        if isinstance(values, sp.MatrixBase):
+            if len(values) and 1 not in values.shape:
+                self.faults.append(f"{what} is a {values.shape[0]} x {values.shape[1]} matrix; pass a column")
+            values = list(values)
+        if not isinstance(values, (list, tuple, np.ndarray)):
+            self.faults.append(f"{what} is {values!r}; pass a list or column of expressions")
+            return []
+        known = len(labels) == len(values)
+        return [self.expression(v, labels[k] if known else f"{what}[{k + 1}]") for k, v in enumerate(values)]
+
+    def mass(self, mass: Any, n: int, of: str) -> sp.Matrix:
+        """The (n, n) mass matrix, from itself or from its diagonal; of: what has n entries."""
+        faults = self.faults
+        try:
+            M = sp.Matrix(mass)
+        except (TypeError, ValueError, sp.SympifyError):
+            faults.append(f"mass is {mass!r}; pass a square matrix, or a list for its diagonal")
+            return sp.eye(n)
+        M = M.applyfunc(lambda e: faults.expression(e, "mass"))
+        if M.shape != (n, n) and 1 in M.shape and len(M) == n:
+            M = sp.diag(*M)
+        if M.shape != (n, n):
+            faults.append(f"mass has the shape {M.shape[0]} x {M.shape[1]}, {of} {n} entries; pass {n} x {n}")
+            return sp.eye(n)
+        if M != M.T:
+            faults.append("mass is not symmetric; pass a symmetric matrix")
+        for k in range(n):
+            if M[k, k].is_number and M[k, k] < 0:
+                faults.append(f"mass[{k + 1}, {k + 1}] is {M[k, k]}; pass zero or a positive number")
+        if M == M.T and not M.is_diagonal() and not M.free_symbols:
+            least = float(np.linalg.eigvalsh(np.array(M.tolist(), dtype=float))[0])
+            if least < -1e-12 * max(abs(float(e)) for e in M):
+                faults.append(f"mass has the eigenvalue {least:.6g}; pass a matrix that gives no negative kinetic energy")
+        return M
+
+    def numbers(self, values: Mapping[Any, Any] | None, known: Sequence[sp.Symbol], what: str,
+                kind: str) -> dict[sp.Symbol, float]:
+        """Numbers for some of the known symbols, by symbol or name; kind: what each of them is."""
+        names = {s.name: s for s in known}
+        numbers = {}
+        for key, value in (values or {}).items():
+            symbol = take_over(key) if isinstance(key, sp.Basic) else key
+            name = str(getattr(symbol, "name", symbol))
+            if name not in names:
+                self.faults.append(f"{what} has a number for {name!r}, which is no {kind}; there are "
+                                   f"{', '.join(names) or 'none'}")
+            elif not isinstance(value, (int, float, sp.Number, np.number)) or not np.isfinite(float(value)):
+                self.faults.append(f"{what}: the value of {name} is {value!r}; pass a finite number")
+            else:
+                numbers[names[name]] = float(value)
+        return numbers
+
+    def symbols(self, parts: Sequence[Part]) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
+        """Parameters and inputs in the order of first use."""
+        parameters: dict[sp.Symbol, None] = {}
+        inputs: dict[sp.Symbol, None] = {}
+        for part in parts:
+            for e in part.expressions:
+                for s in sorted(e.free_symbols, key=lambda a: a.name):
+                    self._use(part, s, parameters, inputs)
+        names = {c.name for c in self.q} | {c.dot.name for c in self.q}
+        for s in [*parameters, *inputs]:
+            if s.name in names:
+                self.faults.append(f"{s} is the name of a coordinate or its derivative, and of another symbol with other "
+                                   "assumptions; use the same symbol everywhere, or another name")
+        return list(parameters), list(inputs)
+
+    def _use(self, part: Part, s: sp.Symbol, parameters: dict[sp.Symbol, None], inputs: dict[sp.Symbol, None]) -> None:
+        what, faults = part.what, self.faults
+        speeds = {c.dot for c in self.q}
+        if s.name == "t" and s != time:
+            faults.append(f"{what} uses a symbol t with assumptions, which is not the time; use symdyn.t")
+        elif isinstance(s, Acceleration) or (isinstance(s, Rate) and not part.speeds):
+            faults.append(f"{what} uses {s}; it may use {part.allowed}")
+        elif s == time or s in self.q or s in speeds:
+            if not part.moving:
+                faults.append(f"{what} depends on {s}, but must be constant")
+        elif isinstance(s, (Coordinate, Rate)):
+            faults.append(f"{what} uses {s}, which is not among the coordinates {', '.join(map(str, self.q))}; add it, or "
+                          "use a parameter in its place")
+        elif isinstance(s, Input):
+            if part.inputs:
+                inputs[s] = None
+            else:
+                faults.append(f"{what} uses the input {s}; it may use {part.allowed}")
+        else:
+            parameters[s] = None
+
+
+def recording(symbols: Symbols) -> TapeAlgebra:
+    """A tape of its own with a leaf for every symbol; speeds are the derivatives of the coordinates."""
+    recorder = Recorder()
+    leaves: dict[sp.Basic, Any] = {time: recorder.leaf("t", kinds.TIME)}
+    for group, kind in ((symbols.coordinates, kinds.COORDINATE), (symbols.speeds, kinds.SPEED),
+                        (symbols.inputs, kinds.INPUT), (symbols.parameters, kinds.PARAMETER)):
+        leaves.update({s: recorder.leaf(s.name, kind) for s in group})
+    return TapeAlgebra(recorder, leaves)

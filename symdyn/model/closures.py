@@ -1,0 +1,60 @@
+"""What closes loops besides joints: a rod between two points, a gear between two joints; and constraints by expression."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from symdyn.model.faults import Faults
+from symdyn.model.joints.base import Joint
+
+
+class Rod(Joint):
+    """A massless rod of a given length (m) between a point of each body, hinged at both ends: one constraint.
+
+    For `System.close_loop`; see Joint for the points. A rod of no length is a Spherical joint.
+    """
+
+    kind = "rod"
+
+    def __init__(self, name: str, parent: Any, child: Any, length: Any, parent_point: Any = (0, 0, 0),
+                 child_point: Any = (0, 0, 0)) -> None:
+        super().__init__(name, parent, child, (), None, parent_point, child_point, None, None)
+        self.length = self.faults.expression(length, f"rod {name!r}: length (m)")
+        if self.length.is_number and not self.length > 0:
+            self.faults.append(f"rod {name!r}: length is {self.length} m; pass a positive length (for two points that coincide: "
+                               "Spherical, or Revolute in a plane)")
+
+    @property
+    def constants(self) -> list[sp.Expr]:
+        return [*super().constants, self.length]
+
+
+class Gear:
+    """A gear between two joints of the tree with one coordinate each: q_b = ratio * q_a + offset, one constraint.
+
+    ratio    of the coordinates, a number or an expression of parameters; offset: rad or m, as the coordinate of joint_b
+    For `System.close_loop`. A joint whose coordinate is an expression, such as coordinate=2*q, is a gear without a constraint.
+    """
+
+    kind = "gear"
+
+    def __init__(self, name: str, joint_a: Any, joint_b: Any, ratio: Any, offset: Any = 0) -> None:
+        self.name = name
+        self.joint_a, self.joint_b = joint_a, joint_b
+        self.faults = Faults()
+        self.ratio = self.faults.expression(ratio, f"gear {name!r}: ratio")
+        self.offset = self.faults.expression(offset, f"gear {name!r}: offset")
+
+    def __repr__(self) -> str:
+        return f"Gear({self.name!r})"
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """expression = 0 in coordinates and t; with speeds, linear in them."""
+
+    name: str
+    expression: sp.Expr

@@ -1,0 +1,108 @@
+"""Checks of closed loops and constraints, and the coordinates that loops through screws and custom joints need."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.bodies import Body
+from symdyn.model.closures import Constraint, Gear
+from symdyn.model.joints import Custom, Fixed, Free, Helical, Joint
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+CARRIER = "carrier"
+
+
+def with_carriers(system: System) -> System:
+    """The system with every Helical and Custom joint that closes a loop taken apart.
+
+    What such a joint leaves free cannot be told from the pose of its two bodies alone (a screw after several turns), so its
+    coordinates become coordinates of the system: the joint carries a massless body, which is fixed to the child.
+    """
+    screws = [j for j in system.loops if isinstance(j, (Helical, Custom))]
+    if not screws:
+        return system
+    result = copy.copy(system)
+    result.bodies, result.joints, result.loops = list(system.bodies), list(system.joints), []
+    for joint in system.loops:
+        if joint not in screws:
+            result.loops.append(joint)
+            continue
+        assert isinstance(joint, Joint)
+        carrier, moving, closure = carried(joint)
+        result.bodies.append(carrier)
+        result.joints.append(moving)
+        result.loops.append(closure)
+    return result
+
+
+def carried(joint: Joint) -> tuple[Body, Joint, Joint]:
+    """A massless body, the joint that carries it in place of its child, and what fixes it to the child."""
+    carrier = Body(f"{joint.name}_{CARRIER}", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)))
+    moving = copy.copy(joint)
+    moving.child, moving.child_point = carrier, sp.ImmutableMatrix(sp.zeros(3, 1))
+    moving.child_rotation = sp.ImmutableMatrix(sp.eye(3))
+    closure = Fixed(f"{joint.name}_closure", carrier, joint.child, (0, 0, 0), joint.child_point, None, joint.child_rotation)
+    return carrier, moving, closure
+
+
+def loop_faults(loops: Iterable[Joint | Gear], joints: Mapping[str, Joint],
+                resolve: Callable[[Any, str], int | None]) -> list[str]:
+    """What is wrong with the loops; resolve(body, where) gives a body's number and reports unknown ones itself."""
+    faults: list[str] = []
+    for loop in loops:
+        if isinstance(loop, Gear):
+            faults += _gear_faults(loop, joints)
+            continue
+        parent = resolve(loop.parent, f"joint {loop.name!r}: parent")
+        child = resolve(loop.child, f"joint {loop.name!r}: child")
+        if parent is not None and parent == child:
+            faults.append(f"joint {loop.name!r} closes a loop from a body onto itself; pass two different bodies")
+        if isinstance(loop, Free):
+            faults.append(f"joint {loop.name!r} is free and constrains nothing; leave out close_loop")
+    return faults
+
+
+def _gear_faults(gear: Gear, joints: Mapping[str, Joint]) -> list[str]:
+    faults = []
+    found = []
+    for end in (gear.joint_a, gear.joint_b):
+        joint = joints.get(end) if isinstance(end, str) else end
+        if joint not in joints.values():
+            faults.append(f"gear {gear.name!r}: it joins {end!r}, which is no joint of the tree; joints: "
+                          f"{', '.join(joints) or 'none'}")
+        elif joint is not None and len(joint.coordinates) != 1:
+            faults.append(f"gear {gear.name!r}: joint {joint.name!r} has {len(joint.coordinates)} coordinates; a gear joins "
+                          "joints with one each")
+        found.append(joint)
+    if not faults and found[0] is found[1]:
+        faults.append(f"gear {gear.name!r} joins joint {gear.joint_a!r} to itself; pass two different joints")
+    return faults
+
+
+def constraint_faults(constraints: Iterable[Constraint], moving: Iterable[sp.Symbol], states: Iterable[sp.Symbol],
+                      speeds: Iterable[sp.Symbol]) -> list[str]:
+    """What is wrong with constraints by expression; moving: coordinates, their rates, speeds."""
+    faults = []
+    moving, states, rates = set(moving), set(states), set(speeds)
+    for c in constraints:
+        symbols = c.expression.free_symbols
+        given = sorted(str(s) for s in symbols if isinstance(s, Input) or s in states)
+        if given:
+            faults.append(f"{c.name} uses {', '.join(given)}; a constraint may use coordinates, speeds, t and parameters")
+        if not symbols & moving and not any(isinstance(s, (Coordinate, Rate, Acceleration)) for s in symbols):
+            faults.append(f"{c.name}, {c.expression} = 0, has no coordinate or speed in it, so that it constrains nothing; use "
+                          "coordinates of the system, or remove it")
+        used = sorted((s for s in symbols if s in rates or isinstance(s, Rate)), key=str)
+        for k, first in enumerate(used):
+            if any(sp.diff(c.expression, first, other) != 0 for other in used[k:]):
+                faults.append(f"{c.name}, {c.expression} = 0, is not linear in the speed {first}; pass a constraint of the form "
+                              "A(q, t) u + b(q, t) = 0")
+                break
+    return faults

@@ -1,0 +1,233 @@
+"""States that fulfil the constraints: checks of an initial state, and the nearest consistent one.
+
+Positions by a damped Gauss-Newton method whose steps are the smallest in the metric of the mass matrix, by singular values
+so that dependent constraints do no harm; speeds by one such projection, since the constraints are linear in them.
+Source: Nocedal and Wright, Numerical Optimization, section 10.3; Garcia de Jalon and Bayo, Kinematic and Dynamic Simulation
+of Multibody Systems, chapter 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.arguments import take
+from symdyn.runtime.constraints import (
+    CONSISTENT,
+    as_velocities,
+    length,
+    listed,
+    names,
+    position_residual,
+    velocity_residual,
+)
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+_ITERATIONS = 100
+_SOLVED = 1e-13
+_GOOD = 1e-10
+# Singular values below this part of the largest are left out of a step.
+_CUT = 1e-9
+_RESTARTS = 8
+
+
+def normalised(module: Module, x: np.ndarray) -> np.ndarray:
+    """The state with unit vectors of length 1; raises ArgumentError if they are off by more than rounding of input."""
+    for group in module.metadata.get("unit_groups", ()):
+        places = [module.metadata["x"].index(name) for name in group]
+        norm = float(np.linalg.norm(x[places]))
+        if abs(norm - 1) > 1e-6:
+            raise ArgumentError(f"{module.name}: initial q: {', '.join(group)} have the norm {norm:.6g}, not 1; Euler parameters "
+                                "are a unit vector: divide them by their norm")
+        x[places] /= norm
+    return x
+
+
+def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> None:
+    """Raise ArgumentError, which names the violated constraints, if a state is not consistent."""
+    if not names(module):
+        return
+    faults = []
+    for what, residual, unit in (
+            ("positions", position_residual(module, t, x, params), "of the mechanism's length"),
+            ("speeds", velocity_residual(module, t, x, params, 1e-9 * length(module, params)), "of its speed")):
+        if (np.abs(residual) > CONSISTENT).any():
+            faults.append(f"the initial {what} violate {listed(module, residual, CONSISTENT)} ({unit})")
+    if faults:
+        raise ArgumentError(f"{module.name}: {'; '.join(faults)}; begin with the nearest consistent state: "
+                            f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''})")
+
+
+def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
+               keep: Collection[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """The consistent state near a guess: q (n_q,) and u (n_u,); see Module.consistent."""
+    metadata = module.metadata
+    p = module.parameters(params)
+    initial = metadata["initial"]
+    q0, u0 = (take(values, metadata[what], what, {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
+              for what, values in (("q", q), ("u", u)))
+    x = np.concatenate([q0, u0, np.zeros(metadata["sizes"]["z"])])
+    if isinstance(keep, str) or hasattr(keep, "name"):
+        keep = (keep,)
+    kept = [str(getattr(k, "name", k)) for k in keep]
+    unknown = [k for k in kept if k not in metadata["q"] and k not in metadata["u"]]
+    if unknown:
+        known = ", ".join([*metadata["q"], *metadata["u"]])
+        raise ArgumentError(f"{module.name}: keep names {', '.join(unknown)}; there are {known}")
+    x = normalised(module, x)
+    if not names(module):
+        return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
+    search = _Search(module, float(t), p, kept)
+    x = search.speeds(search.positions(x))
+    return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
+
+
+class _Search:
+    """Searches of one call: time, parameters and what must stay are fixed."""
+
+    def __init__(self, module: Module, t: float, p: np.ndarray, keep: list[str]) -> None:
+        self.module, self.t, self.p, self.keep = module, t, p, keep
+        self.n_q, self.n_u = (module.metadata["sizes"][k] for k in "qu")
+        self.kept_q = [k for k, name in enumerate(module.metadata["q"]) if name in keep]
+        self.kept_u = [k for k, name in enumerate(module.metadata["u"]) if name in keep]
+        self.holonomic = np.array(module.metadata.get("holonomic") or [True] * len(names(module)), dtype=bool)
+        self.length = length(module, p)
+        self.velocities = as_velocities(module, p)
+
+    def positions(self, x: np.ndarray) -> np.ndarray:
+        """The state with q moved onto the constraints."""
+        best, least = x, np.inf
+        random = np.random.default_rng(1)
+        for attempt in range(_RESTARTS + 1):
+            # Where steps do not reduce the residual, such as in a stretched position, a nearby start leads on.
+            shift = 0.05 * attempt * self.length / self.velocities * random.standard_normal(self.n_u)
+            start = x if attempt == 0 else self._moved(x, shift)
+            found = self._gauss_newton(start)
+            left = self._left(found)
+            if left <= _GOOD:
+                return found
+            if left < least:
+                best, least = found, left
+        self._refuse("positions", position_residual(self.module, self.t, best, self.p))
+        raise AssertionError
+
+    def _gauss_newton(self, x: np.ndarray) -> np.ndarray:
+        merit = self._merit(x)
+        for _ in range(_ITERATIONS):
+            if self._left(x) <= _SOLVED:
+                break
+            dv = self._step(x)
+            if dv is None:
+                break
+            largest = float(np.abs(dv * self.velocities).max(initial=0.0)) / self.length
+            h = min(1.0, 1.0 / largest) if largest > 0 else 1.0  # at most about a radian at once
+            while h > 1e-6:
+                trial = self._moved(x, h * dv)
+                value = self._merit(trial)
+                if value < (1 - 1e-4 * h) * merit:
+                    break
+                h /= 2
+            else:
+                break
+            x, merit = trial, value
+        return x
+
+    def _left(self, x: np.ndarray) -> float:
+        """Largest residual, relative to the length."""
+        return float(np.abs(self._residual(x)).max(initial=0.0))
+
+    def _merit(self, x: np.ndarray) -> float:
+        return float(np.linalg.norm(self._residual(x)))
+
+    def _residual(self, x: np.ndarray) -> np.ndarray:
+        try:
+            return position_residual(self.module, self.t, x, self.p)
+        except EvaluationError:
+            return np.array([np.inf])
+
+    def _moved(self, x: np.ndarray, dv: np.ndarray) -> np.ndarray:
+        """The state after the velocities dv (n_u,) for a unit of time; what must stay stays to the last bit."""
+        free = self._free(x)
+        dv = free @ (free.T @ dv)
+        moved = x.copy()
+        moved[:self.n_q] += self._evaluate("N", x) @ dv
+        moved[self.kept_q] = x[self.kept_q]
+        for group in self.module.metadata.get("unit_groups", ()):
+            places = [self.module.metadata["x"].index(name) for name in group]
+            if not set(places) & set(self.kept_q):
+                moved[places] /= np.linalg.norm(moved[places])
+        return moved
+
+    def _step(self, x: np.ndarray) -> np.ndarray | None:
+        """The velocities (n_u,) of a Gauss-Newton step."""
+        J, scale = self._evaluate("C_r", x), self._evaluate("C_scale", x)
+        C = self._evaluate("C", x)
+        rows = self.holonomic
+        return self._smallest(x, (J * scale[:, None])[rows], -(C * scale)[rows], self._free(x))
+
+    def speeds(self, x: np.ndarray) -> np.ndarray:
+        """The state with u projected onto the constraints."""
+        scale = self._evaluate("C_scale", x)
+        J = self._evaluate("C_r", x) * scale[:, None]
+        free = np.eye(self.n_u)[:, [k for k in range(self.n_u) if k not in self.kept_u]]
+        guess = float(np.abs(x[self.n_q:self.n_q + self.n_u] * self.velocities).max(initial=0.0))
+        for _ in range(3):
+            du = self._smallest(x, J, -self._evaluate("C_dot", x) * scale, free)
+            if du is None:
+                break
+            x = x.copy()
+            x[self.n_q:self.n_q + self.n_u] += du
+        residual = velocity_residual(self.module, self.t, x, self.p, guess)  # the result may well be rest
+        if (np.abs(residual) > _GOOD).any():
+            self._refuse("speeds", residual)
+        u = x[self.n_q:self.n_q + self.n_u]
+        u[np.abs(u * self.velocities) <= 1e-15 * guess] = 0.0
+        return x
+
+    def _smallest(self, x: np.ndarray, J: np.ndarray, right: np.ndarray, free: np.ndarray) -> np.ndarray | None:
+        """The dv (n_u,) in the columns of `free` with J dv = right, as well as it can be, smallest in the metric of the mass."""
+        if free.shape[1] == 0 or len(J) == 0:
+            return None
+        root = self._inverse_root(x, free)
+        A = J @ free @ root
+        U, values, Vt = np.linalg.svd(A, full_matrices=False)
+        if not values.size or values[0] == 0:
+            return None
+        kept = values > _CUT * values[0]
+        return free @ (root @ (Vt[kept].T @ ((U[:, kept].T @ right) / values[kept])))
+
+    def _inverse_root(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """R with R R^T the inverse of the mass matrix on the columns of `free`; directions without mass get a little."""
+        D = self.velocities
+        M = self._evaluate("mass_matrix", x) / np.outer(D, D)  # kg
+        largest = float(np.abs(M).max(initial=0.0)) or 1.0
+        M = (M + 1e-6 * largest * np.eye(self.n_u)) * np.outer(D, D)
+        try:
+            root: np.ndarray = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free)).T
+        except np.linalg.LinAlgError:  # not even positive: all directions alike
+            root = np.linalg.inv(np.linalg.cholesky(free.T @ np.diag(D**2) @ free)).T
+        return root
+
+    def _free(self, x: np.ndarray) -> np.ndarray:
+        """Columns: velocities that leave the kept coordinates as they are, orthonormal, (n_u, n)."""
+        if not self.kept_q:
+            return np.eye(self.n_u)
+        _, values, Vt = np.linalg.svd(self._evaluate("N", x)[self.kept_q])
+        rank = int((values > 1e-12 * max(values.max(initial=0.0), 1e-300)).sum())
+        basis: np.ndarray = Vt[rank:].T
+        return basis
+
+    def _evaluate(self, name: str, x: np.ndarray) -> np.ndarray:
+        return self.module.evaluate(name, self.t, x, self.p)
+
+    def _refuse(self, what: str, residual: np.ndarray) -> None:
+        kept = f" with {', '.join(self.keep)} kept" if self.keep else ""
+        advice = ("let go of one of them in keep, or begin" if self.keep else "begin") + " with another guess, or check lengths"
+        raise ArgumentError(f"{self.module.name}: no consistent {what} found near the guess{kept}: the nearest violate "
+                            f"{listed(self.module, residual, _GOOD)} (relative to the mechanism's "
+                            f"{'length' if what == 'positions' else 'speed'}); {advice}")

@@ -1,0 +1,101 @@
+"""What holds for a state of a module with constraints: residuals by name, rank of the Jacobian, uniqueness of multipliers."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Singular values of the scaled Jacobian below this part of the largest one count as zero.
+RANK_TOLERANCE = 1e-8
+# Residuals up to this part of the mechanism's length, and of its speed, are projected away; larger ones are a mistake.
+CONSISTENT = 1e-6
+
+
+def names(module: Module) -> list[str]:
+    """Names of the constraint rows, (n_c,)."""
+    return list(module.metadata.get("constraints", ()))
+
+
+def length(module: Module, params: Any) -> float:
+    """The mechanism's length, m."""
+    module.unit("rhs")  # it is there, too
+    return float(module.evaluate("length", 0.0, np.zeros(module.metadata["sizes"]["x"]), params))
+
+
+def turning(module: Module) -> np.ndarray:
+    """For every speed whether it is an angular velocity or has no length in it, (n_u,)."""
+    return np.array([module.metadata["units"].get(u) in ("rad/s", "1/s") for u in module.metadata["u"]], dtype=bool)
+
+
+def as_velocities(module: Module, params: Any) -> np.ndarray:
+    """Factors that make velocities (m/s) of all speeds, (n_u,): the mechanism's length for angular ones."""
+    return np.where(turning(module), length(module, params), 1.0)
+
+
+def position_residual(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
+    """C C_scale / length, (..., n_c)."""
+    return _scaled(module, "position_correction", "C", t, x, params) / length(module, params)
+
+
+def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: float = 0.0) -> np.ndarray:
+    """C_dot C_scale / (the largest speed of all states, at least `at_least`, m/s), (..., n_c).
+
+    A speed is |u_j|, times the mechanism's length if it is in rad/s, or that with which the constraints move by themselves.
+    """
+    n_q, n_u = (module.metadata["sizes"][k] for k in "qu")
+    still = np.array(x, dtype=float)
+    u = np.array(still[..., n_q:n_q + n_u])
+    still[..., n_q:n_q + n_u] = 0.0
+    moving = np.abs(_scaled(module, "velocity_correction", "C_dot", t, still, params)).max(initial=0.0)
+    speed = max(np.abs(u * as_velocities(module, params)).max(initial=0.0), moving, at_least)
+    return _scaled(module, "velocity_correction", "C_dot", t, x, params) / max(speed, np.finfo(float).tiny)
+
+
+def _scaled(module: Module, correction: str, plain: str, t: Any, x: Any, params: Any) -> np.ndarray:
+    """Residuals as lengths, or velocities: the first entries of a correction, which is at hand, where it can be computed."""
+    module.unit("rhs")  # corrections are there, too
+    with contextlib.suppress(EvaluationError):
+        return module.evaluate(correction, t, x, params)[..., :len(names(module))]
+    return module.evaluate(plain, t, x, params) * module.evaluate("C_scale", t, x, params)
+
+
+def scaled_jacobian(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
+    """C_scale C_r, columns of angular velocities divided by the mechanism's length: all entries are numbers, (..., n_c, n_u)."""
+    rows = module.evaluate("C_r", t, x, params) * module.evaluate("C_scale", t, x, params)[..., None]
+    return rows / as_velocities(module, params)
+
+
+def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
+    """Rank of the scaled Jacobian, (...)."""
+    if not names(module):
+        return np.zeros(np.shape(x)[:-1], dtype=int)
+    values = np.linalg.svd(scaled_jacobian(module, t, x, params), compute_uv=False)
+    return (values > tolerance * values[..., :1]).sum(axis=-1)
+
+
+def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
+    """Which multipliers are unique, (..., n_c) of bool.
+
+    C_r^T lam fixes lam up to the kernel of C_r^T; where that has no part along a row, its multiplier is unique: its row of
+    the left singular vectors of the range then has the norm 1.
+    """
+    if not names(module):
+        return np.zeros((*np.shape(x)[:-1], 0), dtype=bool)
+    U, values, _ = np.linalg.svd(scaled_jacobian(module, t, x, params), full_matrices=False)
+    kept = values > RANK_TOLERANCE * values[..., :1]
+    squares: np.ndarray = (U**2 * kept[..., None, :]).sum(axis=-1)
+    return squares > 1 - 1e-6
+
+
+def listed(module: Module, residual: np.ndarray, at_least: float) -> str:
+    """The constraints whose residual is larger, the largest first."""
+    order = [k for k in np.argsort(-np.abs(residual), kind="stable") if abs(residual[k]) > at_least]
+    known = names(module)
+    return ", ".join(f"{known[k]} by {residual[k]:.3g}" for k in order)
