@@ -187,6 +187,7 @@ class _Writer:
         self.printer = Printer(dialect, self.text)
         self.uses: Counter[Node] = Counter()
         self.results: set[Node] = set()
+        self.guarded: set[Any] = set()
         self.groups: set[str] = set()
         self.n_unnamed = 0
         self.n_calls = 0
@@ -302,6 +303,7 @@ class _Writer:
         """Note how often each node is used, and which are results."""
         self.uses = Counter(core for values in [*[n.args for n in body], entries] for core in _cores(values))
         self.results = set(_cores(entries))
+        self.guarded = {n.args[0] for n in body if n.op == "guard"}
 
     def _statements(self, body: Sequence[Node]) -> list[Section]:
         """Sections of statements; each begins with the arguments that are first needed there."""
@@ -314,8 +316,12 @@ class _Writer:
                 if node.op == "call":
                     lines += self._call(node)
                     continue
+                if node.op == "guard":
+                    lines.append(self._guard(node))
+                    continue
                 value = self.printer.operation(node)
-                if self.uses[node] <= 1 and not named and node not in self.checks and len(value) <= _INLINE_LENGTH:
+                inline = self.uses[node] <= 1 and not named and node not in self.checks and node not in self.guarded
+                if inline and len(value) <= _INLINE_LENGTH:
                     self.text[node] = value
                     self.printer.inline.add(node)
                 else:
@@ -323,6 +329,12 @@ class _Writer:
             if lines:
                 sections.append(Section(title, tuple(lines)))
         return sections
+
+    def _guard(self, node: Node) -> str:
+        """The statement that stops where the margin is not positive; the node is written as the value that it guards."""
+        value, margin = node.args
+        self.text[node] = self.printer.text(value)
+        return self.dialect.check.format(name=f"({self.printer.text(margin)})", code=self.codes[self.checks[node]])
 
     # -- numeric algorithms
 
@@ -354,7 +366,7 @@ class _Writer:
 def _checks(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
     """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
     divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
-    divisors.update(n for n in steps if n.op == "call")
+    divisors.update(n for n in steps if n.op in ("call", "guard"))
     return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
 
 

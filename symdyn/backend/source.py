@@ -7,11 +7,12 @@ import os
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 import symdyn
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
@@ -19,12 +20,13 @@ from symdyn.backend.program import Function, Part, Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.errors import SymdynError
 from symdyn.tape.kernels import MASSLESS, ROUNDS, SMOOTHED
-from symdyn.tape.tape import Tape
+from symdyn.tape.tape import Output, Tape
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
            "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c"}
 # What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
+VIOLATION = "violation"
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -99,6 +101,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     dialect = next(read_dialect(f / backend) for f in folders if (f / backend / "dialect.toml").is_file())
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
                                      trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    content = _with_violation(content)
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
@@ -115,6 +118,18 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         files[target.format(name=context["name"])] = text
     return Source(backend, files, program, dict(context["metadata_record"]))
+
+
+def _with_violation(content: Content) -> Content:
+    """With corrections also the function `violation`, their residuals alone: a look whether a correction was enough."""
+    if not all(n in content.tapes for n in CORRECTIONS):
+        return content
+    position, velocity = (content.tapes[n].outputs[n].entries for n in CORRECTIONS[:2])
+    n_rows = len(position) - len(content.groups["q"])
+    values = np.array([*position[:n_rows], *velocity[:n_rows]], dtype=object)
+    tape = Tape(content.tapes[CORRECTIONS[0]].recorder, {VIOLATION: Output.of(VIOLATION, values)})
+    return replace(content, tapes={**content.tapes, VIOLATION: tape},
+                   titles={**content.titles, VIOLATION: "constraints as lengths, then their rates, m/s"})
 
 
 def _template_fault(template: str, error: Exception) -> str:
@@ -167,7 +182,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     if all(n in uses for n in CORRECTIONS):
         projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
                       "position_call": field_call(CORRECTIONS[0], "out"), "velocity_call": field_call(CORRECTIONS[1], "out"),
-                      "needs_inputs": any("inputs" in uses[n] for n in CORRECTIONS),
+                      "violation_call": field_call(VIOLATION, "out"),
+                      "needs_inputs": any("inputs" in uses[n] for n in (*CORRECTIONS, VIOLATION)),
                       "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]]}
 
     metadata = {

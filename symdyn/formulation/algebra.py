@@ -37,8 +37,7 @@ class TapeAlgebra:
 
     def divisor(self, value: Any, least: Any, reason: str) -> Any:
         """A value to divide by; where it is not above `least` when the code runs, that stops and tells the reason."""
-        apply = self.recorder.apply
-        return self.positive(apply("select", apply("gt", value, least), value, 0), reason)
+        return self.recorder.guard(value, value - least, reason)
 
     def expression(self, e: Any) -> Any:
         """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""

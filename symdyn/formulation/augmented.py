@@ -26,6 +26,8 @@ from symdyn.formulation.tree import Tree
 from symdyn.formulation.tree_equations import tree_of, tree_result
 from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.record import Model
+from symdyn.spatial.vectors import inner
+from symdyn.tape.node import is_zero
 
 COORDINATES = ("relative", "absolute")
 
@@ -34,12 +36,13 @@ class ConstrainedTree(Constrained, TreeQuantities):
     """A tree whose loops are closed by constraints."""
 
     def __init__(self, tree: Tree, gathered: Gathered | None = None, kernel: bool = False,
-                 independent: tuple[int, ...] | None = None) -> None:
+                 independent: tuple[int, ...] | None = None, pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         super().__init__(tree)
         self.gathered = gathered or Gathered(tree)
         self.rows = self.gathered.rows
         self.kernel = kernel
         self.independent = independent
+        self.pivots = pivots
         if self.gathered.trivial:
             self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
 
@@ -54,6 +57,11 @@ class ConstrainedTree(Constrained, TreeQuantities):
         other = [k for k in range(len(self.rows)) if k not in closed]
         along = -self.C_r()[other].T @ lam[other] if other else None
         return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along)
+
+    def power(self) -> Any:
+        """Power of the loads and drives, and of the constraints that depend on time, W."""
+        total, given = super().power(), self.C_t()
+        return total if all(is_zero(e) for e in given) else total + inner(self.lam(), given)
 
     @cached_property
     def length(self) -> Any:
@@ -76,13 +84,10 @@ def augment(model: Model, coordinates: str = "relative", orientation: Any = None
     gathered = Gathered(tree)
     names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
 
-    def derivation(kernel: bool, independent: tuple[int, ...] | None) -> ConstrainedTree:
-        return ConstrainedTree(tree, gathered, kernel, independent)
-
     def result(quantities: ConstrainedTree, otherwise: Equations | None) -> AugmentedEquations:
         return tree_result(quantities, "augmented", AugmentedEquations, again, otherwise=otherwise, **names)
 
-    equations = choose(derivation, result, ranks)
+    equations = choose(lambda *way: ConstrainedTree(tree, gathered, *way), result, ranks)
     faults = contradictions(equations.otherwise or equations) if gathered.rows else []
     if faults:
         raise ModelError(faults, model.name)

@@ -26,7 +26,6 @@ import numpy as np
 from symdyn.formulation.relative import End, complement
 from symdyn.model.closures import Rod
 from symdyn.model.joints import Cylindrical, Fixed, Joint, Planar, Prismatic, Revolute, Spherical, Universal
-from symdyn.model.joints.base import numeric
 from symdyn.spatial.vectors import cross, dot, identity, vector, zeros
 
 
@@ -75,8 +74,7 @@ def closure_rows(algebra: Any, joint: Joint, P: End, Q: End, planar: bool) -> It
             yield _tilt(f"{joint.name}_tilt_{k + 1}", P, Q, P.A[:, k], Q.A[:, 2])
     if isinstance(joint, (Revolute, Prismatic, Cylindrical)):
         axis = algebra.constants(joint.axis)
-        sample = np.array([numeric(e) for e in joint.axis])
-        sides = complement(axis, sample) if not planar else (vector(-axis[1], axis[0], 0),)
+        sides = complement(algebra.recorder, axis) if not planar else (vector(-axis[1], axis[0], 0),)
         if isinstance(joint, (Prismatic, Cylindrical)):
             for number, side in enumerate(sides):
                 yield _across(f"{joint.name}_side_{number + 1}", P, Q, D, P.A @ side)

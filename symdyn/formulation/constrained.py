@@ -14,6 +14,7 @@ import numpy as np
 
 from symdyn.formulation.constraints import Row
 from symdyn.formulation.motion import Motion
+from symdyn.formulation.null_space import NullSpaceSolver
 from symdyn.formulation.saddle import KernelSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
@@ -33,11 +34,13 @@ class Constrained(Motion):
     kernel        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows
+    pivots        (row, column) of C_r in the order in which dependent speeds are eliminated; None: by the Schur complement
     """
 
     rows: list[Row]
     kernel = False
     independent: tuple[int, ...] | None = None
+    pivots: tuple[tuple[int, int], ...] | None = None
 
     @cached_property
     def length(self) -> Any:
@@ -103,11 +106,14 @@ class Constrained(Motion):
         if self.kernel:
             return KernelSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), UNHELD,
                                 smoothed)
-        if self.independent is None:
-            return RangeSolver(self.algebra, self.recall("solver"), self.C_r(), [r.name for r in self.rows])
-        kept = list(self.independent)
-        inner = RangeSolver(self.algebra, self.recall("solver"), self.C_r()[kept], [self.rows[k].name for k in kept])
-        return SubsetSolver(inner, kept, len(self.rows))
+        kept = list(range(len(self.rows)) if self.independent is None else self.independent)
+        C_r, names = self.C_r()[kept], [self.rows[k].name for k in kept]
+        if self.pivots is not None:
+            pivots = [(kept.index(row), column) for row, column in self.pivots]
+            solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds)
+        else:
+            solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names)
+        return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))
 
     def _columns(self) -> list[Any]:
         return [1 / self.length if turning else 1 for turning in self.angular]

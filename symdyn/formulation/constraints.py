@@ -21,10 +21,17 @@ from symdyn.formulation.relative import End, Relative, common_link
 from symdyn.formulation.tree import Tree
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Joint
+from symdyn.model.orientation import EulerParameters
 from symdyn.model.symbols import Coordinate
 from symdyn.spatial.vectors import dot, inner, vector, zeros
 from symdyn.tape.differentiate import forward
-from symdyn.tape.node import PARAMETER, Node, is_zero
+from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.node import PARAMETER, TIME, Node, is_zero
+from symdyn.tape.tape import Tape
+
+# What is smaller at STATES random states is zero but for rounding: lengths in m, directions.
+ROUNDING = 1e-13
+STATES = 3
 
 
 @dataclass(frozen=True)
@@ -115,7 +122,7 @@ class Gathered:
             jacobian = along if self.tree.plain else along @ self.tree.D if len(along) else zeros(len(self.model.speeds))
             unit = "m" if row.length else "rad"
             full = Row(row.label, row.value, jacobian, inner(along, self.tree.w), row.remaining(P, Q), unit)
-            if self._add(full):
+            if self._add(full, closes=True):
                 kept.append(row)
                 places.append(len(self.rows) - 1)
         self.closures.append(Closure(joint, base, seen, P, Q, tuple(kept), tuple(places)))
@@ -128,25 +135,52 @@ class Gathered:
                              self.model.speeds)
         self._add(row)
 
-    def _add(self, row: Row) -> bool:
-        """Take a row, unless it holds by structure."""
-        if any(not is_zero(e) for e in row.jacobian):
+    def _add(self, row: Row, closes: bool = False) -> bool:
+        """Take a row, unless it holds by structure; closes: one of a joint that closes a loop, which may hold by numbers, too."""
+        regular = any(not is_zero(e) for e in row.jacobian)
+        if regular and not closes:
             self.rows.append(row)
             return True
-        if is_zero(row.value) and is_zero(row.rate):
+        if (is_zero(row.value) and is_zero(row.rate) and not regular) or self._vanish([row.value, row.rate, *row.jacobian]):
             self.trivial.append(row.name)
             return False
+        if regular:
+            self.rows.append(row)
+            return True
         what = row.value if row.holonomic else row.rate
-        if not isinstance(what, Node):
-            self.faults.append(f"{row.name} demands {float(what):.6g} = 0, which no motion of the system changes: it contradicts "
-                               "the other joints; remove it, or correct the points and axes")
-        elif what.mask & ~PARAMETER:
+        number = self._at([what])[0, 0]
+        if isinstance(what, Node) and what.mask & TIME:
             self.faults.append(f"{row.name} holds what is prescribed as a function of time: no coordinate of the system is in "
                                "it; remove it, or replace the prescribed motion by a coordinate")
-        else:
+        elif isinstance(what, Node) and what.mask & PARAMETER:
             self.faults.append(f"{row.name} is an equation between parameters alone, which no motion of the system changes; "
                                "remove it, or choose points and axes so that it holds by itself")
+        else:
+            self.faults.append(f"{row.name} demands {number:.6g} = 0, which no motion of the system changes: it contradicts "
+                               "the other joints; remove it, or correct the points and axes")
         return False
+
+    def _vanish(self, values: Sequence[Any]) -> bool:
+        """Whether values are zero but for rounding, at random states and parameters."""
+        return bool((np.abs(self._at(values)) <= ROUNDING).all())
+
+    def _at(self, values: Sequence[Any]) -> np.ndarray:
+        """Values at a few random states, (s, n), with random parameters near their defaults."""
+        if not any(isinstance(v, Node) for v in values):
+            return np.array([[float(v) for v in values]])
+        tape = Tape.of(self.algebra.recorder, values=np.array(list(values), dtype=object))
+        stream = np.random.default_rng(3)
+        parameters = {p.name: float(v) for p, v in self.model.defaults.items()}
+        numbers: dict[str, Any] = {}
+        for leaf in tape.inputs:
+            drawn = stream.uniform(0.2, 1.2, STATES)
+            name = leaf.args[1]
+            numbers[name] = parameters[name] * (1 + drawn / 100) if parameters.get(name) else drawn
+        for joint in (j for j in self.model.joints if isinstance(getattr(j, "orientation", None), EulerParameters)):
+            group = [q.name for q in joint.coordinates[-4:] if q.name in numbers]
+            norm = np.sqrt(sum(numbers[name] ** 2 for name in group))
+            numbers.update({name: numbers[name] / norm for name in group})
+        return evaluate_rows(tape, numbers, STATES)["values"]
 
 
 def expression_row(algebra: Any, constraint: Constraint, coordinates: Sequence[sp.Symbol], rates: Sequence[Any],

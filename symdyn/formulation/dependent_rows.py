@@ -1,81 +1,102 @@
-"""Which rows of the constraints depend on the others, found in numbers at consistent states near the initial one."""
+"""Which rows of the constraints depend on the others, and which speeds on the others, found in numbers at consistent states:
+the initial one, and those that are reached from there by walking along the motions that the constraints leave."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.consistent_states import FULFILLED, ConstraintStates
 from symdyn.formulation.equations import Equations
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.tape import Tape
 
 # Singular values of the scaled Jacobian below this part of the largest count as zero.
 RANK_TOLERANCE = 1e-8
-ITERATIONS = 60
-SPREAD = 0.3
+# Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
+WALKS, STEPS, STRIDE = 6, 12, 0.25
 
 
 @dataclass(frozen=True)
 class Ranks:
-    """rank: the largest found, of the scaled C_r; independent: rows that have it; states: how many it was tried at."""
+    """rank: the largest found, of the scaled C_r; independent: rows that have it, far from losing it at all states.
+
+    samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
+    """
 
     rank: int
     independent: tuple[int, ...]
-    states: int
+    samples: np.ndarray
+    mass: np.ndarray
 
 
-def ranks(equations: Equations, states: int = 4, seed: int = 1) -> Ranks | None:
-    """The rank of the constraints at consistent states near the initial one; None where parameters have no numbers, or no
-    consistent state is found."""
+def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
+    """The rank of the constraints at consistent states; None where parameters have no numbers, or the initial state is far
+    from any consistent one."""
     symbols = equations.symbols
     if any(p not in symbols.defaults for p in symbols.parameters):
         return None
-    tape = equations.tape("C", "C_r", "C_scale", "N", "length")
-    values = {p.name: float(symbols.defaults[p]) for p in symbols.parameters} | {"t": 0.0}
-    values |= {s.name: 0.0 for s in (*symbols.speeds, *symbols.states, *symbols.inputs)}
-    names = [q.name for q in symbols.coordinates]
-    start = np.array([float(symbols.initial.get(q, 0.0)) for q in symbols.coordinates])
-    stream = np.random.default_rng(seed)
-    best: tuple[int, float, np.ndarray] | None = None
-    found = 0
-    for trial in range(4 * states):
-        if found == states:
-            break
-        q = start + (SPREAD * stream.uniform(-1, 1, len(start)) if trial else 0.0)
-        scaled = _consistent(tape, values, names, q)
-        if scaled is None:
-            if trial == 0:
-                return None
-            continue
-        found += 1
-        sizes = np.linalg.svd(scaled, compute_uv=False)
-        rank = int((sizes > RANK_TOLERANCE * max(sizes[0], 1e-300)).sum()) if len(sizes) else 0
-        least = float(sizes[rank - 1] / sizes[0]) if rank else 0.0
-        if best is None or (rank, least) > best[:2]:
-            best = rank, least, scaled
-    assert best is not None
-    rank, _, scaled = best
-    if rank == len(scaled):
-        return Ranks(rank, tuple(range(rank)), found)
-    from scipy.linalg import qr
-
-    order = qr(scaled.T, pivoting=True, mode="r")[1]
-    return Ranks(rank, tuple(sorted(int(k) for k in order[:rank])), found)
+    states = ConstraintStates(equations, symbols.defaults)
+    start = np.array([[float(symbols.initial.get(q, 0.0)) for q in symbols.coordinates]])
+    q, residual = states.nearest(start)
+    if not residual[0] < FULFILLED:
+        return None
+    places = np.concatenate([q, *walked(states, q, np.random.default_rng(seed))])
+    samples = scaled(states, places)
+    sizes = np.linalg.svd(samples, compute_uv=False)
+    counts = (sizes > RANK_TOLERANCE * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
+    rank = int(counts.max(initial=0))
+    samples = samples[counts == rank]
+    values = {**states.values, **dict(zip(states.names, q[0], strict=True))}
+    mass = evaluate_rows(equations.tape("M_tilde"), values, 1)["M_tilde"][0]
+    return Ranks(rank, _independent(samples, rank), samples, mass)
 
 
-def _consistent(tape: Tape, values: Mapping[str, Any], names: list[str], q: np.ndarray) -> np.ndarray | None:
-    """The scaled Jacobian at the consistent state nearest to q by Gauss-Newton; None if there is none near."""
-    for _ in range(ITERATIONS):
-        at = {**values, **dict(zip(names, q, strict=True))}
-        found = {name: array[0] for name, array in evaluate_rows(tape, at, 1).items()}
-        residual = found["C"] * found["C_scale"]
-        if not np.isfinite(residual).all() or not np.isfinite(found["C_r"]).all():
-            return None
-        scaled = found["C_r"] * found["C_scale"][:, None]
-        if np.abs(residual).max(initial=0.0) < 1e-12 * found["length"]:
-            return scaled  # type: ignore[no-any-return]
-        q = q + found["N"] @ np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
-    return None
+def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator) -> Iterator[np.ndarray]:
+    """Consistent states (s, n_q) on walks from one (1, n_q), each going on in its direction as the constraints allow."""
+    now = np.repeat(q, WALKS, axis=0)
+    n_u = len(states.angular)
+    direction = stream.normal(size=(WALKS, n_u))
+    direction[1::2] = -direction[::2]
+    for _ in range(STEPS):
+        found = states.at(now)
+        onward = _along(scaled_of(states, found), direction)
+        size = np.linalg.norm(onward, axis=1, keepdims=True)
+        if not (size > 1e-6).any():
+            return
+        direction = onward / np.maximum(size, 1e-6)
+        now, residual = states.nearest(now + states.moved(found, STRIDE * direction))
+        kept = residual < FULFILLED
+        if not kept.any():
+            return
+        now, direction = now[kept], direction[kept]
+        yield now
+
+
+def scaled(states: ConstraintStates, q: np.ndarray) -> np.ndarray:
+    """C_r (s, n_c, n_u) at coordinates (s, n_q), lengths by lengths."""
+    return scaled_of(states, states.at(q))
+
+
+def scaled_of(states: ConstraintStates, found: dict[str, np.ndarray]) -> np.ndarray:
+    """The same of what the states give."""
+    turning = np.where(states.angular[None, :], found["length"][:, None], 1.0)
+    return found["C_r"] * found["C_scale"][..., None] / turning[:, None, :]  # type: ignore[no-any-return]
+
+
+def _along(A: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Directions (s, n_u) without what the rows of A (s, m, n_u) hold."""
+    held = np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ (A @ direction[..., None])
+    return direction - held[..., 0]  # type: ignore[no-any-return]
+
+
+def _independent(samples: np.ndarray, rank: int) -> tuple[int, ...]:
+    """Rows of full rank at the samples (s, n_c, n_u): one after the other the row goes that the others replace best where they
+    do it worst, by its part in the combinations of rows that vanish."""
+    kept = list(range(samples.shape[1]))
+    while len(kept) > rank:
+        left = np.linalg.svd(samples[:, kept])[0][:, :, rank:]
+        part = np.linalg.norm(left, axis=2).min(axis=0)
+        kept.pop(int(part.argmax()))
+    return tuple(kept)

@@ -124,13 +124,14 @@ class _Recorded:
 class _Coordinates(Constrained, Motion):
     """Coordinates whose mass matrix is constant; the speeds are their derivatives."""
 
-    def __init__(self, recorded: _Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None) -> None:
+    def __init__(self, recorded: _Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None,
+                 pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         symbols = recorded.symbols
         super().__init__(recorded.algebra, symbols.coordinates, symbols.speeds, recorded.rates, (), symbols.inputs,
                          symbols.parameters)
         self.recorded = recorded
         self.rows = recorded.rows
-        self.kernel, self.independent = kernel, independent
+        self.kernel, self.independent, self.pivots = kernel, independent, pivots
 
     @cached_property
     def length(self) -> Any:
@@ -182,7 +183,7 @@ def _derive(description: _Description) -> AugmentedEquations:
     faults = contradictions(result(_Coordinates(recorded, kernel=True), None))
     if faults:
         raise ModelError(faults, description.name)
-    return choose(lambda kernel, independent: _Coordinates(recorded, kernel, independent), result, _search)
+    return choose(lambda *way: _Coordinates(recorded, *way), result, _search)
 
 
 def _search(equations: Equations) -> Ranks | None:

@@ -13,6 +13,9 @@ import numpy as np
 from symdyn.formulation.newton_euler import LinkMotion, base_motion, carried_on
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.spatial.vectors import cross, identity, zeros
+from symdyn.tape.evaluate import constant
+from symdyn.tape.node import Node, is_zero
+from symdyn.tape.recorder import Recorder
 
 
 @dataclass(frozen=True)
@@ -102,20 +105,25 @@ def common_link(tree: Tree, *links: int) -> int:
     return next((k for k in paths[0] if all(k in path for path in paths)), GROUND)
 
 
-def complement(axis: Any, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def complement(recorder: Recorder, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two directions across a unit axis, so that the three are right-handed.
 
-    sample   (3,) the axis at some numbers for its parameters: tells which of two formulas is far from its pole
     Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6 (2017), page 1.
     """
     x, y, z = axis
-    along = [k for k in range(3) if abs(sample[k]) > 1e-12]
-    if len(along) == 1:
-        first = np.array([int(k == (along[0] + 1) % 3) for k in range(3)], dtype=object)
+    along = [k for k in range(3) if not is_zero(axis[k])]
+    if len(along) < 3:
+        free = (along[0] + 1) % 3 if len(along) == 1 else 3 - sum(along)
+        first = np.array([int(k == free) for k in range(3)], dtype=object)
         return first, cross(axis, first)
-    if abs(sample[2]) < 1e-12:
-        return np.array([0, 0, 1], dtype=object), np.array([y, -x, 0], dtype=object)
-    s = 1 if sample[2] > 0 else -1
+    s = _sign(recorder, z)
     a = -1 / (s + z)
     b = x * y * a
     return (np.array([1 + s * (x * x) * a, s * b, -s * x], dtype=object), np.array([b, s + y * y * a, -y], dtype=object))
+
+
+def _sign(recorder: Recorder, z: Any) -> Any:
+    """1 or -1; of what depends on parameters as a choice when the code runs."""
+    if isinstance(z, Node) and z.mask:
+        return recorder.apply("select", recorder.apply("gt", z, 0), 1, -1)
+    return 1 if constant(z) > 0 else -1

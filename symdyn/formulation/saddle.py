@@ -95,7 +95,7 @@ class SubsetSolver:
     kept   places of the rows among all n
     """
 
-    solver: RangeSolver
+    solver: SaddleSolver
     kept: list[int]
     n: int
 

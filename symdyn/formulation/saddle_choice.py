@@ -1,5 +1,5 @@
-"""How accelerations of constrained motion are computed: by statements where the mass matrix allows it, else by the numeric
-algorithm, which also takes over where constraints come to depend on each other."""
+"""How accelerations of constrained motion are computed: by statements, in the way that takes the fewest operations, and by the
+numeric algorithm where these lose their digits, or where no statements would do."""
 
 from __future__ import annotations
 
@@ -7,41 +7,106 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from symdyn.formulation.augmented_equations import AugmentedEquations
 from symdyn.formulation.constrained import Constrained
 from symdyn.formulation.dependent_rows import Ranks
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.null_space import elimination_order
 from symdyn.formulation.rank import first_dependent
 from symdyn.tape.node import is_zero
+from symdyn.tape.tape import Tape
 
 Q = TypeVar("Q", bound=Constrained)
+Rows = tuple[int, ...]
+Pivots = tuple[tuple[int, int], ...]
+# Mass in a direction that the constraints leave, by the largest: below this there is none.
+MASSLESS = 1e-12
+# Orders of elimination that are compared, each the best at one state.
+CANDIDATES = 8
 
 
-def choose(derivation: Callable[[bool, tuple[int, ...] | None], Q], result: Callable[[Q, Equations | None], AugmentedEquations],
+def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
+           result: Callable[[Q, Equations | None], AugmentedEquations],
            search: Callable[[Equations], Ranks | None]) -> AugmentedEquations:
     """The equations with the cheapest accelerations that hold at every state.
 
-    derivation   (kernel, independent) -> quantities, all on one tape; see Constrained
+    derivation   (kernel, independent, pivots) -> quantities, all on one tape; see Constrained
     result       (quantities, the same for states where these fail) -> equations
     search       finds which rows depend on the others; None: unknown
     """
-    quantities = derivation(True, None)
+    quantities = derivation(True, None, None)
     whole = result(quantities, None)
-    if singular(quantities):
-        note = "mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system"
-        return replace(whole, notes=(*whole.notes, note))
     rows = quantities.rows
-    found = search(whole) if rows else None
-    if found is None or found.rank == len(rows):
-        return result(derivation(False, None), whole)
-    direct = result(derivation(False, found.independent), whole)
-    left = [r.name for k, r in enumerate(rows) if k not in found.independent]
-    note = (f"constraints {', '.join(left)}: they depend on the others at every state tried; accelerations come without them, "
-            f"multipliers of least norm with them (rank {found.rank} of {len(rows)})")
-    return replace(direct, notes=(*direct.notes, note))
+    if not rows:
+        return result(derivation(False, None, None), None)
+    found = search(whole)
+    independent = found.independent if found is not None and found.rank < len(rows) else None
+    ways: dict[str, Q] = {}
+    if not singular(quantities):
+        ways["Schur complement of the mass matrix"] = derivation(False, independent, None)
+    pivots = _pivots(quantities, found)
+    if pivots is not None:
+        dependent = ", ".join(str(quantities.speeds[column]) for _, column in pivots)
+        ways[f"elimination of the dependent speeds {dependent}"] = derivation(False, independent, pivots)
+    notes = []
+    if independent is not None and found is not None:
+        left = [r.name for k, r in enumerate(rows) if k not in independent]
+        notes.append(f"constraints {', '.join(left)}: they depend on the others at every state tried; accelerations come without "
+                     f"them, multipliers of least norm with them (rank {found.rank} of {len(rows)})")
+    if not ways:
+        notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
+        return replace(whole, notes=(*whole.notes, *notes))
+    counts = {name: operations(way) for name, way in ways.items()}
+    best = min(counts, key=lambda name: counts[name])
+    others = [f"{name}, {count}" for name, count in counts.items() if name != best]
+    others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
+    notes.append(f"accelerations by {best}: {counts[best]} operations ({'; '.join(others)})")
+    chosen = result(ways[best], whole)
+    return replace(chosen, notes=(*chosen.notes, *notes))
+
+
+def operations(quantities: Constrained) -> int:
+    """Of one evaluation of the accelerations."""
+    return Tape.of(quantities.algebra.recorder, accelerations=quantities.accelerations()).operations
 
 
 def singular(quantities: Constrained) -> bool:
     """Whether M_tilde is singular at every state."""
     M = quantities.recall("M_tilde")
     return any(is_zero(M[k, k]) for k in range(len(M))) or first_dependent(quantities.algebra.recorder, M) is not None
+
+
+def _pivots(quantities: Constrained, found: Ranks | None) -> Pivots | None:
+    """Dependent speeds and their order, where the sample state allows it."""
+    if found is None:
+        return None
+    kept = list(found.independent)
+    C_r = quantities.C_r()[kept]
+    structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
+    if not _holds(found, kept):
+        return None
+    samples = found.samples[:, kept]
+    orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)]
+              if (order := elimination_order(A, structure)) is not None}
+    if not orders:
+        return None
+    whole = np.linalg.svd(samples, compute_uv=False)[:, -1]
+
+    def usual(order: tuple[tuple[int, int], ...]) -> float:
+        """How far the dependent speeds are from losing their rows, at most of the states."""
+        part = np.linalg.svd(samples[:, :, [column for _, column in order]], compute_uv=False)[:, -1]
+        return float(np.quantile(part / whole, 0.1))
+
+    best = max(sorted(orders), key=usual)
+    return tuple((kept[row], column) for row, column in best)
+
+
+def _holds(found: Ranks, kept: list[int]) -> bool:
+    """Whether there is mass in every direction that the constraints leave."""
+    free = np.linalg.svd(found.samples[0, kept])[2][len(kept):].T
+    if not free.shape[1]:
+        return True
+    values = np.linalg.eigvalsh(free.T @ found.mass @ free)
+    return bool(values[0] > MASSLESS * max(np.abs(found.mass).max(), 1e-300))

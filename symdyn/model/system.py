@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,6 +19,7 @@ from symdyn.model.record import Model, NamedOutput, State
 from symdyn.model.symbols import Coordinate, as_coordinate
 
 if TYPE_CHECKING:
+    from symdyn.diagnosis import Diagnosis
     from symdyn.formulation.augmented_equations import AugmentedEquations
     from symdyn.formulation.embedding import EmbeddedEquations
     from symdyn.formulation.motion_equations import MotionEquations
@@ -228,6 +230,23 @@ class System:
         from symdyn.formulation.augmented import augment
 
         return augment(self.check(), coordinates, orientation, frames)
+
+    def diagnose(self, q: Any = None, params: Any = None, t: float = 0.0, coordinates: str = "relative",
+                 reach: float = math.pi) -> Diagnosis:
+        """What the constraints do: freedoms, redundant and contradictory constraints, singular configurations, idle motions.
+
+        q             coordinates of the state to look at, in order, or by symbol or name; what is left out takes its initial
+                      value; the nearest consistent state is taken
+        params        numbers for parameters; others take their default, those without one a random number, which is told
+        t             time, s; coordinates: as for `augmented`
+        reach         how far from the state singular configurations are looked for, along up to six independent motions both
+                      ways: change of the fastest speed's coordinate, rad or parts of the mechanism's length
+        Returns a Diagnosis, which prints as text. Raises ModelError for a description with faults; contradictory constraints
+        are told in the diagnosis.
+        """
+        from symdyn.diagnosis import diagnose
+
+        return diagnose(self, q, params, t, coordinates, reach)
 
     def equations(self, tune: bool = False) -> MotionEquations:
         """The equations in the formulation that computes accelerations in the least predicted time.

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from symdyn.errors import EvaluationError
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -41,7 +38,7 @@ def as_velocities(module: Module, params: Any) -> np.ndarray:
 
 def position_residual(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
     """C C_scale / length, (..., n_c)."""
-    return _scaled(module, "position_correction", "C", t, x, params) / length(module, params)
+    return _violation(module, t, x, params)[0] / length(module, params)
 
 
 def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: float = 0.0) -> np.ndarray:
@@ -53,17 +50,16 @@ def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: flo
     still = np.array(x, dtype=float)
     u = np.array(still[..., n_q:n_q + n_u])
     still[..., n_q:n_q + n_u] = 0.0
-    moving = np.abs(_scaled(module, "velocity_correction", "C_dot", t, still, params)).max(initial=0.0)
+    moving = np.abs(_violation(module, t, still, params)[1]).max(initial=0.0)
     speed = max(np.abs(u * as_velocities(module, params)).max(initial=0.0), moving, at_least)
-    return _scaled(module, "velocity_correction", "C_dot", t, x, params) / max(speed, np.finfo(float).tiny)
+    return _violation(module, t, x, params)[1] / max(speed, np.finfo(float).tiny)
 
 
-def _scaled(module: Module, correction: str, plain: str, t: Any, x: Any, params: Any) -> np.ndarray:
-    """Residuals as lengths, or velocities: the first entries of a correction, which is at hand, where it can be computed."""
-    module.unit("rhs")  # corrections are there, too
-    with contextlib.suppress(EvaluationError):
-        return module.evaluate(correction, t, x, params)[..., :len(names(module))]
-    return module.evaluate(plain, t, x, params) * module.evaluate("C_scale", t, x, params)
+def _violation(module: Module, t: Any, x: Any, params: Any) -> tuple[np.ndarray, np.ndarray]:
+    """C C_scale, m, and C_dot C_scale, m/s, each (..., n_c)."""
+    module.unit("rhs")  # it is there, too
+    rows, n_c = module.evaluate("violation", t, x, params), len(names(module))
+    return rows[..., :n_c], rows[..., n_c:]
 
 
 def scaled_jacobian(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome, Request
-from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector
+from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
     evaluator = module.unit(field_name).evaluator("rhs")
     evaluator.set_params(request.field_p)
     projector = Projector(module, request.p) if request.stabilization.way == "projection" else None
+    watch = Watch(module, request.p) if request.stabilization.way == "baumgarte" else None
     n_state = request.n_state
     free: Inputs = request.inputs
     n_in = len(free.constant)
@@ -135,6 +136,9 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                     ts.append(pending.pop(0))
                 if bar is not None:
                     bar.update(abs(solver.t - before))
+                if watch is not None and watch(here, state):
+                    message = watch(here, state) + lost_rank(module, here, state[:n_state], request.p, request.x0[:n_state], t0)
+                    break
                 if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
                     message = f"stopped after {accepted} steps, as asked"
                     break

@@ -17,7 +17,7 @@ from symdyn.runtime.inputs import take_inputs
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
-from symdyn.runtime.stabilization import Stabilization, choose, chosen_gain
+from symdyn.runtime.stabilization import Projector, Stabilization, choose, chosen_gain
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -80,6 +80,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         check_ggl(module, start, p, span[0], stabilization, work)
     else:
         request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
+        if request.stabilization.way == "baumgarte":
+            request = replace(request, x0=Projector(module, p)(span[0], start))
     bar = _bar(module, span) if progress else None
     begun = clock.perf_counter()
     try:

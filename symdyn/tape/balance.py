@@ -47,7 +47,7 @@ class _Balancer:
                 if node in names:
                     self.recorder.name(names[node], value)
                 if node in checks:
-                    self.recorder.positive(value, checks[node])
+                    self.recorder.positive(unsigned(value) if node.op == "guard" else value, checks[node])
         return Tape(self.recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
                                     for name, o in self.old.outputs.items()})
 

@@ -80,6 +80,7 @@ def _functions(context: Any) -> dict[str, Callable]:
     special: dict[str, Callable] = {
         "pi": lambda: +context.pi,
         "select": lambda c, a, b: a if c else b,
+        "guard": lambda value, margin: value if margin > 0 else context.nan,
         "lt": lambda a, b: a < b, "le": lambda a, b: a <= b, "gt": lambda a, b: a > b, "ge": lambda a, b: a >= b,
         "eq": lambda a, b: a == b, "ne": lambda a, b: a != b,
         "and": lambda a, b: a and b, "or": lambda a, b: a or b, "not": lambda a: not a,

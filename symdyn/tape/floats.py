@@ -45,6 +45,8 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
 
 
 def _function(op: str) -> Callable[..., Any]:
+    if op == "guard":
+        return lambda value, margin: np.where(margin > 0, value, np.nan)
     if op == "pi":
         return lambda: np.pi
     if op == "erf":

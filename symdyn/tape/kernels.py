@@ -103,7 +103,7 @@ class Saddle(Kernel):
         C = s[..., :, None] * C * w[..., None, :]
         f, d, Ct = w * f, s * d, np.swapaxes(C, -1, -2)
         stiff = largest / _stacked([_objects(values[:1])], shape)[0] ** 2
-        inverse = np.linalg.inv(M + stiff[..., None] * (Ct @ C))
+        inverse = _inverse(M + stiff[..., None] * (Ct @ C))
         x, lam = np.zeros(f.shape), np.zeros(d.shape)
         for _ in range(ROUNDS):
             gap = d - (C @ x[..., None])[..., 0]
@@ -172,7 +172,7 @@ class Multipliers(Kernel):
         C, s, w, g = _stacked(self.split(values), shape)
         C = s[..., :, None] * C * w[..., None, :]
         g, Ct = w * g, np.swapaxes(C, -1, -2)
-        inverse = np.linalg.inv(C @ Ct + SMOOTHED**2 * np.eye(m))
+        inverse = _inverse(C @ Ct + SMOOTHED**2 * np.eye(m))
         lam = np.zeros(s.shape)
         for _ in range(ROUNDS):
             lam = lam + (inverse @ C @ (g - (Ct @ lam[..., None])[..., 0])[..., None])[..., 0]
@@ -212,3 +212,12 @@ def _stacked(arrays: Sequence[np.ndarray], shape: tuple[int, ...]) -> list[np.nd
         whole = np.stack(columns, axis=-1) if columns else np.zeros((*shape, 0))
         stacked.append(whole.reshape(*shape, *a.shape))
     return stacked
+
+
+def _inverse(A: np.ndarray) -> np.ndarray:
+    """Inverses of matrices (..., n, n); NaN for singular ones."""
+    try:
+        return np.linalg.inv(A)
+    except np.linalg.LinAlgError:
+        regular = (np.linalg.slogdet(A)[0] != 0)[..., None, None]
+        return np.where(regular, np.linalg.inv(np.where(regular, A, np.eye(A.shape[-1]))), np.nan)

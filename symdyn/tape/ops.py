@@ -78,6 +78,7 @@ OPERATIONS: dict[str, Operation] = {
     "not": Operation("compare", None, "logical_not", "not_", "Not"),
     "select": Operation("compare", lambda r, y, a: (0, r.apply("select", a[0], 1, 0), r.apply("select", a[0], 0, 1)),
                         "where", "select", "Piecewise"),
+    "guard": Operation("free", lambda r, y, a: (1, 0), "", "", ""),
     "call": Operation("kernel", None, "", "", ""),
     "item": Operation("free", None, "", "", ""),
     "pi": Operation("free", None, "pi", "pi", "pi"),

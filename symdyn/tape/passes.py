@@ -18,6 +18,8 @@ def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
     if op == "call":
         items = recorder.call(args[0], args[1:])
         return items[0].args[0] if isinstance(items[0], Node) else items
+    if op == "guard":
+        return recorder.guarded(*args)
     if op == "item":
         return recorder.item(*args)
     if op in _ARITHMETIC:
@@ -38,14 +40,15 @@ def substitute(entries: tuple, replacements: Mapping[Node, Any], recorder: Recor
                 try:
                     value = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
                 except ZeroDivisionError:
-                    reason = node.recorder.checks.get(unsigned(node.args[-1]), "an expression divides by zero")
+                    demanded = node if node.op == "call" else unsigned(node.args[-1])
+                    reason = node.recorder.checks.get(demanded, "an expression divides by zero")
                     raise EvaluationError(f"with the numbers that are bound: {reason}") from None
             new[node] = value
             if isinstance(value, Node):
                 if node in node.recorder.names:
                     recorder.name(node.recorder.names[node], value)
                 if node in node.recorder.checks:
-                    recorder.positive(value, node.recorder.checks[node])
+                    recorder.positive(unsigned(value) if node.op == "guard" else value, node.recorder.checks[node])
     return tuple(new[e] if isinstance(e, Node) else e for e in entries)
 
 

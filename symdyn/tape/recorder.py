@@ -84,6 +84,22 @@ class Recorder:
             self.checks.setdefault(node, reason)
         return node
 
+    def guard(self, value: Any, margin: Any, reason: str) -> Any:
+        """A value that may be used only where the margin is positive; where it is not, the code stops and tells the reason."""
+        node = self.guarded(value, margin)
+        core = node.args[0] if isinstance(node, Node) and node.op == "neg" else node
+        if isinstance(core, Node) and core.op == "guard":
+            self.checks.setdefault(core, reason)
+        return node
+
+    def guarded(self, value: Any, margin: Any) -> Any:
+        """A guard that is recorded anew; its reason is taken over with it."""
+        if not isinstance(margin, Node) or not isinstance(value, Node):
+            return value if isinstance(margin, Node) or margin > 0 else 0
+        if value.op == "neg":
+            return self.neg(self._record("guard", value.args[0], margin))
+        return self._record("guard", value, margin)
+
     def _make(self, op: str, args: tuple, mask: int) -> Node:
         key = (op, *args)
         node = self._known.get(key)
@@ -241,11 +257,21 @@ class Recorder:
     def call(self, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
         """The results of a numeric algorithm."""
         taken = [v if isinstance(v, Node) else exact(v) for v in values]
-        if not any(isinstance(v, Node) for v in taken):
-            return [exact(float(v)) for v in kernel.rows(taken)]
+        if not any(isinstance(v, Node) and v.mask for v in taken):
+            return self._called(kernel, taken)
         node = self._record("call", kernel, *taken)
         self.checks.setdefault(node, kernel.reason)
         return [self._record("item", node, k) for k in range(kernel.n_out)]
+
+    @staticmethod
+    def _called(kernel: Kernel, values: Sequence[Any]) -> list[Any]:
+        """The results for numbers and for nodes without inputs, such as sqrt(2)."""
+        from symdyn.tape.evaluate import constant
+
+        results = [float(v) for v in kernel.rows([constant(v) for v in values])]
+        if not all(map(math.isfinite, results)):
+            raise ZeroDivisionError(kernel.reason)
+        return [exact(v) for v in results]
 
     def item(self, results: Any, k: int) -> Any:
         """One result of a call that was recorded, or folded into a list of numbers."""

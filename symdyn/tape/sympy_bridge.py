@@ -17,7 +17,7 @@ from symdyn.tape.tape import Output, reachable
 
 _FUNCTIONS: dict[type, str] = {getattr(sp, row.sympy): op for op, row in OPERATIONS.items()
                                if op not in ("add", "sub", "mul", "div", "neg", "pow", "sqrt", "pi", "select",
-                                             "min", "max", "and", "or", "call", "item")}
+                                             "min", "max", "and", "or", "call", "item", "guard")}
 _FOLDED = {sp.Min: "min", sp.Max: "max", sp.And: "and", sp.Or: "or"}
 # Elementary functions in terms of others that generated code has.
 _REWRITTEN: dict[type, Callable[..., sp.Expr]] = {
@@ -142,8 +142,8 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
         elif node.op == "call":
             raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
                                         "the right side instead")
-        elif node.op == "select" and node in node.recorder.checks:
-            done[node] = done[node.args[1]]  # the code stops where it is the other branch
+        elif node.op == "guard":
+            done[node] = done[node.args[0]] if isinstance(node.args[0], Node) else number(node.args[0])
         else:
             done[node] = _expression(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
     entries = [done[e] if isinstance(e, Node) else number(e) for e in output.entries]

@@ -15,10 +15,11 @@ from tests import helpers
 from tests.formulation.general import chain
 from tests.formulation.test_identities import SEEDS, Draw
 
-CATALOGUE = [*[(name, {}) for name in sd.systems.names(constrained=False)], ("puma560", {"general": True}), ("puma560", {"motors": True}),
-             ("puma560", {"convention": "modified", "general": True}), ("prismatic_chain", {"n": 4})]
-# Loads are no part of Y pi: inputs and friction are switched off.
-SILENT = ("F", "tau", "B", "Tp", "Tn")
+CATALOGUE = [*[(name, {}) for name in sd.systems.names(constrained=False)], ("puma560", {"general": True}),
+             ("puma560", {"motors": True}), ("puma560", {"convention": "modified", "general": True}),
+             ("prismatic_chain", {"n": 4})]
+# Loads are no part of Y pi: inputs, friction, springs and dampers are switched off.
+SILENT = ("F", "tau", "B", "Tp", "Tn", "K", "C")
 
 
 def agree(eq: Equations, seed: int, **given: Any) -> None:

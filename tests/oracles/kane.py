@@ -192,6 +192,33 @@ def kane_spatial_chain(n: int) -> Accelerations:
     return s.accelerations(names)
 
 
+def kane_flyball_governor() -> Accelerations:
+    """Shaft about z, slider on it, two arms with balls, a spring and damper from the slider to the middle of each arm."""
+    s = Scene(4)
+    names = ["g", "m", "l", "I_a", "I_t", "m_b", "m_s", "I_s", "a", "h", "l0", "K", "C"]
+    g, m, l, I_a, I_t, m_b, m_s, I_s, a, h, l0, K, C = sp.symbols(names)
+    A = s.turned(s.N, "A", 0, s.N.z)
+    shaft = s.fixed_on(s.O, A, "G", l / 2 * A.z)
+    s.weigh(me.RigidBody("shaft", shaft, A, m, (_dyadic(A, I_t, I_t, I_a), shaft)), shaft, -m * g * s.N.z)
+    P = s.O.locatenew("P", s.q[1] * A.z)
+    P.set_vel(s.N, s.u[1] * A.z)
+    s.weigh(me.RigidBody("slider", P, A, m_s, (_dyadic(A, I_s, I_s, I_s), P)), P, -m_s * g * s.N.z)
+    for k, side in enumerate((1, -1)):
+        B = s.turned(A, f"B{k}", 2 + k, side * A.y)
+        hinge = s.fixed_on(s.O, A, f"H{k}", side * a * A.x + h * A.z)
+        middle = s.fixed_on(hinge, B, f"M{k}", side * l / 2 * B.x)
+        ball = s.fixed_on(hinge, B, f"E{k}", side * l * B.x)
+        foot = s.fixed_on(P, A, f"Q{k}", side * a * A.x)
+        s.weigh(me.RigidBody(f"arm{k}", middle, B, m, (_dyadic(B, I_a, I_t, I_t), middle)), middle, -m * g * s.N.z)
+        s.weigh(me.Particle(f"ball{k}", ball, m_b), ball, -m_b * g * s.N.z)
+        reach = middle.pos_from(hinge) + hinge.pos_from(s.O) - s.q[1] * A.z - side * a * A.x
+        length = sp.sqrt(reach.dot(reach))
+        rate = reach.dot(middle.vel(s.N) - foot.vel(s.N)) / length
+        pull = (K * (length - l0) + C * rate) / length * reach
+        s.loads += [(middle, -pull), (foot, pull)]
+    return s.accelerations(names)
+
+
 def kane_two_link_arm() -> Accelerations:
     """Two links in the vertical plane, torques tau1 from the ground and tau2 between the links."""
     s = Scene(2)

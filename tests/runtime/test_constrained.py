@@ -45,7 +45,7 @@ def test_hundred_seconds_on_the_manifold(name: str) -> None:
     for steps in (False, True):
         solution = module(name).simulate((0, 100), rtol=1e-8, steps=steps)
         assert solution.success and max(worst(solution)) < 1e-11
-    assert solution.corrections.position < 1e-5 and 0 < solution.corrections.n_steps <= solution.n_steps
+    assert solution.corrections.position < 1e-3 and 0 < solution.corrections.n_steps <= solution.n_steps
 
 
 def test_redundant_constraints() -> None:
@@ -199,6 +199,13 @@ def test_no_way_back(method: str) -> None:
     assert not solution.success and 0.99 < solution.t[-1] <= 1.01 and len(solution.t) > 495
     assert worst(solution)[0] < 1e-9 and np.isfinite(solution.lam[:495]).all()
     np.testing.assert_allclose(solution["y"][:495], solution.t[:495], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["LSODA", "RK45"])
+def test_baumgarte_tells_when_it_loses_them(method: str) -> None:
+    with pytest.warns(SimulationWarning, match="lift is violated by 0.01.* of the mechanism's length, which Baumgarte's method"):
+        solution = module("driven").simulate((0, 2), method=method, rtol=1e-6, stabilization="baumgarte")
+    assert not solution.success and 1.0 < solution.t[-1] < 1.1
 
 
 def test_steps_as_asked_and_on() -> None:

@@ -190,7 +190,7 @@ def test_an_early_stop_is_told_and_short_motions_are_drawn() -> None:
 def test_bodies_are_drawn_rigid_and_joined(name: str, options: dict[str, Any]) -> None:
     drawing = Drawing.of(motion(name, **options))
     assert drawing is not None
-    assert drawing.spatial == (name in ("spatial_chain", "three_link_arm", "puma560"))
+    assert drawing.spatial == (name in ("spatial_chain", "three_link_arm", "puma560", "flyball_governor"))
     points = [line[:, k] for line in drawing.lines for k in range(line.shape[1])]
     size = max(float(np.ptp(np.array(points), axis=(0, 1)).max()), 1e-3)
     for k, line in enumerate(drawing.lines):

@@ -16,7 +16,8 @@ _OWN: dict[str, Callable[..., Any]] = {
     "pow": math.pow, "abs": abs, "sign": lambda a: float((a > 0) - (a < 0)), "min": min, "max": max, "lt": operator.lt,
     "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
     "and": lambda a, b: a and b, "or": lambda a, b: a or b, "not": operator.not_,
-    "select": lambda condition, a, b: a if condition else b, "pi": lambda: math.pi}
+    "select": lambda condition, a, b: a if condition else b, "pi": lambda: math.pi,
+    "guard": lambda value, margin: value if margin > 0 else math.nan}
 _FUNCTIONS = {op: _OWN[op] if op in _OWN else getattr(math, row.mpmath) for op, row in OPERATIONS.items()
               if op in _OWN or row.mpmath}
 

@@ -1,0 +1,86 @@
+"""States that fulfil the constraints, found in doubles on the tape, many at once, without generating code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.tape.floats import evaluate_rows
+
+ITERATIONS = 60
+# Residuals as lengths, relative to the mechanism's, below this are zero.
+FULFILLED = 1e-12
+# Singular values below this part of the largest are left out of a step.
+CUT = 1e-10
+
+
+class ConstraintStates:
+    """The constraints of equations in numbers: parameters by symbol, all other symbols but the coordinates zero, at a time t."""
+
+    def __init__(self, equations: Equations, numbers: Mapping[Any, float], t: float = 0.0) -> None:
+        symbols = equations.symbols
+        self.tape = equations.tape("C", "C_r", "C_scale", "N", "length")
+        self.names = [q.name for q in symbols.coordinates]
+        self.values: dict[str, Any] = {p.name: float(numbers[p]) for p in symbols.parameters} | {"t": t}
+        self.values |= {s.name: 0.0 for s in (*symbols.speeds, *symbols.states, *symbols.inputs)}
+        self.holonomic = np.array(equations.holonomic, dtype=bool)
+        self.units = [[self.names.index(q.name) for q in group] for group in equations.unit_groups]
+        self.angular = np.array([symbols.units.get(u) in ("rad/s", "1/s") for u in symbols.speeds], dtype=bool)
+
+    def at(self, q: np.ndarray) -> dict[str, np.ndarray]:
+        """C (s, n_c), C_r (s, n_c, n_u), C_scale (s, n_c), N (s, n_q, n_u), length (s,) at coordinates (s, n_q)."""
+        return evaluate_rows(self.tape, {**self.values, **dict(zip(self.names, q.T, strict=True))}, len(q))
+
+    def nearest(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From coordinates (s, n_q) the consistent ones nearby by Gauss-Newton, and the largest residual left, relative, (s,).
+
+        Where there are none: those of least residual; inf where constraints are not defined.
+        """
+        best, least = q.copy(), np.full(len(q), np.inf)
+        now, running = q.copy(), np.arange(len(q))
+        for k in range(ITERATIONS + 1):
+            found = self.at(now[running])
+            residual = self.residual(found)
+            size = np.abs(residual).max(axis=1, initial=0.0)
+            defined = np.isfinite(size) & np.isfinite(found["C_r"]).all(axis=(1, 2))
+            better = defined & (size < least[running])
+            best[running[better]], least[running[better]] = now[running[better]], size[better]
+            on = defined & (size >= FULFILLED)
+            if k == ITERATIONS or not on.any():
+                break
+            running = running[on]
+            found = {name: array[on] for name, array in found.items()}
+            now[running] += self._step(found, residual[on])
+            self._normalise(now)
+        return best, least
+
+    def residual(self, found: Mapping[str, np.ndarray]) -> np.ndarray:
+        """C C_scale / length, (s, n_c)."""
+        return found["C"] * found["C_scale"] / found["length"][:, None]
+
+    def velocities(self, length: Any) -> np.ndarray:
+        """What makes velocities (m/s) of the speeds, (n_u,)."""
+        return np.where(self.angular, length, 1.0)
+
+    def moved(self, found: Mapping[str, np.ndarray], y: np.ndarray) -> np.ndarray:
+        """Changes of the coordinates (s, n_q) for directions y (s, n_u) of the speeds as parts of the length."""
+        length = found["length"][:, None]
+        v = y * length / np.where(self.angular[None, :], length, 1.0)
+        changes: np.ndarray = (found["N"] @ v[..., None])[..., 0]
+        return changes
+
+    def _step(self, found: Mapping[str, np.ndarray], residual: np.ndarray) -> np.ndarray:
+        length = found["length"][:, None, None]
+        A = found["C_r"] * found["C_scale"][..., None] / np.where(self.angular[None, None, :], length, 1.0)
+        A[:, ~self.holonomic] = 0.0
+        y = -(np.linalg.pinv(A, rcond=CUT) @ residual[..., None])[..., 0]
+        largest = np.abs(y).max(axis=1, initial=0.0)[:, None]
+        return self.moved(found, y / np.maximum(largest, 1.0))  # at most about a radian at once
+
+    def _normalise(self, q: np.ndarray) -> None:
+        for places in self.units:
+            size = np.linalg.norm(q[:, places], axis=1, keepdims=True)
+            q[:, places] /= np.where(size > 0, size, 1.0)

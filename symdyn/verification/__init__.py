@@ -1,0 +1,120 @@
+"""Proves equations of motion sound without a reference: identities that must hold at any state, at 30 digits.
+
+A check is a function of a Sample that returns its residual, or None where it does not apply; a new formulation joins by
+naming its quantities alike, a new check by one line in CHECKS, or in CONSTRAINED.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+
+from symdyn.formulation.equations import Equations
+from symdyn.verification import identities as holds
+from symdyn.verification import reactions
+from symdyn.verification.sample import Sample
+from symdyn.verification.states import samples as samples_of
+
+
+@dataclass(frozen=True)
+class Check:
+    """One identity: its largest residual over all states, relative to the size of its terms, and what is allowed."""
+
+    name: str
+    residual: float | None
+    tolerance: float
+    remark: str = ""
+
+    @property
+    def passed(self) -> bool | None:
+        """None where the check does not apply."""
+        return None if self.residual is None else bool(self.residual <= self.tolerance)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of one set of equations; prints as a table."""
+
+    name: str
+    states: int
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        return all(check.passed is not False for check in self.checks)
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: verified at {self.states} random states"]
+        for c in self.checks:
+            verdict = {True: "ok", False: "FAIL", None: "-"}[c.passed]
+            figure = "" if c.residual is None else f"{c.residual:9.1e}  (allowed {c.tolerance:.0e})"
+            lines.append(f"  {verdict:5}{c.name:62}{figure}{'  ' + c.remark if c.remark else ''}".rstrip())
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+CHECKS: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
+    ("M_tilde is symmetric", holds.symmetric, 1e-25),
+    ("M_tilde is positive definite", holds.positive_definite, 0.0),
+    ("M_tilde u_dot + k_tilde = F_tilde", holds.equations_hold, 1e-20),
+    ("inverse dynamics of the accelerations gives zero", holds.inverse_of_forward, 1e-20),
+    ("rate of energy equals power of the loads", holds.energy_balance, 1e-20),
+    ("kinetic energy is quadratic in u with M_tilde", holds.kinetic_energy_quadratic, 1e-20),
+    ("J u is the rate of the positions and rotations", holds.jacobian_of_positions, 1e-15),
+    ("Coriolis matrix times u is k_tilde", holds.coriolis_times_speeds, 1e-20),
+    ("rate of M_tilde less twice the Coriolis matrix is skew", holds.coriolis_is_skew_with_mass_rate, 1e-20),
+)
+# In the place of those of the same functions, and after them, where there are constraints.
+CONSTRAINED: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
+    ("M_tilde is positive definite along the motions that are left", holds.positive_definite, 0.0),
+    ("M_tilde u_dot + k_tilde + C_r^T lam = F_tilde", holds.equations_hold, 1e-15),
+    ("inverse dynamics of the accelerations gives -C_r^T lam", holds.inverse_of_forward, 1e-15),
+    ("rate of energy equals power of the loads", holds.energy_balance, 1e-15),
+    ("C_r u_dot = F_d", holds.constraints_hold, 1e-15),
+    ("C_dot = C_r u + C_t", holds.constraint_rates, 1e-20),
+    ("C_dot is the rate of C", holds.constraint_rates_are_derivatives, 1e-15),
+    ("C_ddot = 0 along the motion", holds.constraints_stay, 1e-13),
+    ("statements and numeric algorithm solve the whole system", holds.whole_system, 1e-12),
+    ("reactions, loads and weight move every body", reactions.move_every_body, 1e-10),
+    ("reactions do no work along what their joints allow", reactions.do_no_work, 1e-10),
+)
+
+
+def checks_of(equations: Equations) -> list[tuple[str, Callable[[Sample], float | None], float]]:
+    """The checks for equations, without those of backends."""
+    if not equations.constraints:
+        return list(CHECKS)
+    instead = {check: (name, check, tolerance) for name, check, tolerance in CONSTRAINED}
+    shared = [instead.pop(row[1], row) for row in CHECKS]
+    return [*shared, *instead.values()]
+
+
+def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None,
+           seed: int = 1) -> Verification:
+    """Check equations at random states: coordinates, speeds, states, inputs in [-1, 1], t in [0, 1].
+
+    params   numbers for parameters (by symbol or name); others take their default, else a number in [0.5, 1.5]; then
+             the mass matrix need not be positive definite and is not tested for it
+    With constraints the states are consistent ones near the initial state, to all digits, and speeds are projected.
+    Returns a Verification; its `passed` is False if a check failed. Raises SymdynError where no states are found.
+    """
+    from symdyn.runtime.compiler import find_compiler
+
+    samples = samples_of(equations, states, digits, params, seed)
+    checks = checks_of(equations)
+    checks.append(("NumPy module agrees with the tape, over the condition", holds.backend_agrees("numpy"), 1e-13))
+    if find_compiler() is not None:
+        checks.append(("C module agrees with the tape, over the condition", holds.backend_agrees("c"), 1e-13))
+    results = []
+    for name, check, tolerance in checks:
+        with mpmath.workdps(digits + 5):
+            residuals = [check(s) for s in samples]
+        known = [r for r in residuals if r is not None]
+        remark = "" if known else ("parameters without numbers" if check is holds.positive_definite else "does not apply")
+        results.append(Check(name, max(known) if known else None, tolerance, remark))
+    return Verification(f"{equations.name} ({equations.formulation})", states, tuple(results))
