@@ -10,6 +10,7 @@ import gc
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from symdyn.errors import SymdynError
@@ -94,11 +95,11 @@ def predicted_time(tape: Tape) -> float:
     return time_of(terms(tape, schedule(tape)))
 
 
-def choose(model: Model, tune: bool = False, formulation: str = "auto") -> MotionEquations:
+def choose(model: Model, tune: bool = False, formulation: str = "auto", coordinates: str = "relative") -> MotionEquations:
     """The equations of a checked model in the formulation that takes the least time for accelerations.
 
     tune          compile the candidates and time them, instead of predicting
-    formulation   "auto", or the one whose frames are to be chosen
+    formulation   "auto", or the one whose frames are to be chosen; coordinates: of the augmented formulation
     The result's `candidates` is the table. Raises ModelError as the formulations do; CompilerNotFound if there is no
     compiler to tune with.
     """
@@ -107,7 +108,7 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto") -> Motio
 
         require_compiler()
     with _collector_paused():
-        derived = _worth_comparing(model, formulation)
+        derived = _worth_comparing(model, formulation, coordinates)
     times: Sequence[float | None] = [None] * len(derived)
     if tune:
         from symdyn.bench.side_by_side import times_side_by_side
@@ -123,18 +124,25 @@ def constrained(model: Model) -> bool:
     return bool(model.loops or model.constraints)
 
 
-def formulated(system: System, formulation: str = "auto", tune: bool = False) -> MotionEquations:
+def formulated(system: System, formulation: str = "auto", tune: bool = False,
+               coordinates: str = "relative") -> MotionEquations:
     """The equations of a system in the formulation of that name; "auto" takes the fastest.
 
-    tune   compile the candidates and time them, instead of predicting; of a formulation that is named, its frames
-    Raises SymdynError for an unknown name.
+    tune          compile the candidates and time them, instead of predicting; of a formulation that is named, its frames
+    coordinates   of the augmented formulation, see System.augmented; absolute ones imply it
+    Raises SymdynError for an unknown name, and for absolute coordinates of another formulation.
     """
     if formulation not in FORMULATIONS:
         raise SymdynError(f"formulation {formulation!r} asked for; there are {', '.join(FORMULATIONS)}")
+    if coordinates != "relative":
+        if formulation not in ("auto", "augmented"):
+            raise SymdynError(f"coordinates {coordinates!r} asked for with the formulation {formulation!r}; they are for "
+                              "'augmented' alone")
+        formulation = "augmented"
     if tune or formulation == "auto":
-        return choose(system.check(), tune, formulation)
+        return choose(system.check(), tune, formulation, coordinates)
     ways: dict[str, Callable[[], MotionEquations]] = {
-        "embedding": system.embedding, "recursive": system.recursive, "augmented": system.augmented}
+        "embedding": system.embedding, "recursive": system.recursive, "augmented": partial(system.augmented, coordinates)}
     return ways[formulation]()
 
 
@@ -177,10 +185,10 @@ def derived_in_frames(derive: Callable[[Model, str], MotionEquations], model: Mo
     return [Derived.of(derive(model, "body")), parallel]
 
 
-def _worth_comparing(model: Model, formulation: str) -> list[Derived]:
+def _worth_comparing(model: Model, formulation: str, coordinates: str) -> list[Derived]:
     """The candidates; the mass matrix only where it can win, and nothing twice."""
     if formulation == "augmented" or (formulation == "auto" and constrained(model)):
-        return derived_in_frames(lambda m, frames: augment(m, frames=frames), model)
+        return derived_in_frames(lambda m, frames: augment(m, coordinates, frames=frames), model)
     if formulation == "embedding":
         return derived_in_frames(embed, model)
     recursions = derived_in_frames(recursive, model)

@@ -57,6 +57,7 @@ FUNCTIONS = {
     "F_d": ("F_d", "right side of C_r u_dot = F_d"),
     "lam": ("lam", "multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde"),
     "reactions": ("reactions", "force and moment of every joint on its child, at the joint's point on it, n-frame"),
+    "reactions_by_lam": ("reactions_by_lam", "derivatives of the reactions, row by row, by the multipliers"),
     "C_scale": ("C_scale", "factors that make every constraint a length"),
     "length": ("length", "the mechanism's length, m"),
     "N": ("N", "q_dot = N u + what is given"),
@@ -74,6 +75,8 @@ FUNCTIONS = {
 }
 # The extra state of a simulation that integrates the work of the loads.
 WORK = "(work)"
+# What consistent states are found with: compiled together.
+CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")
 # What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
 STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
 
@@ -135,7 +138,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
     def source_of(name: str) -> Source:
         if not name.startswith("rhs"):
-            return emit(equations, backend, (name,), templates, standalone=False, specialize=specialize)
+            group = CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
+            return emit(equations, backend, group, templates, standalone=False, specialize=specialize)
         needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in name,
                     baumgarte="baumgarte" in name)
@@ -160,7 +164,9 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
     metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
-                "reactions": list(equations.joints), "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "reactions": [name for name, _, _ in equations.joints], "bodies": list(equations.bodies),
+                "reaction_bodies": [[parent, child] for _, parent, child in equations.joints],
+                "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
     return Module(metadata, provide, backend, fallback, write, report)

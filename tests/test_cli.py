@@ -75,7 +75,8 @@ def test_help_and_list_come_without_sympy() -> None:
                              "from symdyn.cli import main; main(['--help'])"],
                             capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ROOT})
     assert helped.returncode == 0 and helped.stdout.splitlines()[-1] == "[]"
-    assert all(f" {c} " in helped.stdout for c in ("list", "derive", "generate", "simulate", "report", "bench", "demo"))
+    assert all(f" {c} " in helped.stdout for c in ("list", "derive", "generate", "simulate", "report", "diagnose", "bench",
+                                                      "demo"))
     listed = run("list", after=after)
     assert listed.returncode == 0 and listed.stdout.splitlines()[-1] == "[]"
 
@@ -391,7 +392,64 @@ def test_faults_of_a_users_file_are_told_as_its_own(name: str, here: Path, capsy
 # -- what is asked wrongly
 
 
+# -- closed loops and constraints
+
+
+def test_derive_prints_constraints(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["derive", "pendulum_absolute"]) == 0
+    said = capsys.readouterr().out
+    assert "M_tilde u_dot + k_tilde + C_r^T lam = F_tilde, C_r u_dot = F_d" in said and "constraints: rod" in said
+    assert all(f"\n{name} =" in said for name in ("M_tilde", "k_tilde", "F_tilde", "C_r", "F_d", "C"))
+    assert main(["derive", "pendulum", "--coordinates", "absolute", "--quantity", "C"]) == 0
+    assert "constraints: pivot_x, pivot_y" in capsys.readouterr().out
+    assert main(["derive", "pendulum", "--formulation", "augmented", "--latex", "--quantity", "C_dot", "M_tilde"]) == 0
+    assert r"\dot{C} = " in capsys.readouterr().out
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+def test_simulate_tells_how_constraints_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = {}
+    for way in ("projection", "baumgarte", "none"):
+        assert main(["simulate", "four_bar", "--t", "2", "--no-picture", "--stabilization", way, "--rtol", "1e-6"]) == 0
+        said = capsys.readouterr().out
+        kept[way] = float(re.search(r"constraints are kept to (\S+) of the mechanism's length", said).group(1))  # type: ignore[union-attr]
+        assert ("projections changed" in said) == (way == "projection")
+    assert kept["projection"] < 1e-13 < kept["none"]
+
+
+def test_coordinates_are_remembered_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy"]
+    assert main(arguments) == 0 and "q1 = " in capsys.readouterr().out
+    assert main([*arguments, "--coordinates", "absolute"]) == 0 and "x_bar1 = " in capsys.readouterr().out
+    assert main(arguments) == 0 and "q1 = " in capsys.readouterr().out
+    assert len(list((here / "cache").rglob("four_bar-*.json"))) == 2
+
+
+def test_diagnose(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diagnose", "n_four_bar", "--option", "n=2"]) == 0
+    said = capsys.readouterr().out
+    assert "degrees of freedom by count: 1" in said and "rank is lost" in said and "theta0 = 1.5708" in said
+    assert main(["diagnose", "four_bar", "--q", "q1=0.5", "--set", "l1=0.7", "--reach", "0.2", "--coordinates", "absolute"]) == 2
+    assert "there is no 'q1'" in capsys.readouterr().err
+    assert main(["diagnose", "four_bar", "--q", "q1=0.5", "--set", "l1=0.7", "--reach", "0.2"]) == 0
+    assert "from the one given" in capsys.readouterr().out
+    (here / "spring.py").write_text(SPRING, encoding="utf-8")
+    assert main(["diagnose", "spring.py"]) == 0
+    assert "no loops or constraints: 1 degree of freedom" in capsys.readouterr().out
+
+
+def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", "pendulum_absolute"]) == 0
+    said = capsys.readouterr().out
+    assert "augmented equations of motion" in said and "C_ddot = 0 along the motion" in said and "FAIL" not in said
+
+
 @pytest.mark.parametrize("arguments, said", [
+    (["derive", "four_bar", "--formulation", "recursive"], "the recursive form takes trees only"),
+    (["derive", "pendulum", "--formulation", "embedding", "--coordinates", "absolute"], "they are for 'augmented' alone"),
+    (["simulate", "four_bar", "--stabilization", "hope"], "invalid choice: 'hope'"),
+    (["simulate", "four_bar", "--method", "BDF", "--stabilization", "projection"], "builds on earlier steps"),
+    (["diagnose", "four_bar", "--reach", "-1"], "--reach takes a distance from 0 on"),
     (["derive", "pendulm"], "no system 'pendulm'; did you mean pendulum"),
     (["derive", "absent.py"], "there is no file absent.py"),
     (["derive", "pendulum", "--option", "n=5"], "pendulum has no option 'n'; it has none"),

@@ -105,3 +105,148 @@ def test_euler_parameters_and_given_motion():
     system.add_joint(sd.Spherical("joint", system.ground, body, p, sd.EulerParameters()))
     result = system.embedding().verify(states=2)
     assert result.passed, str(result)
+
+
+# -- with constraints
+
+
+def closed(kind: str) -> sd.System:
+    """A body on a ball joint and a free one, with a joint of some kind between them."""
+    system = sd.System(f"closed_{kind}", gravity=[0.3, -1, -9.81])
+    a, b = (system.add_body(name, mass=m, inertia=[1, 2, 2.5], com=[0.1, 0.2, 0.3]) for name, m in (("a", 2), ("b", 3)))
+    system.add_joint(sd.Spherical("ball", system.ground, a, sd.coordinates("e0:4"), sd.EulerParameters(),
+                                  parent_point=[0, 0.5, 0]))
+    system.add_joint(sd.Free("free", system.ground, b, sd.coordinates("x y z psi theta phi")))
+    at = {"parent_point": [0.4, 0.1, 0.2], "child_point": [0.4, -0.4, 0.2]}
+    joints = {"fixed": lambda: sd.Fixed("loop", a, b, **at),
+              "revolute": lambda: sd.Revolute("loop", a, b, axis=[0.6, 0, 0.8], **at),
+              "prismatic": lambda: sd.Prismatic("loop", a, b, axis=[0, 0.6, 0.8], **at),
+              "cylindrical": lambda: sd.Cylindrical("loop", a, b, axis=[0.6, 0.8, 0], **at),
+              "universal": lambda: sd.Universal("loop", a, b, axes=([1, 0, 0], [0, 0.6, 0.8]), **at),
+              "spherical": lambda: sd.Spherical("loop", a, b, **at), "planar": lambda: sd.Planar("loop", a, b, **at),
+              "helical": lambda: sd.Helical("loop", a, b, sd.coordinates("s"), axis=[0, 0, 1], pitch=0.2, **at),
+              "rod": lambda: sd.Rod("loop", a, b, 0.8, **at)}
+    system.close_loop(joints[kind]())
+    if kind == "rod":
+        system.initial = {"x": 0.8}
+    return system
+
+
+def proved(equations, states=1):
+    """name -> whether it holds, None where it does not apply, of all checks but those of generated code."""
+    import mpmath
+
+    from symdyn.verification import checks_of
+    from symdyn.verification.states import samples
+
+    found = samples(equations, states, 30, None, 1)
+    with mpmath.workdps(35):
+        residuals = {name: ([check(s) for s in found], tolerance) for name, check, tolerance in checks_of(equations)}
+    return {name: None if rs[0] is None else max(rs) <= tolerance for name, (rs, tolerance) in residuals.items()}
+
+
+def failed_of(equations, states=1):
+    return [name for name, holds in proved(equations, states).items() if holds is False]
+
+
+CLOSING = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "helical", "rod")
+
+
+@pytest.mark.parametrize("kind", CLOSING)
+def test_every_joint_that_closes_a_loop(kind):
+    found = proved(closed(kind).augmented())
+    assert False not in found.values(), found
+    assert {"C_ddot = 0 along the motion", "reactions, loads and weight move every body",
+            "reactions do no work along what their joints allow", "C_dot is the rate of C"} <= {n for n, ok in found.items() if ok}
+
+
+@pytest.mark.parametrize("name", ["four_bar", "bricard", "particle_on_moving_slope", "rolling_disc"])
+def test_constrained_mechanisms_pass(name):
+    result = sd.systems.get(name).augmented().verify(states=1)
+    assert result.passed and "C_r u_dot = F_d" in str(result), str(result)
+
+
+def test_absolute_coordinates_pass():
+    assert not failed_of(sd.systems.get("four_bar").augmented(coordinates="absolute"))
+    assert not failed_of(sd.systems.get("spatial_slider_crank").augmented(coordinates="absolute"))
+
+
+def test_constraints_by_hand_pass():
+    x, y = sd.coordinates("x y")
+    m, l, g = sd.parameters("m l g")
+    eq = sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 - l**2], name="bob", initial={x: 0.7, y: -0.7})
+    result = eq.verify(states=2)
+    assert result.passed, str(result)
+    assert not failed_of(eq, 3)
+
+
+def test_samples_fulfil_the_constraints_to_all_digits():
+    import mpmath
+
+    from symdyn.verification.states import samples
+
+    for name in ("bricard", "rolling_disc"):
+        for s in samples(sd.systems.get(name).augmented(), 2, 30, None, 1):
+            with mpmath.workdps(35):
+                assert max(abs(v) for q in ("C", "C_dot") for v in s[q]) < mpmath.mpf(10) ** -27
+
+
+def test_without_a_consistent_state_it_says_so():
+    x, y = sd.coordinates("x y")
+    with pytest.warns(sd.ModelWarning, match="no state was found"):
+        eq = sd.augmented([x, y], [1, 1], None, [x**2 + y**2 + 1], name="nowhere")
+    with pytest.raises(sd.SymdynError, match="0 of 40 searches near the initial state"):
+        eq.verify(states=1)
+
+
+SPOILT = {
+    "C": ["C_dot is the rate of C"],
+    "C_r": ["C_dot = C_r u + C_t", "C_r u_dot = F_d", "u_dot + k_tilde + C_r"],
+    "C_t": ["C_dot = C_r u + C_t"],
+    "C_dot": ["C_dot is the rate of C", "C_dot = C_r u + C_t"],
+    "F_d": ["C_r u_dot = F_d"],
+    "lam": ["u_dot + k_tilde + C_r", "inverse dynamics", "solve the whole system"],
+    "accelerations": ["C_ddot = 0", "rate of energy"],
+    "reactions": ["move every body"],
+}
+
+
+@pytest.fixture(scope="module")
+def linkage():
+    return sd.systems.get("four_bar").augmented()
+
+
+@pytest.mark.parametrize("quantity", SPOILT)
+def test_one_wrong_quantity_under_constraints_is_found(linkage, quantity):
+    wrong = linkage.quantity(quantity) * 1
+    wrong.ravel()[0] = wrong.ravel()[0] * (1 + 1e-7) + 1e-7
+    spoilt = dataclasses.replace(linkage, _recorded={**linkage._recorded, quantity: wrong}, _printed={})
+    failed = failed_of(spoilt, 2)
+    for part in SPOILT[quantity]:
+        assert any(part in name for name in failed), failed
+
+
+@pytest.mark.parametrize("kind, row, entry, failing", [
+    ("revolute", "_tilt", "rest", "C_ddot = 0 along the motion"), ("prismatic", "_across", "rest", "C_ddot = 0 along the motion"),
+    ("rod", "_distance", "rest", "C_ddot = 0 along the motion"), ("revolute", "_tilt", "n_p", "C_dot is the rate of C"),
+    ("prismatic", "_across", "n_p", "C_dot is the rate of C"), ("planar", "_across", "f", "C_dot is the rate of C"),
+    ("universal", "_tilt", "n_c", "C_dot is the rate of C"), ("rod", "_distance", "f", "C_dot is the rate of C")])
+def test_a_row_with_a_wrong_sign_is_found(monkeypatch, kind, row, entry, failing):
+    from symdyn.formulation import closures
+
+    right = getattr(closures, row)
+
+    def wrong(*arguments):
+        made = right(*arguments)
+        return dataclasses.replace(made, **{entry: -getattr(made, entry)})
+
+    monkeypatch.setattr(closures, row, wrong)
+    assert failing in failed_of(closed(kind).augmented())
+
+
+def test_a_wrong_reaction_of_one_joint_is_found(linkage):
+    for k in range(len(linkage.joints)):
+        wrong = linkage.quantity("reactions") * 1
+        wrong[k] = -wrong[k]
+        spoilt = dataclasses.replace(linkage, _recorded={**linkage._recorded, "reactions": wrong}, _printed={})
+        assert "reactions, loads and weight move every body" in failed_of(spoilt)

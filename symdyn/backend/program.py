@@ -15,7 +15,7 @@ from symdyn.backend.divide import divide
 from symdyn.backend.printer import Printer
 from symdyn.errors import SymdynError
 from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
-from symdyn.tape.tape import Tape, reachable, unsigned
+from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
 GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
 ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
@@ -114,16 +114,31 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                   [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]})
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
         [*reasons, *_checks(whole, whole.steps).values()]))}
-    used = set(_cores([a for n in whole.running for a in n.args] + [e for o in whole.outputs.values() for e in o.entries]))
-    constants = {node: k for k, node in enumerate(n for n in whole.hoisted if n in used)}
+    late = _late(whole, tapes, otherwise)
+    used = set(_cores([a for n in (*whole.running, *late) for a in n.args]
+                      + [e for o in whole.outputs.values() for e in o.entries]))
+    constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes)
+    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late)
     functions = tuple(
         _either(name, titles[name], write(tape, name=f"{name}_{REGULAR}", title=titles[name]),
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
         else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
-    prologue = _Writer(dialect, whole, places, {}, codes).prologue(constants)
+    prologue = _Writer(dialect, whole, places, {}, codes, late).prologue(constants)
     return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole))
+
+
+def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
+    """Steps that depend on parameters only, and yet wait until a function runs: they divide by what may vanish, and then there
+    is another way to compute the function."""
+    either = [set(_checks(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
+    always = [set(_checks(tape, tape.prologue)) for tape in
+              [*[tape for name, tape in tapes.items() if name not in otherwise], *otherwise.values()]]
+    late = set().union(*either).difference(*always)
+    for node in whole.prologue:
+        if not late.isdisjoint(_cores(node.args)):
+            late.add(node)
+    return late
 
 
 def _either(name: str, title: str, regular: Function, otherwise: Function) -> Function:
@@ -143,27 +158,29 @@ def _kernels(tape: Tape) -> dict[str, tuple[int, ...]]:
 
 
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
-              codes: Mapping[str, int], name: str, title: str) -> Function:
+              codes: Mapping[str, int], late: set[Node], name: str, title: str) -> Function:
     """One function, in parts if it is long and the dialect divides long ones."""
     output = next(iter(tape.outputs.values()))
-    body = [n for n in tape.running if n not in hoisted]
+    running = {*tape.running, *late}
+    body = [n for n in tape.steps if n in running and n not in hoisted and n.op != "leaf"]
+    operations = count_of(body)
     if dialect.parts is None or len(body) <= dialect.parts.whole:
-        writer = _Writer(dialect, tape, places, hoisted, codes)
+        writer = _Writer(dialect, tape, places, hoisted, codes, late)
         part = writer.part(body, output.entries, writer.results_of(output.entries))
-        return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, tape.count(),
+        return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, operations,
                         tape.longest_chain())
     parts: list[Part] = []
     earlier: dict[Node, tuple[str, int]] = {}
     stretches, slots, n_w = divide(body, output.entries, dialect.parts.longest)
     for k, (stretch, kept) in enumerate(stretches):
-        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes)
+        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late)
         if k == len(stretches) - 1:
             parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries)))
         else:
             parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots)))
         earlier |= {node: ("w", slots[node]) for node in kept}
     groups = {g for part in parts for g in part.arguments}
-    return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), tape.count(),
+    return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), operations,
                     tape.longest_chain(), tuple(parts), n_w)
 
 
@@ -171,11 +188,13 @@ class _Writer:
     """Writes one function or part of one: decides which nodes get a variable, and in which words.
 
     stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, place)
+    late     see _late
     """
 
     def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
-                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int]) -> None:
+                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node]) -> None:
         self.dialect = dialect
+        self.late = late
         self.tape = tape
         self.places = places
         self.stored = stored
@@ -194,7 +213,7 @@ class _Writer:
 
     def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]]) -> Part:
         """Statements for the steps of `body`, of which `entries` are used afterwards."""
-        self.checks = _checks(self.tape, self.tape.running)
+        self.checks = _checks(self.tape, [*self.tape.running, *(n for n in self.tape.prologue if n in self.late)])
         self._count(body, entries)
         # Only what the sines and cosines need is read before them; anything else would wait in registers, or be spilled.
         at_once = self._at_once(body)
@@ -222,7 +241,7 @@ class _Writer:
 
     def prologue(self, constants: Mapping[Node, int]) -> Function:
         """The function that computes the constants c from the parameters p."""
-        body = list(self.tape.prologue)
+        body = [n for n in self.tape.prologue if n not in self.late]
         self.checks = _checks(self.tape, body)
         self._count(body, tuple(constants))
         loads: list[str] = []
@@ -234,7 +253,7 @@ class _Writer:
         results = self.results_of(tuple(constants))()
         return Function("prologue", "constants: everything that depends on parameters only", (len(constants),),
                         tuple(g for g in ("p",) if g in self.groups), tuple(loads), tuple(sections), results,
-                        self.tape.count_prologue(), 0)
+                        count_of(body), 0)
 
     # -- leaves and constants
 

@@ -19,7 +19,7 @@ from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.program import Function, Part, Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.errors import SymdynError
-from symdyn.tape.kernels import MASSLESS, ROUNDS, SMOOTHED
+from symdyn.tape.kernels import CLEANINGS, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
@@ -211,7 +211,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels,
-        "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS,
+        "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call("rhs", "xd"), "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],

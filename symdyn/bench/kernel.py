@@ -24,7 +24,7 @@ SYMDYN_EXPORT void {name}_loop(long n, long fed, {name}_frame *frame, double *x)
 {{
     const double start = x[fed];
     for (long i = 0; i < n; i++) {{
-        {name}_rhs({call});
+        {name}_{function}({call});
         x[fed] = start + 1e-9 * frame->out[{last}];
     }}
     x[fed] = start;
@@ -34,7 +34,7 @@ SYMDYN_EXPORT void {name}_loop(long n, long fed, {name}_frame *frame, double *x)
 
 @dataclass(frozen=True)
 class Loop:
-    """A compiled right-hand side in a loop.
+    """A compiled function in a loop.
 
     evaluator   its buffers: x (n_x,) the state, out (n_x,) the result
     fed         index of the entry of x that carries the result of an evaluation on to the next, so that latency counts
@@ -50,18 +50,22 @@ class Loop:
                       ctypes.c_void_p(self.evaluator.x.ctypes.data))
 
 
-def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 0) -> Loop:
-    """The right-hand side at the state x (default: small numbers), parameters at their defaults, 0.5 and more without one."""
-    source = emit(equations, "c", ("rhs",), standalone=False, integrator=False)
+def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 0, name: str = "rhs") -> Loop:
+    """The right-hand side at the state x (default: small numbers), parameters at their defaults, 0.5 and more without one.
+
+    name   of another function whose result begins with x_dot
+    """
+    source = emit(equations, "c", (name,), standalone=False, integrator=False)
     metadata = source.metadata
     function = source.program.functions[0]
     sizes = metadata["sizes"]
     places = {"t": "frame->t[0]", "q": "x", "u": f"x + {sizes['q']}", "z": f"x + {sizes['q'] + sizes['u']}",
               "inputs": "frame->inputs", "p": "frame->p", "c": "frame->c"}
     call = ", ".join([*[places[g] for g in function.arguments], "frame->out"])
-    text = next(iter(source.files.values())) + _LOOP.format(name=metadata["name"], call=call, last=sizes["x"] - 1)
+    text = next(iter(source.files.values())) + _LOOP.format(
+        name=metadata["name"], function=name, call=call, last=sizes["x"] - 1)
     unit = CUnit(text, metadata, require_compiler())
-    evaluator = unit.evaluator("rhs")
+    evaluator = unit.evaluator(name)
     evaluator.set_params(np.array([0.5 + 0.01 * k if v is None else v for k, v in enumerate(metadata["defaults"])]))
     evaluator.x[:] = 0.1 + 0.01 * np.arange(sizes["x"]) if x is None else x
     return Loop(evaluator, unit.function("loop"), fed)

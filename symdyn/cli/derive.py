@@ -15,22 +15,28 @@ if TYPE_CHECKING:
 # Quantities with more operations than this, written out, are counted and not printed: nobody reads them.
 READABLE = 1000
 _LATEX = {"M_tilde": r"\tilde{M}", "k_tilde": r"\tilde{k}", "F_tilde": r"\tilde{F}", "Jdot": r"\dot{J}",
-          "Jd_qd": r"\dot{J} \dot{q}"}
+          "Jd_qd": r"\dot{J} \dot{q}", "C_dot": r"\dot{C}", "lam": r"\lambda"}
+USUAL = ("M_tilde", "k_tilde", "F_tilde")
+OF_CONSTRAINTS = ("C_r", "F_d", "C")
 
 
 def derive(arguments: argparse.Namespace) -> int:
     """Print the symbols, and every quantity that was asked for."""
     equations = find_equations(arguments)
-    for name in arguments.quantity:
+    tied = bool(equations.constraints)
+    quantities = arguments.quantity or [*USUAL, *OF_CONSTRAINTS * tied]
+    for name in quantities:
         equations.quantity(name)
     s = equations.symbols
     if not arguments.latex:
-        print(f"{equations.name}: M_tilde u_dot + k_tilde = F_tilde")
+        print(f"{equations.name}: M_tilde u_dot + k_tilde {'+ C_r^T lam = F_tilde, C_r u_dot = F_d' if tied else '= F_tilde'}")
         for what, symbols in (("coordinates q", s.coordinates), ("speeds u", s.speeds), ("inputs", s.inputs),
                               ("parameters", s.parameters)):
             if symbols:
                 print(f"  {what}: " + ", ".join(f"{x.name} [{s.units[x]}]" if s.units.get(x) else x.name for x in symbols))
-    for name in arguments.quantity:
+        if tied:
+            print(f"  constraints: {', '.join(equations.constraints)}")
+    for name in quantities:
         count, shape = _written_out(equations, name), equations.quantity(name).shape
         if count > READABLE and not arguments.force:
             size = " x ".join(map(str, shape)) or "a number"

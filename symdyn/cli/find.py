@@ -34,11 +34,14 @@ def find_system(name: str, options: Mapping[str, Any]) -> System:
 
 
 def find_equations(arguments: argparse.Namespace) -> MotionEquations:
-    """The equations of the system with its options, in the formulation that was asked for."""
+    """The equations of the system with its options, in the formulation that was asked for; where none is named, the embedding,
+    for closed loops and constraints the augmented one."""
     from symdyn.choice import formulated
 
-    return formulated(find_system(arguments.system, options_of(arguments)), arguments.formulation,
-                      getattr(arguments, "tune", False))
+    system = find_system(arguments.system, options_of(arguments))
+    tied = system.loops or system.constraints or arguments.coordinates != "relative"
+    formulation = arguments.formulation or ("augmented" if tied else "embedding")
+    return formulated(system, formulation, getattr(arguments, "tune", False), arguments.coordinates)
 
 
 def find_module(arguments: argparse.Namespace) -> Module:
@@ -52,4 +55,4 @@ def find_module(arguments: argparse.Namespace) -> Module:
     options = options_of(arguments)
     if options:
         check_options(arguments.system, getattr(systems, arguments.system), options)
-    return recall(arguments.system, options, arguments.backend, arguments.formulation)
+    return recall(arguments.system, options, arguments.backend, arguments.formulation, arguments.coordinates)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from symdyn.cli import bench
 from symdyn.cli.demo import demo
 from symdyn.cli.derive import READABLE, derive
+from symdyn.cli.diagnose import diagnose
 from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.report import report
@@ -34,13 +36,19 @@ def make_parser() -> argparse.ArgumentParser:
 
     command("list", list_systems, "list the systems of the catalogue", system=False)
 
-    def formulation(sub: argparse.ArgumentParser, default: str = "auto") -> argparse.ArgumentParser:
-        sub.add_argument("--formulation", choices=("auto", "embedding", "recursive"), default=default,
-                         help=f"auto takes the one with the fastest right-hand side (default: {default})")
+    def formulation(sub: argparse.ArgumentParser, default: str | None = "auto") -> argparse.ArgumentParser:
+        told = default or "embedding, of closed loops and constraints augmented"
+        sub.add_argument("--formulation", choices=("auto", "embedding", "recursive", "augmented"), default=default,
+                         help=f"auto takes the one with the fastest right-hand side (default: {told})")
+        return coordinates(sub)
+
+    def coordinates(sub: argparse.ArgumentParser) -> argparse.ArgumentParser:
+        sub.add_argument("--coordinates", choices=("relative", "absolute"), default="relative",
+                         help="of the augmented formulation: those of the joints, or of every body its own (default: relative)")
         return sub
 
-    _add_derive(formulation(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde"),
-                            "embedding"))
+    _add_derive(formulation(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde, with "
+                                    "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
     proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
@@ -48,6 +56,8 @@ def make_parser() -> argparse.ArgumentParser:
     formulation(proof)
     proof.add_argument("--tune", action="store_true", help="compile the candidates and time them, instead of predicting")
     proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
+    _add_diagnose(coordinates(command("diagnose", diagnose, "what the constraints do: freedoms, redundant and contradictory "
+                                      "ones, singular configurations, idle motions")))
     _add_bench(commands.add_parser("bench", help="measure symdyn", description="Measure symdyn on this machine."))
     _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
                         system=False))
@@ -55,8 +65,8 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _add_derive(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quantity", metavar="NAME", nargs="+", default=["M_tilde", "k_tilde", "F_tilde"],
-                        help="what to print (default: M_tilde k_tilde F_tilde)")
+    parser.add_argument("--quantity", metavar="NAME", nargs="+",
+                        help="what to print (default: M_tilde k_tilde F_tilde, with constraints also C_r F_d C)")
     parser.add_argument("--latex", action="store_true", help="print LaTeX")
     parser.add_argument("--no-simplify", action="store_true", help="print as derived")
     parser.add_argument("--force", action="store_true", help=f"print also what has more than {READABLE} operations")
@@ -80,10 +90,19 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
                        ("--u", "initial speeds, such as q1_dot=1"), ("--z", "initial extra states"),
                        ("--input", "constant inputs, such as F=1")):
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
+    parser.add_argument("--stabilization", choices=("projection", "baumgarte", "none"), help="what keeps constraints (default: "
+                        "projection; with BDF and LSODA baumgarte)")
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--gif", action="store_true", help="save an animation too")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(parser)
+
+
+def _add_diagnose(parser: argparse.ArgumentParser) -> None:
+    for flag, what in (("--q", "coordinates of the state to look at, such as q1=0.1"), ("--set", "parameters, such as l=2.0")):
+        parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
+    parser.add_argument("--reach", metavar="ANGLE", type=float, default=math.pi, help="how far from the state singular "
+                        "configurations are looked for: rad, or parts of the mechanism's length (default: pi)")
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:

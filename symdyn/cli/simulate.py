@@ -30,7 +30,7 @@ def simulate(arguments: argparse.Namespace) -> int:
     code = 0
     try:
         solution = module.simulate(t, **values, rtol=arguments.rtol, atol=arguments.atol, method=arguments.method,
-                                   progress=arguments.progress)
+                                   progress=arguments.progress, stabilization=arguments.stabilization)
     except SimulationInterrupted as stop:
         solution, code = stop.solution, INTERRUPTED  # type: ignore[assignment]
     if not solution.success:

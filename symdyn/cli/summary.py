@@ -24,11 +24,25 @@ def summarize(solution: Solution) -> None:
     print(f"  {solution.n_steps} steps, {solution.nfev} evaluations, {time}")
     if "energy" in module.functions and len(solution.t):
         print(f"  {_energy(solution)}")
+    if metadata.get("constraints") and len(solution.t):
+        print(f"  {_constraints(solution)}")
     if len(solution.t):
         names = metadata["x"]
         state = ", ".join(f"{n} = {v:.6g}" for n, v in list(zip(names, solution.x[-1]))[:SHOWN])
         more = f", and {len(names) - SHOWN} more in the files" if len(names) > SHOWN else ""
         print(f"  at the end: {state}{more}")
+
+
+def _constraints(solution: Solution) -> str:
+    """How well the constraints are kept, and what it took."""
+    import numpy as np
+
+    off = float(np.nanmax(np.abs(solution.constraint_violation), initial=0.0))
+    told = f"constraints are kept to {off:.2g} of the mechanism's length"
+    made = solution.corrections
+    if not made.n_steps:
+        return told
+    return f"{told}; projections changed {made.n_steps} steps, q by up to {made.position:.2g}, u by up to {made.speed:.2g}"
 
 
 def _energy(solution: Solution) -> str:

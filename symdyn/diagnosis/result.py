@@ -122,7 +122,8 @@ class Diagnosis:
 
     def _freedoms(self) -> list[str]:
         if not self.rows:
-            lines = [f"  no loops or constraints: {self.speeds} degrees of freedom, one for each speed"]
+            lines = [f"  no loops or constraints: {self.speeds} degrees of freedom, one for each speed" if self.speeds != 1 else
+                     "  no loops or constraints: 1 degree of freedom"]
         else:
             lines = [f"  degrees of freedom by count: {self.by_count}", *(f"    {line}" for line in self.gruebler)]
         if self.by_rank is not None and self.rows:

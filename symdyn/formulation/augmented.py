@@ -25,9 +25,11 @@ from symdyn.formulation.saddle_choice import choose
 from symdyn.formulation.tree import Tree
 from symdyn.formulation.tree_equations import tree_of, tree_result
 from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.model.joints import Joint
 from symdyn.model.record import Model
-from symdyn.spatial.vectors import inner
-from symdyn.tape.node import is_zero
+from symdyn.spatial.vectors import inner, vector
+from symdyn.tape.differentiate import jacobian
+from symdyn.tape.node import SEED, is_zero
 
 COORDINATES = ("relative", "absolute")
 
@@ -47,12 +49,26 @@ class ConstrainedTree(Constrained, TreeQuantities):
             self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
 
     @property
-    def reacting(self) -> tuple[str, ...]:
-        names = (*super().reacting, *[c.joint.name for c in self.gathered.closures])
-        return tuple(n for n in names if not n.endswith((f"_{OWN}", "_closure")))
+    def reacting(self) -> tuple[Joint, ...]:
+        joints = (*super().reacting, *[c.joint for c in self.gathered.closures])
+        return tuple(j for j in joints if not j.name.endswith((f"_{OWN}", "_closure")))
+
+    def quantities(self) -> dict[str, Any]:
+        return {**super().quantities(), "reactions_by_lam": self.reactions_by_lam}
+
+    def reactions_by_lam(self) -> np.ndarray:
+        """Derivatives of the reactions, row by row, by the multipliers at given accelerations, (6 n_joints, n_c)."""
+        recorder = self.algebra.recorder
+        lam = vector(*[recorder.leaf(f"lam{k + 1}", SEED) for k in range(len(self.rows))])
+        found = self.reactions_of(lam)
+        entries = [e for joint in self.reacting for e in found[joint.name]]
+        return jacobian(recorder, entries, list(lam), "forward")
 
     def all_reactions(self) -> dict[str, np.ndarray]:
-        lam = self.lam()
+        return self.reactions_of(self.lam())
+
+    def reactions_of(self, lam: np.ndarray) -> dict[str, np.ndarray]:
+        """Joint name -> reaction with these multipliers."""
         closed = {place for c in self.gathered.closures for place in c.places}
         other = [k for k in range(len(self.rows)) if k not in closed]
         along = -self.C_r()[other].T @ lam[other] if other else None

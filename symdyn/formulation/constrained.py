@@ -20,7 +20,6 @@ from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.kernels import DAMPED, SMOOTHED
-from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
 
 BAUMGARTE = "(baumgarte)"
@@ -223,8 +222,3 @@ def residual_names(coordinates: Any, speeds: Any, states: Any, n_c: int) -> list
     """Names of what the residual takes in the group ud: q_dot, u_dot, z_dot, lam, mu."""
     return [*[f"d_{q.name}" for q in coordinates], *[f"d_{u.name}" for u in speeds], *[f"d_{z.name}" for z in states],
             *[f"lambda_{k + 1}" for k in range(n_c)], *[f"mu_{k + 1}" for k in range(n_c)]]
-
-
-def trivially(values: Any) -> bool:
-    """Whether all of them are zero by structure."""
-    return all(is_zero(v) for v in values)

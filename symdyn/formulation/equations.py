@@ -44,7 +44,8 @@ class Equations:
     again        derives the same equations on a new tape, so that files do not depend on what was recorded before
     frames       axes that quantities are formed in: "body", or "parallel" where links keep those of the link before
     candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
-    constraints  names of the constraint rows; holonomic: whether each holds positions; joints: those in `reactions`
+    constraints  names of the constraint rows; holonomic: whether each holds positions; bodies: names
+    joints       of those in `reactions`: name, parent, child
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     identification   what records regressors and base parameters; None without bodies
     """
@@ -64,7 +65,8 @@ class Equations:
     candidates: tuple[Any, ...] = ()
     constraints: tuple[str, ...] = ()
     holonomic: tuple[bool, ...] = ()
-    joints: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
+    joints: tuple[tuple[str, str, str], ...] = ()
     otherwise: Equations | None = None
     identification: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -6,7 +6,6 @@ Source: lecture, chapters 3.3 and 3.4.
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from symdyn.errors import ModelError, ModelWarning
+from symdyn.errors import ModelError
 from symdyn.formulation.augmented_equations import AugmentedEquations
 from symdyn.formulation.constrained import Constrained
 from symdyn.formulation.constraints import Row, expression_row
@@ -75,7 +74,7 @@ def augmented(coordinates: Sequence[Any], mass: Any, force: Any, constraints: An
         raise ModelError(faults, name)
     description = _Description(name, Symbols(tuple(q), tuple(speeds), (), tuple(inputs), tuple(parameters), numbers, start),
                                sp.ImmutableMatrix(M), tuple(F), tuple(expressions))
-    return _told(_derive(description))
+    return _derive(description)
 
 
 def _labels(given: ByHand, names: Any, n: int) -> list[str]:
@@ -201,16 +200,3 @@ def _search(equations: Equations) -> Ranks | None:
         if found is not None:
             return found
     return None
-
-
-def _told(equations: AugmentedEquations) -> AugmentedEquations:
-    """With what there is to say about the states that the constraints allow."""
-    found = _search(equations) if equations.constraints else None
-    symbols = equations.symbols
-    if equations.constraints and found is None and all(p in symbols.defaults for p in symbols.parameters):
-        warnings.warn(f"{equations.name}: no state was found that fulfils the constraints {', '.join(equations.constraints)}; "
-                      "check the numbers in defaults, or give a state near one in initial", ModelWarning, stacklevel=3)
-    if found is not None and found.rank == len(symbols.speeds):
-        note = "motion: the constraints determine every speed, so that the forces do not change the motion"
-        return replace(equations, notes=(*equations.notes, note))
-    return equations

@@ -3,12 +3,14 @@ numeric algorithm where these lose their digits, or where no statements would do
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
+from symdyn.errors import ModelWarning
 from symdyn.formulation.augmented_equations import AugmentedEquations
 from symdyn.formulation.constrained import Constrained
 from symdyn.formulation.dependent_rows import Ranks
@@ -42,6 +44,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     if not rows:
         return result(derivation(False, None, None), None)
     found = search(whole)
+    remarks = _remarks(whole, quantities, found)
     independent = found.independent if found is not None and found.rank < len(rows) else None
     ways: dict[str, Q] = {}
     if not singular(quantities):
@@ -50,7 +53,7 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     if pivots is not None:
         dependent = ", ".join(str(quantities.speeds[column]) for _, column in pivots)
         ways[f"elimination of the dependent speeds {dependent}"] = derivation(False, independent, pivots)
-    notes = []
+    notes = list(remarks)
     if independent is not None and found is not None:
         left = [r.name for k, r in enumerate(rows) if k not in independent]
         notes.append(f"constraints {', '.join(left)}: they depend on the others at every state tried; accelerations come without "
@@ -65,6 +68,23 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
     notes.append(f"accelerations by {best}: {counts[best]} operations ({'; '.join(others)})")
     chosen = result(ways[best], whole)
     return replace(chosen, notes=(*chosen.notes, *notes))
+
+
+def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None) -> list[str]:
+    """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
+    symbols = equations.symbols
+    if found is None:
+        if all(p in symbols.defaults for p in symbols.parameters):
+            warnings.warn(f"{equations.name}: no state was found that fulfils the constraints "
+                          f"{', '.join(equations.constraints)}; check the numbers in defaults, or give a state near one in "
+                          "initial", ModelWarning, stacklevel=6)
+        return []
+    if found.rank < len(symbols.speeds):
+        return []
+    if all(is_zero(e) for e in quantities.C_t()):
+        warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {found.rank}, as many as there are "
+                      "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=6)
+    return ["motion: the constraints determine every speed, so that the forces do not change the motion"]
 
 
 def operations(quantities: Constrained) -> int:

@@ -54,7 +54,9 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
     return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, quantities.quantities(),
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body", identification=quantities.identification,
-                  joints=quantities.reacting, **more)
+                  bodies=tuple(b.name for b in model.bodies),
+                  joints=tuple((j.name, *[getattr(b, "name", b) for b in (j.parent, j.child)]) for j in quantities.reacting),
+                  **more)
 
 
 def _notes(model: Model, tree: Tree) -> list[str]:

@@ -17,6 +17,7 @@ from symdyn.formulation.newton_euler import inverse_dynamics, inward, outward
 from symdyn.formulation.reactions import reactions
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.model.bodies import Point
+from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, joint_speeds
 from symdyn.spatial.vectors import congruence, cross, inner, vector, zeros
@@ -39,9 +40,9 @@ class TreeQuantities(Motion):
         self.notes: list[str] = []
 
     @property
-    def reacting(self) -> tuple[str, ...]:
-        """Names of the joints in the rows of `reactions`."""
-        return tuple(j.name for j in self.model.joints)
+    def reacting(self) -> tuple[Joint, ...]:
+        """The joints in the rows of `reactions`."""
+        return self.model.joints
 
     def demand_inertia(self) -> None:
         """Raise ModelError for speeds that move nothing at any state."""
@@ -117,7 +118,7 @@ class TreeQuantities(Motion):
     def reactions(self) -> np.ndarray:
         """Force and moment of each joint on its child, at its point on the child, n-frame, (n_joints, 6)."""
         found = self.all_reactions()
-        return np.array([found[name] for name in self.reacting], dtype=object).reshape(-1, 6)
+        return np.array([found[name] for name in (j.name for j in self.reacting)], dtype=object).reshape(-1, 6)
 
     def all_reactions(self) -> dict[str, np.ndarray]:
         """Joint name -> reaction."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.bodies import Point
-from symdyn.model.closures import Gear
+from symdyn.model.closures import Gear, Rod
 from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.record import joint_speeds
@@ -80,8 +80,10 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         note([body.mass], "kg")
         note(body.com, "m")
         note(body.inertia, "kg m^2")
-    for joint in joints:
+    for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:
         note([*joint.parent_point, *joint.child_point], "m")
+        if isinstance(joint, Rod):
+            note([joint.length], "m")
         if isinstance(joint, Helical):
             note([joint.pitch], "m/rad")
     for load in loads:

@@ -90,6 +90,16 @@ def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
     return squares > 1 - 1e-6
 
 
+def undetermined(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
+    """Combinations of multipliers that make no force along the speeds, as columns, (..., n_c, n_c); zero columns for the rest."""
+    U, values, _ = np.linalg.svd(scaled_jacobian(module, t, x, params))
+    kept = np.zeros(U.shape[:-1], dtype=bool)
+    kept[..., :values.shape[-1]] = values > RANK_TOLERANCE * values[..., :1]
+    scale = module.evaluate("C_scale", t, x, params)
+    free: np.ndarray = scale[..., :, None] * U * ~kept[..., None, :]
+    return free
+
+
 def listed(module: Module, residual: np.ndarray, at_least: float) -> str:
     """The constraints whose residual is larger, the largest first."""
     order = [k for k in np.argsort(-np.abs(residual), kind="stable") if abs(residual[k]) > at_least]

@@ -236,9 +236,10 @@ class Module:
         if name not in self._units:
             with self._lock:  # the derivation behind it is for one thread at a time
                 if name not in self._units:
-                    beside = self._units.get("rhs")  # what an integration needs besides is in the same unit
-                    shared = beside is not None and name in beside.metadata["shapes"]
-                    self._units[name] = beside if beside is not None and shared else self._provider(name)
+                    unit = self._units[name] = self._provider(name)
+                    if name in unit.metadata["shapes"]:  # not in variations of rhs, where "rhs" means something else
+                        for other in unit.metadata["shapes"]:
+                            self._units.setdefault(other, unit)
         return self._units[name]
 
     def _evaluator(self, name: str, params: Any) -> Evaluator:

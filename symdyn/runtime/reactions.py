@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.constraints import names, undetermined
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -45,3 +46,17 @@ def reaction(solution: Solution, joint: Any, frame: str = "ground") -> np.ndarra
     R = solution.frames[:, bodies.index(frame), 3:].reshape(-1, 3, 3)
     turned: np.ndarray = np.einsum("tji,tkj->tki", R, values.reshape(-1, 2, 3)).reshape(-1, 6)
     return turned
+
+
+def unique_reactions(solution: Solution) -> dict[str, np.ndarray]:
+    """Joint name -> whether the motion determines its reaction, (n_t,) of bool: not where redundant constraints share it."""
+    module = solution.module
+    joints = list(module.metadata.get("reactions", ()))
+    if not joints or not names(module):
+        return {joint: np.ones(len(solution.t), dtype=bool) for joint in joints}
+    by_lam = solution.rows("reactions_by_lam").reshape(len(solution.t), len(joints), 6, -1)
+    free = undetermined(module, solution.t, solution.x, solution.params)
+    changes = np.abs(by_lam @ free[:, None]).max(axis=(2, 3))
+    sizes = np.abs(by_lam).max(axis=(2, 3)) * np.abs(free).max(axis=(1, 2))[:, None]
+    determined = changes <= 1e-6 * sizes
+    return {joint: determined[:, k] for k, joint in enumerate(joints)}

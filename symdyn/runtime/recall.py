@@ -23,16 +23,17 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 
 
-def recall(name: str, options: Mapping[str, Any], backend: str | None = None, formulation: str = "auto") -> Module:
+def recall(name: str, options: Mapping[str, Any], backend: str | None = None, formulation: str = "auto",
+           coordinates: str = "relative") -> Module:
     """The module of a system of the catalogue, from what is remembered of it as far as that goes.
 
     backend       "c", "numpy", or None: C if a compiler is found, else NumPy, and `module.fallback` says why
-    formulation   "auto", "embedding" or "recursive"
+    formulation   "auto", "embedding", "recursive" or "augmented"; coordinates: of the last, "relative" or "absolute"
     Raises what deriving and compiling the system raises.
     """
     compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
     chosen = backend or ("c" if compiler else "numpy")
-    memory = _Memory(name, options, chosen, compiler, formulation)
+    memory = _Memory(name, options, chosen, compiler, formulation, coordinates)
     fallback = no_compiler_reason() if backend is None and compiler is None else ""
     return Module(memory.metadata, memory.unit, chosen, fallback, lambda folder: memory.derived.write(folder),
                   lambda: memory.derived.report())
@@ -42,10 +43,11 @@ class _Memory:
     """The record of one system in one formulation with one backend."""
 
     def __init__(self, name: str, options: Mapping[str, Any], backend: str, compiler: Compiler | None,
-                 formulation: str) -> None:
+                 formulation: str, coordinates: str) -> None:
         self.name, self.options, self.backend, self.compiler = name, dict(options), backend, compiler
-        self.formulation = formulation
-        own = hashlib.sha256(repr((name, sorted(self.options.items()), backend, formulation)).encode()).hexdigest()[:16]
+        self.formulation, self.coordinates = formulation, coordinates
+        about = name, sorted(self.options.items()), backend, formulation, coordinates
+        own = hashlib.sha256(repr(about).encode()).hexdigest()[:16]
         self.path = cache.cache_dir() / f"{name}-{own}.json"
         self.state = _state_of_symdyn()
         self.record = self._read() or {"state": self.state, "metadata": dict(self.derived.metadata), "units": {}}
@@ -58,7 +60,8 @@ class _Memory:
         from symdyn.choice import formulated
         from symdyn.pipeline import compile_equations
 
-        return compile_equations(formulated(systems.get(self.name, **self.options), self.formulation), self.backend)
+        return compile_equations(formulated(systems.get(self.name, **self.options), self.formulation,
+                                            coordinates=self.coordinates), self.backend)
 
     def unit(self, function: str) -> Unit:
         """A unit from the record, else a derived one, which is put into it."""

@@ -17,7 +17,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome
-from symdyn.runtime.reactions import reaction, reactions
+from symdyn.runtime.reactions import reaction, reactions, unique_reactions
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -151,6 +151,12 @@ class Solution:
     def rank(self) -> np.ndarray:
         """Number of independent constraints, (n_t,); see Module.rank."""
         return rank(self.module, self.t, self.x, self.params) if self._n_c else np.zeros(len(self.t), dtype=int)
+
+    @cached_property
+    def unique_reactions(self) -> dict[str, np.ndarray]:
+        """Joint name -> whether the motion determines its reaction, (n_t,) of bool; where redundant constraints share it, it is
+        that of the multipliers of least norm."""
+        return unique_reactions(self)
 
     @cached_property
     def unique(self) -> np.ndarray:

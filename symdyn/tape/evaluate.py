@@ -26,7 +26,7 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
         raise KeyError(f"no value for {', '.join(missing)}")
     context = mpmath.mp.clone()
     context.dps = digits
-    functions = _functions(context)
+    functions = functions_of(context)
     done: dict[Node, Any] = {}
 
     def number(value: Any) -> Any:
@@ -65,7 +65,7 @@ def constant(value: Any) -> float:
         return float(value)
     context = mpmath.mp.clone()
     context.dps = 40
-    functions = _functions(context)
+    functions = functions_of(context)
     done: dict[Node, Any] = {}
     for node in reachable([value]):
         done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else context.mpf(Fraction(a).numerator)
@@ -76,7 +76,8 @@ def constant(value: Any) -> float:
     return float(done[value])
 
 
-def _functions(context: Any) -> dict[str, Callable]:
+def functions_of(context: Any) -> dict[str, Callable]:
+    """Operation -> what computes it with numbers of an mpmath context."""
     special: dict[str, Callable] = {
         "pi": lambda: +context.pi,
         "select": lambda c, a, b: a if c else b,

@@ -14,8 +14,9 @@ import numpy as np
 # Singular values of the scaled constraints below this count less and less, in accelerations and in multipliers ...
 SMOOTHED = 1e-5
 # ... and in corrections, which would else be as large as a tiny error divided by a tiny singular value.
-DAMPED = 1e-2
+DAMPED = 1e-3
 ROUNDS = 5
+CLEANINGS = 2
 # A mass below this part of the largest is none.
 MASSLESS = 1e-12
 
@@ -103,12 +104,12 @@ class Saddle(Kernel):
         C = s[..., :, None] * C * w[..., None, :]
         f, d, Ct = w * f, s * d, np.swapaxes(C, -1, -2)
         stiff = largest / _stacked([_objects(values[:1])], shape)[0] ** 2
-        inverse = _inverse(M + stiff[..., None] * (Ct @ C))
+        A = M + stiff[..., None] * (Ct @ C)
         x, lam = np.zeros(f.shape), np.zeros(d.shape)
         for _ in range(ROUNDS):
             gap = d - (C @ x[..., None])[..., 0]
             r = f - (M @ x[..., None])[..., 0] + (Ct @ (stiff * gap - lam)[..., None])[..., 0]
-            x = x + (inverse @ r[..., None])[..., 0]
+            x = x + _solve(A, r[..., None])[..., 0]
             lam = lam + stiff * ((C @ x[..., None])[..., 0] - d)
         return w * x
 
@@ -145,7 +146,8 @@ class Multipliers(Kernel):
     """lam of C^T lam = g of least norm after scaling, for sizes (n, m): the rows of C perhaps dependent.
 
     Values: C row by row, scales of its rows (m) and columns (n), g. Iterated regularized normal equations,
-    lam += (C C^T + e^2)^-1 C (g - C^T lam) with e = SMOOTHED, which stay in the range of C.
+    lam += (C C^T + e^2)^-1 C (g - C^T lam) with e = SMOOTHED, which stay in the range of C but for rounding, divided by e^2;
+    that is what applying e^2 (C C^T + e^2)^-1 to lam again and again leaves, and it is taken off.
     """
 
     name = "symdyn_multipliers"
@@ -157,7 +159,7 @@ class Multipliers(Kernel):
     @property
     def operations(self) -> int:
         n, m = self.sizes
-        return m * (m + 1) * n + m**3 // 3 + ROUNDS * (2 * m * m + 4 * m * n) + 2 * n
+        return m * (m + 1) * n + m**3 // 3 + ROUNDS * ((2 + 2 * CLEANINGS) * m * m + 4 * m * n) + 2 * n
 
     def split(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """C (m, n), scales of rows and columns, g as arrays of objects."""
@@ -172,22 +174,32 @@ class Multipliers(Kernel):
         C, s, w, g = _stacked(self.split(values), shape)
         C = s[..., :, None] * C * w[..., None, :]
         g, Ct = w * g, np.swapaxes(C, -1, -2)
-        inverse = _inverse(C @ Ct + SMOOTHED**2 * np.eye(m))
-        lam = np.zeros(s.shape)
+        B = C @ Ct + SMOOTHED**2 * np.eye(m)
+        lam = np.zeros((*s.shape, 1))
         for _ in range(ROUNDS):
-            lam = lam + (inverse @ C @ (g - (Ct @ lam[..., None])[..., 0])[..., None])[..., 0]
-        return s * lam
+            lam = lam + np.linalg.solve(B, C @ (g[..., None] - Ct @ lam))
+        for _ in range(CLEANINGS):
+            rest = lam
+            for _ in range(ROUNDS):
+                rest = SMOOTHED**2 * np.linalg.solve(B, rest)
+            lam = lam - rest
+        return s * lam[..., 0]
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
         m = self.sizes[1]
         C, s, w, g = self.split(values)
         C, g = s[:, None] * C * w[None, :], w * g
-        B = C @ C.T + np.array(context.eye(m).tolist(), dtype=object) * context.mpf(10) ** (-(context.dps // 2))
+        smoothed = context.mpf(10) ** (-(context.dps // 2))
+        B = C @ C.T + np.array(context.eye(m).tolist(), dtype=object) * smoothed
         lam = s * 0
         for _ in range(ROUNDS):
             step = context.lu_solve(context.matrix(B.tolist()), context.matrix(list(C @ (g - C.T @ lam))))
             lam = lam + np.array(list(step), dtype=object)
-        return list(s * lam)
+        rest = lam
+        for _ in range(ROUNDS):
+            step = context.lu_solve(context.matrix(B.tolist()), context.matrix(list(smoothed * rest)))
+            rest = np.array(list(step), dtype=object)
+        return list(s * (lam - rest))
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         C, s, w, _ = self.split(values)
@@ -214,10 +226,10 @@ def _stacked(arrays: Sequence[np.ndarray], shape: tuple[int, ...]) -> list[np.nd
     return stacked
 
 
-def _inverse(A: np.ndarray) -> np.ndarray:
-    """Inverses of matrices (..., n, n); NaN for singular ones."""
+def _solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A^-1 b for matrices (..., n, n), (..., n, 1); NaN for singular ones."""
     try:
-        return np.linalg.inv(A)
+        return np.linalg.solve(A, b)
     except np.linalg.LinAlgError:
         regular = (np.linalg.slogdet(A)[0] != 0)[..., None, None]
-        return np.where(regular, np.linalg.inv(np.where(regular, A, np.eye(A.shape[-1]))), np.nan)
+        return np.where(regular, np.linalg.solve(np.where(regular, A, np.eye(A.shape[-1])), b), np.nan)

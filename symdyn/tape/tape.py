@@ -101,11 +101,11 @@ class Tape:
 
     def count(self) -> dict[str, int]:
         """Operations of one evaluation after hoisting, by kind; one each for + - * / sqrt sin cos."""
-        return _count(self.running)
+        return count_of(self.running)
 
     def count_prologue(self) -> dict[str, int]:
         """Operations of the prologue, which runs once per set of parameters."""
-        return _count(self.prologue)
+        return count_of(self.prologue)
 
     @property
     def operations(self) -> int:
@@ -140,7 +140,8 @@ def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
     return tuple(sorted(seen, key=lambda n: n.index))
 
 
-def _count(nodes: Iterable[Node]) -> dict[str, int]:
+def count_of(nodes: Iterable[Node]) -> dict[str, int]:
+    """Operations of these steps, by kind."""
     counter: Counter[str] = Counter()
     for node in nodes:
         counter[OPERATIONS[node.op].kind] += node.args[0].operations if node.op == "call" else 1

@@ -44,20 +44,21 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
         for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
             values.update({s.name: stream.uniform(-1, 1) for s in group})
         values.update({f"{u.name}_dot": 0.0 for u in symbols.speeds})
-        independent: tuple[int, ...] | None = ()
+        independent: tuple[int, ...] = ()
         if manifold is None:
             _on_unit_sphere(equations, values)
         else:
-            independent = manifold.reach(values, SPREADS[attempt % len(SPREADS)], digits)
-            if independent is None:
+            reached = manifold.reach(values, SPREADS[attempt % len(SPREADS)], digits)
+            if reached is None:
                 continue
+            independent = reached
         sample = Sample(equations, values, digits, numbers, independent)
         if _defined(sample):
             found.append(sample)
     if manifold is not None:
-        raise SymdynError(f"{equations.name}: {len(found)} of {40 * states} searches near the initial state ended at a consistent "
-                          "state where the right-hand side is defined; give an initial state near one, and numbers to all "
-                          "parameters (defaults, or params) that the mechanism can be assembled with")
+        raise SymdynError(f"{equations.name}: {len(found)} of {40 * states} searches near the initial state ended at a "
+                          "consistent state where the right-hand side is defined; give an initial state near one, and numbers "
+                          "to all parameters (defaults, or params) that the mechanism can be assembled with")
     raise SymdynError(f"{equations.name}: the right-hand side is defined at {len(found)} of {40 * states} random states only "
                       "(coordinates and speeds in [-1, 1]); check where its loads leave their domain, such as log, sqrt or a "
                       "division, and whether these parameters leave a joint without mass and inertia")

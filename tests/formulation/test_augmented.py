@@ -36,11 +36,14 @@ def started(system: sd.System, seed: int = 0) -> sd.System:
 
 
 def at(equations: Equations, *names: str, **given: Any) -> dict[str, np.ndarray]:
-    """Quantities in numbers, at the initial state but for what is given."""
+    """Quantities in numbers, at the initial state but for what is given; where a pivot vanishes, those of the other way."""
     s = equations.symbols
     numbers: dict[str, Any] = {"t": 0.0, **{p.name: float(s.defaults[p]) for p in s.parameters}}
     numbers |= {a.name: float(s.initial.get(a, 0.0)) for a in (*s.coordinates, *s.speeds, *s.states, *s.inputs)}
-    return {name: rows[0] for name, rows in evaluate_rows(equations.tape(*names), {**numbers, **given}, 1).items()}
+    found = {name: rows[0] for name, rows in evaluate_rows(equations.tape(*names), {**numbers, **given}, 1).items()}
+    if equations.otherwise is not None and not all(np.isfinite(value).all() for value in found.values()):
+        return at(equations.otherwise, *names, **given)
+    return found
 
 
 def accelerations(equations: Equations, **given: Any) -> np.ndarray:
@@ -50,7 +53,8 @@ def accelerations(equations: Equations, **given: Any) -> np.ndarray:
 
 
 def reactions(equations: Equations, **given: Any) -> dict[str, np.ndarray]:
-    return dict(zip(equations.joints, at(equations, "reactions", **given)["reactions"], strict=True))
+    names = [name for name, *_ in equations.joints]
+    return dict(zip(names, at(equations, "reactions", **given)["reactions"], strict=True))
 
 
 def close(found: Any, wanted: Any, scale: float = 1.0, tolerance: float = TOLERANCE) -> bool:
@@ -110,7 +114,8 @@ def four_bar_in_space() -> sd.System:
         s.add_joint(sd.Revolute(joint.name, parent, bar, joint.coordinates[0], parent_point=list(joint.parent_point)))
         parent = bar
     last = plane.loops[0]
-    s.close_loop(sd.Revolute("hinge4", s.ground, parent, parent_point=list(last.parent_point), child_point=list(last.child_point)))
+    at_ends = {"parent_point": list(last.parent_point), "child_point": list(last.child_point)}
+    s.close_loop(sd.Revolute("hinge4", s.ground, parent, **at_ends))
     s.defaults, s.initial = plane.defaults, plane.initial
     return s
 
@@ -130,7 +135,7 @@ def closed_chain() -> sd.System:
 
 TREES: dict[str, tuple[Callable[[], sd.System], Any]] = {
     **{name: (getattr(sd.systems, name), None) for name in ("double_pendulum", "cart_pole", "vehicle_on_rotating_track",
-                                                            "prismatic_chain", "two_link_arm", "flyball_governor")},
+                                                            "prismatic_chain", "two_link_arm")},
     "three_link_arm": (sd.systems.three_link_arm, sd.EulerAngles("XYZ")),
     "kitchen_sink": (kitchen_sink, sd.EulerParameters()),
     "planar": (lambda: planar_or_spatial(True), None),
@@ -231,7 +236,7 @@ def test_reactions_move_every_free_body_and_do_no_work(seed: int, formulation: s
 
 
 @pytest.mark.parametrize("make", [sd.systems.four_bar, sd.systems.spatial_slider_crank, sd.systems.bricard, four_bar_in_space,
-                                  sd.systems.double_wishbone], ids=lambda make: make.__name__)
+                                  closed_chain], ids=lambda make: make.__name__)
 def test_reactions_of_loops_move_every_free_body_and_do_no_work(make: Callable[[], sd.System]) -> None:
     system = make()
     equations = system.augmented()
@@ -241,8 +246,7 @@ def test_reactions_of_loops_move_every_free_body_and_do_no_work(make: Callable[[
     free = Vt[(sizes > 1e-9 * sizes[0]).sum():]
     u = np.random.default_rng(1).uniform(1, 2, len(free)) @ free
     system.initial = {**model.initial, **dict(zip(model.speeds, u.tolist(), strict=True))}
-    if not any(not isinstance(load, (sd.JointForce if hasattr(sd, "JointForce") else ())) for load in model.loads):
-        check_free_bodies(system, system.augmented())
+    check_free_bodies(system, system.augmented())
 
 
 def check_free_bodies(system: sd.System, equations: Equations) -> None:
@@ -360,7 +364,7 @@ def test_rod_carries_what_hangs_on_it() -> None:
     s.close_loop(sd.Rod("rod", s.ground, body, 2))
     s.initial = {y: -2}
     equations = s.augmented()
-    assert close(at(equations, "lam")["lam"], [-30.0])
+    assert close(at(equations, "lam")["lam"], [30.0])
     assert close(reactions(equations)["rod"], [0, 30, 0, 0, 0, 0])
     assert close(reactions(equations, x_dot=4.0)["rod"], [0, 30 + 3 * 16 / 2, 0, 0, 0, 0])
 
@@ -379,7 +383,7 @@ def test_solution_and_corrections(make: Callable[[], sd.System]) -> None:
              "position_correction", "velocity_correction", "C_scale", "rates")
     f = at(equations, *names, **given)
     M, C_r = f["M_tilde"], f["C_r"]
-    n_c, n_u = C_r.shape
+    n_c = len(C_r)
     force = f["F_tilde"] - f["k_tilde"]
     scale = max(np.abs(force).max(), np.abs(C_r.T @ f["lam"]).max())
     assert close(M @ f["accelerations"] + C_r.T @ f["lam"], force, scale)
@@ -443,7 +447,7 @@ def test_unknown_frames() -> None:
 
 @pytest.mark.parametrize("formulation", ["embedding", "recursive"])
 def test_other_forms_take_trees_only(formulation: str) -> None:
-    with pytest.raises(ModelError, match=r"has 1 constraints or closed loops; .*; use system.augmented\(\)"):
+    with pytest.raises(ModelError, match=r"has 1 constraints or closed loops; .* trees only: use system.augmented\(\)"):
         getattr(sd.systems.four_bar(), formulation)()
 
 

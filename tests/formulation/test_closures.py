@@ -224,7 +224,7 @@ def test_gear() -> None:
     check_derivatives(rows, 2)
     at = {"q1": 20.0, "q2": 6.1, "q3": -40.0, "t": 0.4}
     found = rows_of(s, given=lambda values: at)
-    np.testing.assert_allclose(found.C, [[0, math.sin(0.4)]] * STATES, atol=1e-14)
+    np.testing.assert_allclose(found.C, np.tile([0, math.sin(0.4)], (STATES, 1)), atol=1e-14)
     np.testing.assert_allclose(found.C_r, [[[-0.3, 1, 0], [2, 0, 1]]] * STATES)
 
 

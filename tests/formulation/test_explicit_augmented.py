@@ -299,7 +299,7 @@ def test_disc_rolls_in_a_circle():
 @compiled
 def test_coordinate_without_mass_follows_its_constraint():
     eq = massless_slider(defaults={m: 1.0, g: 9.81, l: 1.0, w: 2.0}, initial={x: 0.6, y: -0.8, z: -0.48, z.dot: 2.0})
-    assert any("singular" in note for note in eq.notes)
+    assert any("elimination of the dependent speeds z_dot" in note for note in eq.notes)
     module = eq.compile()
     sol = module.simulate((0, 3), rtol=1e-10, atol=1e-11)
     np.testing.assert_allclose(sol.q[:, 2], sol.q[:, 0] * sol.q[:, 1] + np.sin(2 * sol.t), atol=1e-9)
@@ -455,7 +455,8 @@ def test_constraints_that_agree_contradict_nothing():
 def test_no_consistent_state_near_is_warned_of():
     with pytest.warns(sd.ModelWarning, match="no state was found that fulfils the constraints"):
         sd.augmented([x, y], [m, m], None, [x**2 + y**2 - l**2, x - a], defaults={m: 1, l: 1, a: 2})
-    sd.augmented([x, y], [m, m], None, [x**2 + y**2 - l**2, x - a], defaults={m: 1, l: 2, a: 1})
+    with pytest.warns(sd.ModelWarning, match="the constraints leave no motion: their rank is 2"):
+        sd.augmented([x, y], [m, m], None, [x**2 + y**2 - l**2, x - a], defaults={m: 1, l: 2, a: 1})
 
 
 def test_coordinate_that_nothing_holds():

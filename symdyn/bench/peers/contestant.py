@@ -15,11 +15,13 @@ class Contestant:
 
     run             run(n): n evaluations; one coordinate of each depends on the result of the one before, so latency counts
     accelerations   (n_u,) derivatives of the speeds of the last evaluation, in symdyn's order of speeds
+    multipliers     (n_c,) of the last evaluation, as in M u_dot + k + C_r^T lam = F; None if it computes none
     """
 
     name: str
     run: Callable[[int], None]
     accelerations: Callable[[], np.ndarray]
+    multipliers: Callable[[], np.ndarray] | None = None
 
 
 @dataclass(frozen=True)

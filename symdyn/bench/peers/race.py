@@ -17,17 +17,21 @@ AGREEMENT = 1e-7
 def agree(contestants: Sequence[Contestant], model: str) -> float:
     """Largest difference of the contestants' accelerations from those of the first, relative to their norm.
 
-    Raises SymdynError if they do not compute the same.
+    The same of multipliers, of those that compute them. Raises SymdynError if they do not compute the same.
     """
     for contestant in contestants:
         contestant.run(1)
-    first, worst = contestants[0], 0.0
-    wanted = first.accelerations()
-    for other in contestants[1:]:
-        found = other.accelerations()
+    worst = _difference([(c.name, c.accelerations()) for c in contestants], "accelerations", model)
+    return max(worst, _difference([(c.name, c.multipliers()) for c in contestants if c.multipliers], "multipliers", model))
+
+
+def _difference(results: Sequence[tuple[str, np.ndarray]], what: str, model: str) -> float:
+    worst = 0.0
+    for name, found in results[1:]:
+        first, wanted = results[0]
         difference = float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
         if not difference <= AGREEMENT:
-            raise SymdynError(f"{model}: {other.name} and {first.name} do not compute the same accelerations, {found} and "
+            raise SymdynError(f"{model}: {name} and {first} do not compute the same {what}, {found} and "
                               f"{wanted}: they differ by {difference:.2g} of their norm, more than {AGREEMENT:.0e}; look for a "
                               "difference between the models that they were given")
         worst = max(worst, difference)
