@@ -67,6 +67,7 @@ FUNCTIONS = {
     "power": ("power", "power of all loads but gravity and springs, and of prescribed motions, W"),
     "power_x": ("power_x", "derivative of the power by x"),
     "Jd_qd": ("Jd_qd", "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame"),
+    "joint_points": ("joint_points", "where every joint sits on its parent, then on its child, n-frame, m"),
     "frames": ("frames", "origin and rotation (row by row) of every body's frame, n-frame"),
     "positions": ("positions", "centres of mass, n-frame, m"),
     "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
@@ -79,12 +80,14 @@ WORK = "(work)"
 CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")
 # What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
 STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
+# What constraints add to it; with the corrections the integrator keeps a motion on its manifold.
+OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
 
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False) -> Source:
-    """The source of the named functions (default: STANDARD, those the formulation has) in a backend.
+    """The source of the named functions (default: STANDARD and OF_CONSTRAINTS, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
     work         rhs gets one more state at the end: the work of all loads but gravity and springs
@@ -95,7 +98,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     if standalone and equations.again is not None:
         equations = equations.again()
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
-    names = tuple(functions) if functions is not None else tuple(n for n in STANDARD if has_function(equations, n))
+    usual = (*STANDARD, *(OF_CONSTRAINTS if equations.constraints else ()))
+    names = tuple(functions) if functions is not None else tuple(n for n in usual if has_function(equations, n))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
@@ -164,8 +168,9 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
     metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
-                "reactions": [name for name, _, _ in equations.joints], "bodies": list(equations.bodies),
-                "reaction_bodies": [[parent, child] for _, parent, child in equations.joints],
+                "reactions": [name for name, *_ in equations.joints], "bodies": list(equations.bodies),
+                "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
+                "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}

@@ -226,11 +226,29 @@ def test_an_unknown_formulation_is_told() -> None:
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_constraints_are_refused_by_each(formulation: str) -> None:
-    system = geared(1)
-    system.add_constraint(system.joints[0].coordinates[0] - 1)
+def test_constraints_are_for_the_augmented_formulation(formulation: str) -> None:
+    system = systems.get("four_bar")
+    if formulation in ("auto", "augmented"):
+        equations = formulated(system, formulation)
+        assert equations.formulation == "augmented" and len(equations.constraints) == 2
+        return
     with pytest.raises(ModelError, match="trees only"):
         formulated(system, formulation)
+
+
+def test_candidates_under_constraints() -> None:
+    equations = systems.get("four_bar").equations()
+    assert {c.formulation for c in equations.candidates} == {"augmented"} and taken(equations).chosen
+    assert taken(equations).operations == function_tape(equations, "rhs").operations
+    absolute = choose(systems.get("four_bar").check(), coordinates="absolute", formulation="augmented")
+    assert len(absolute.symbols.speeds) == 9 and absolute.candidates
+
+
+def test_absolute_coordinates_imply_the_augmented_formulation() -> None:
+    equations = formulated(systems.pendulum(), coordinates="absolute")
+    assert equations.formulation == "augmented" and len(equations.constraints) == 2
+    with pytest.raises(SymdynError, match="'absolute' asked for with the formulation 'recursive'"):
+        formulated(systems.pendulum(), "recursive", coordinates="absolute")
 
 
 def test_gears_have_a_mass_matrix_once() -> None:
@@ -282,7 +300,7 @@ def test_what_is_recalled_depends_on_the_formulation(tmp_path: Path, monkeypatch
         assert modules["recursive"].metadata["formulation"] == "recursive"
         values = [module.rhs(0.0, [0.1, 0.2, 0.3, 0.4]) for module in modules.values()]
         assert all(value == pytest.approx(values[0], rel=1e-12) for value in values)
-        assert len(list(tmp_path.glob("n_link_pendulum-*.json"))) == 3
+        assert len(list(tmp_path.glob("n_link_pendulum-*.json"))) == len(FORMULATIONS)
 
 
 def test_choosing_leaves_the_model_alone() -> None:

@@ -22,6 +22,8 @@ ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
 _INLINE_LENGTH = 72
 # Ends of the names of the two ways of a function that is tried in one way first.
 REGULAR, OTHERWISE = "regular", "singular"
+# Operations that may stop a function.
+STOPPING = ("call", "guard")
 
 
 @dataclass(frozen=True)
@@ -134,9 +136,11 @@ def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape])
     either = [set(_checks(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
     always = [set(_checks(tape, tape.prologue)) for tape in
               [*[tape for name, tape in tapes.items() if name not in otherwise], *otherwise.values()]]
-    late = set().union(*either).difference(*always)
+    demanded = set().union(*either).difference(*always)
+    late: set[Node] = set()
     for node in whole.prologue:
-        if not late.isdisjoint(_cores(node.args)):
+        divides = node.op == "div" and unsigned(node.args[1]) in demanded
+        if divides or (node.op in STOPPING and node in demanded) or not late.isdisjoint(_cores(node.args)):
             late.add(node)
     return late
 
@@ -195,6 +199,7 @@ class _Writer:
                  stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node]) -> None:
         self.dialect = dialect
         self.late = late
+        self.demanded = {unsigned(n.args[1]) for n in late if n.op == "div"}
         self.tape = tape
         self.places = places
         self.stored = stored
@@ -272,6 +277,8 @@ class _Writer:
             self.text[node] = identifier(self.names.get(node, unnamed), self.taken)
             load = self.dialect.load["c"] if group == "c" else self.dialect.parts.load  # type: ignore[union-attr]
             lines.append(self.dialect.assign.format(name=self.text[node], value=load.format(k=place + self.dialect.first)))
+            if node in self.demanded and node in self.checks:
+                lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
         return lines
 
     def _load(self, leaf: Node, lines: list[str]) -> None:
@@ -385,7 +392,7 @@ class _Writer:
 def _checks(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
     """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
     divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
-    divisors.update(n for n in steps if n.op in ("call", "guard"))
+    divisors.update(n for n in steps if n.op in STOPPING)
     return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
 
 

@@ -79,7 +79,7 @@ def _draw(stream: random.Random, tapes: Mapping[str, Tape], groups: Mapping[str,
 
 def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> ReferenceResult | None:
     """A function at a state; None where it is not defined."""
-    pivots = [n for n in tape.steps if n in tape.recorder.checks and n.op != "call"]
+    pivots = [n.args[1] if n.op == "guard" else n for n in tape.steps if n in tape.recorder.checks and n.op != "call"]
     checked = Tape(tape.recorder, {**tape.outputs, "": Output.of("", pivots)})
     try:
         exact, positive = (r.ravel() for r in evaluate(checked, values, DIGITS).values())

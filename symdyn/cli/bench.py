@@ -22,3 +22,10 @@ def growth(arguments: argparse.Namespace) -> int:
     if any(n < 1 for n in arguments.sizes or ()):
         raise Stop(f"--sizes takes numbers of bodies, 1 or more; found {' '.join(map(str, arguments.sizes))}")
     return measured.run(arguments.sizes or measured.SIZES, arguments.output or Path("generated") / "growth")
+
+
+def loops(arguments: argparse.Namespace) -> int:
+    """Measure mechanisms with loops beside what is known of them; a missed bound is a failure."""
+    from symdyn.bench.loops import run
+
+    return FAILED if run(arguments.systems, arguments.repeats, arguments.json) else 0

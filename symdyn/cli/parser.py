@@ -120,6 +120,13 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
     growth.set_defaults(run=bench.growth)
     growth.add_argument("--sizes", metavar="N", nargs="+", type=int, help="numbers of bodies (default: 2 to 100)")
     _add_output(growth)
+    text = "mechanisms with loops beside published motions and closed forms: errors, energy, constraints, run time"
+    loops = kinds.add_parser("loops", help=text, description=text)
+    loops.set_defaults(run=bench.loops)
+    loops.add_argument("--systems", metavar="NAME", nargs="+", help="some of the mechanisms, such as andrews_squeezer or "
+                       "'n_four_bar(2)' (default: all)")
+    loops.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the median counts (default: 5)")
+    loops.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:

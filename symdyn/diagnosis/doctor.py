@@ -14,6 +14,8 @@ from symdyn.diagnosis.paths import LOST, NEAR, STEP, Near, Scaled, follow
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState
 from symdyn.errors import ModelError, SymdynError
 from symdyn.formulation.consistent_states import ConstraintStates
+from symdyn.formulation.dependent_rows import ranks
+from symdyn.model.loop_check import CARRIER
 from symdyn.runtime.arguments import some, take
 from symdyn.tape.floats import evaluate_rows
 
@@ -209,7 +211,7 @@ class _Examination:
 
     def _dependencies(self, A: np.ndarray, rank: int, here: np.ndarray, rank_here: int) -> tuple[Dependency, ...]:
         listed = [Dependency(name, (), (name,)) for name in self.gathered.trivial]
-        always = _implied(A, rank)
+        always = _implied(A, rank, self._kept(A, rank))
         listed += [self._dependency(k, used, True) for k, used in always.items()]
         if rank_here < rank:
             kept = [k for k in range(len(here)) if k not in always]
@@ -217,6 +219,15 @@ class _Examination:
             listed += [self._dependency(kept[k], [kept[j] for j in used], False) for k, used in there.items()]
         self._advise([d.row for d in listed if d.always], A, rank)
         return tuple(listed)
+
+    def _kept(self, A: np.ndarray, rank: int) -> Sequence[int]:
+        """The rows that the equations keep, so that both name the same ones."""
+        if rank == A.shape[1]:
+            return ()
+        symbols = replace(self.equations.symbols, defaults=self.numbers.values, initial=dict(
+            zip(self.equations.symbols.coordinates, self.start, strict=True)))
+        found = ranks(replace(self.equations, symbols=symbols))
+        return found.independent if found is not None and found.rank == rank else ()
 
     def _dependency(self, k: int, used: Sequence[int], always: bool) -> Dependency:
         joints = tuple(dict.fromkeys(self.owners[j] for j in (*used, k)))
@@ -280,12 +291,14 @@ class _Examination:
             around = [j for j, c in zip(self.model.joints, self.model.children, strict=True) if c == b and j.kind == "spherical"]
             if around:
                 self.advice.append(f"idle rotation of {bodies[b]}: sd.Universal in place of the spherical joint {around[0].name} "
-                                   "takes it away; nothing else changes")
+                                   "takes it away; nothing else changes where the body is symmetric about that axis")
         if found.massless:
             self.advice.append(f"{', '.join(speeds[j] for j in found.massless)}: give the bodies that move mass or inertia, or "
                                "hold the motion by a constraint")
-        return replace(plain, parts=tuple(tuple(bodies[b] for b in part) for part in found.parts),
-                       still=tuple(bodies[b] for b in found.still), idle=tuple(bodies[b] for b in found.idle),
+        given = {b for b, name in enumerate(bodies) if not name.endswith(f"_{CARRIER}")}
+        parts = [tuple(bodies[b] for b in part if b in given) for part in found.parts]
+        return replace(plain, parts=tuple(part for part in parts if part),
+                       still=tuple(bodies[b] for b in found.still if b in given), idle=tuple(bodies[b] for b in found.idle),
                        massless=tuple(speeds[j] for j in found.massless), advice=tuple(self.advice),
                        remarks=tuple(self.remarks))
 
@@ -334,13 +347,14 @@ def _rank(A: np.ndarray) -> int:
     return int((np.linalg.svd(A, compute_uv=False) > RANK).sum(axis=1).max()) if A.size else 0
 
 
-def _implied(A: np.ndarray, rank: int) -> dict[int, list[int]]:
-    """Row -> the rows before it, or after, that it is a combination of at all states (s, m, n); `rank` rows are not in it."""
+def _implied(A: np.ndarray, rank: int, first: Sequence[int] = ()) -> dict[int, list[int]]:
+    """Row -> the rows that it is a combination of at all states (s, m, n); `rank` rows are not in it, preferably
+    those of `first`."""
     m = A.shape[1]
     if rank == m:
         return {}
     kept: list[int] = []
-    for k in range(m):
+    for k in [*first, *[k for k in range(m) if k not in first]]:
         if _rank(A[:, [*kept, k]]) > len(kept):
             kept.append(k)
     result: dict[int, list[int]] = {}

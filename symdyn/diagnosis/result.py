@@ -148,7 +148,7 @@ class Diagnosis:
         if self.still:
             lines.append(f"  Bodies that no speed moves: {', '.join(self.still)}.")
         if self.idle:
-            lines.append(f"  Idle rotation, which no other body and no load notices: {', '.join(self.idle)}.")
+            lines.append(f"  Idle rotation, in which nothing else moves and along which no load acts: {', '.join(self.idle)}.")
         if self.massless:
             lines.append(f"  Motions that move no mass, in the speeds {', '.join(self.massless)}.")
         return lines
@@ -163,4 +163,4 @@ def _block(title: str, lines: Iterable[str]) -> list[str]:
 
 
 def _state(q: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in q.items())
+    return ", ".join(f"{name} = {value if abs(value) > 1e-12 else 0.0:.6g}" for name, value in q.items())

@@ -24,14 +24,13 @@ from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, Speed
 
-OWN = "own"
-
 
 def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParameters | None = None) -> Model:
     """The model with coordinates of its own for every body: planar x, y, theta; spatial x, y, z of its origin and its
     orientation in the ground's frame. Start values are those of the relative coordinates (see absolute_start)."""
     orientation = orientation or EulerParameters()
     taken = {s.name for s in (*model.coordinates, *model.speeds, *model.parameters, *model.inputs)}
+    names = {j.name for j in (*model.joints, *model.loops)}
     used = _used(model)
     free: dict[int, Joint] = {}
     moving: list[tuple[Joint, int, int]] = []
@@ -42,6 +41,7 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
             free[child] = joint
         elif _needs_coordinates(joint, used):
             carrier, carrying, closure = carried(joint)
+            closure.name = _new(closure.name, names)
             moving.append((carrying, parent, len(bodies)))
             bodies.append(carrier)
             closing.append(closure)
@@ -49,7 +49,7 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
             closing.append(joint)
     for k, body in enumerate(model.bodies):
         if k not in free:
-            free[k] = _own_joint(body, model.planar, orientation, taken)
+            free[k] = _own_joint(body, model.planar, orientation, taken, names)
     order = [(free[k], -1, k) for k in range(len(model.bodies))] + moving
     joints = tuple(j for j, _, _ in order)
     coordinates = dict.fromkeys(q for j in joints for q in j.coordinates if isinstance(q, Coordinate))
@@ -71,8 +71,21 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
                    initial={s: v for s, v in model.initial.items() if s in known})
 
 
-def _own_joint(body: Body, planar: bool, orientation: Any, taken: set[str]) -> Joint:
-    name = f"{body.name}_{OWN}"
+def _own_joint(body: Body, planar: bool, orientation: Any, taken: set[str], names: set[str]) -> Joint:
+    joint = _free_joint(_new(f"{body.name}_own", names), body, planar, orientation, taken)
+    joint.inner = True
+    return joint
+
+
+def _new(name: str, names: set[str]) -> str:
+    """The name, with lines after it if it is there already; adds it."""
+    while name in names:
+        name += "_"
+    names.add(name)
+    return name
+
+
+def _free_joint(name: str, body: Body, planar: bool, orientation: Any, taken: set[str]) -> Joint:
     if planar:
         return Planar(name, "ground", body, [_symbol(letter, body, taken) for letter in ("x", "y", "theta")])
     letters = ["x", "y", "z"]

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from symdyn.formulation.absolute import OWN
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.tree_equations import tree_of
 from symdyn.model.joints import Free, Joint
@@ -26,7 +25,7 @@ def absolute_start(relative: Model, absolute: Model) -> dict[sp.Symbol, float]:
     """
     if any(p not in relative.defaults for p in relative.parameters):
         return {}
-    own = [(k, j) for j, k in zip(absolute.joints, absolute.children, strict=True) if j.name.endswith(f"_{OWN}")]
+    own = [(k, j) for j, k in zip(absolute.joints, absolute.children, strict=True) if j.inner]
     values: dict[str, float] = {p.name: float(relative.defaults[p]) for p in relative.parameters} | {"t": 0.0}
     for group in (relative.coordinates, relative.speeds, [z.symbol for z in relative.states], relative.inputs):
         values.update({s.name: float(relative.initial.get(s, 0.0)) for s in group})

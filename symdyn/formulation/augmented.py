@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ModelError, SymdynError
-from symdyn.formulation.absolute import OWN, in_absolute_coordinates
+from symdyn.formulation.absolute import in_absolute_coordinates
 from symdyn.formulation.absolute_start import absolute_start
 from symdyn.formulation.augmented_equations import AugmentedEquations
 from symdyn.formulation.constrained import Constrained
@@ -51,7 +51,10 @@ class ConstrainedTree(Constrained, TreeQuantities):
     @property
     def reacting(self) -> tuple[Joint, ...]:
         joints = (*super().reacting, *[c.joint for c in self.gathered.closures])
-        return tuple(j for j in joints if not j.name.endswith((f"_{OWN}", "_closure")))
+        return tuple(j for j in joints if not j.inner)
+
+    def remaining(self) -> list[Any]:
+        return self.gathered.remaining()
 
     def quantities(self) -> dict[str, Any]:
         return {**super().quantities(), "reactions_by_lam": self.reactions_by_lam}

@@ -74,13 +74,18 @@ class Constrained(Motion):
 
     def F_d(self) -> np.ndarray:
         with self.algebra.section("F_d"):
-            return self.algebra.name("F_d", vector(*[-r.remaining for r in self.rows]))
+            return self.algebra.name("F_d", vector(*[-e for e in self.remaining()]))
+
+    def remaining(self) -> list[Any]:
+        """C_ddot with u_dot = 0, row by row."""
+        return [r.remaining for r in self.rows]
 
     def C_scale(self) -> np.ndarray:
         """What makes every row a length, m; rows of unknown unit are divided by their gradient."""
         with self.algebra.section("scale of the constraints"):
-            known = {"m": 1, "rad": self.length}
-            return vector(*[known[r.unit] if r.unit in known else self._by_gradient(r) for r in self.rows])
+            powers = {"rad": 0, "m": 1, "m^2": 2, "m^3": 3}
+            return vector(*[self.length / self.length ** powers[r.unit] if r.unit in powers else self._by_gradient(r)
+                            for r in self.rows])
 
     def _by_gradient(self, row: Row) -> Any:
         apply = self.algebra.recorder.apply
@@ -119,7 +124,7 @@ class Constrained(Motion):
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
         """u_dot and lam."""
-        right, saddle, F_d = -self.recall("bias"), self.recall("saddle"), self.recall("F_d")
+        right, saddle, F_d = -self.recall("bias"), self.recall("saddle"), vector(*[-r.remaining for r in self.rows])
         with self.algebra.section("accelerations and multipliers"):
             ud, lam = saddle.solve(right, F_d)
             return self.algebra.name("ud", ud), self.algebra.name("lam", lam)
@@ -189,7 +194,7 @@ class Constrained(Motion):
         a = self.algebra.recorder.leaf(BAUMGARTE, kinds.PARAMETER)
         right, saddle = -self.recall("bias"), self.recall("saddle")
         with self.algebra.section("Baumgarte's stabilization"):
-            pulled = vector(*[f - 2 * a * r.rate - a * a * r.value for f, r in zip(self.F_d(), self.rows, strict=True)])
+            pulled = vector(*[-r.remaining - 2 * a * r.rate - a * a * r.value for r in self.rows])
             ud = saddle.solve(right, pulled)[0]
         return vector(*self.rates, *ud, *self.state_rates())
 

@@ -7,8 +7,8 @@ Source: lecture, chapters 3.4 and 6.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from symdyn.errors import ModelError
 from symdyn.formulation.closures import ClosureRow, closure_rows
 from symdyn.formulation.loads import Loads
 from symdyn.formulation.relative import End, Relative, common_link
-from symdyn.formulation.tree import Tree
+from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerParameters
@@ -39,7 +39,7 @@ class Row:
     """One constraint.
 
     value      C, 0 of a velocity constraint; jacobian (n_u,); rate: C_dot; remaining: C_ddot with u_dot = 0
-    unit       "m" or "rad" of the value, "" if unknown
+    unit       "m", "rad" or "m^2", ... of the value, "" if unknown
     holonomic  whether it holds positions
     """
 
@@ -88,7 +88,7 @@ class Gathered:
                     self._closure(loop, loads)
         for constraint in self.model.constraints:
             with self.algebra.section(f"constraint {constraint.name}"):
-                self._add(expression_row(self.algebra, constraint, self.model.coordinates, tree.rates, self.model.speeds))
+                self._expression(constraint)
         if self.faults:
             raise ModelError(self.faults, self.model.name)
 
@@ -114,8 +114,7 @@ class Gathered:
         poses = loads.pose(joint.parent), loads.pose(joint.child)
         base = common_link(self.tree, *(pose.link for pose in poses))
         seen = self._seen.setdefault(base, Relative(self.tree, base))
-        P, Q = (seen.end(pose, a.constants(point), a.matrix(rotation)) for pose, point, rotation in
-                zip(poses, (joint.parent_point, joint.child_point), (joint.parent_rotation, joint.child_rotation), strict=True))
+        P, Q = self._ends(seen, joint, poses)
         kept, places = [], []
         for row in closure_rows(a, joint, P, Q, self.model.planar):
             along = row.along(P, Q)
@@ -127,45 +126,64 @@ class Gathered:
                 places.append(len(self.rows) - 1)
         self.closures.append(Closure(joint, base, seen, P, Q, tuple(kept), tuple(places)))
 
+    def _ends(self, seen: Relative, joint: Joint, poses: Sequence[Pose]) -> tuple[End, End]:
+        a = self.algebra
+        P, Q = (seen.end(pose, a.constants(point), a.matrix(rotation)) for pose, point, rotation in
+                zip(poses, (joint.parent_point, joint.child_point), (joint.parent_rotation, joint.child_rotation), strict=True))
+        return P, Q
+
+    def remaining(self) -> list[Any]:
+        """C_ddot with u_dot = 0 of every row, without the weight that goes in and out again: to be read."""
+        result = [row.remaining for row in self.rows]
+        seen = Relative(self.tree, GROUND, weight=False)
+        for closure in self.closures:
+            if closure.base == GROUND:
+                with self.algebra.section(f"constraints of {closure.joint.kind} {closure.joint.name}"):
+                    P, Q = self._ends(seen, closure.joint, (closure.parent.pose, closure.child.pose))
+                    for row, place in zip(closure.rows, closure.places, strict=True):
+                        result[place] = row.remaining(P, Q)
+        return result
+
     def _gear(self, gear: Gear) -> None:
         joints = {j.name: j for j in self.model.joints}
         a, b = (joints[end] if isinstance(end, str) else end for end in (gear.joint_a, gear.joint_b))
         expression = b.coordinates[0] - gear.ratio * a.coordinates[0] - gear.offset
-        row = expression_row(self.algebra, Constraint(gear.name, expression), self.model.coordinates, self.tree.rates,
-                             self.model.speeds)
-        self._add(row)
+        self._expression(Constraint(gear.name, expression))
+
+    def _expression(self, constraint: Constraint) -> None:
+        row = expression_row(self.algebra, constraint, self.model.coordinates, self.tree.rates, self.model.speeds)
+        self._add(replace(row, unit=unit_of(constraint.expression, self.model.units)))
 
     def _add(self, row: Row, closes: bool = False) -> bool:
         """Take a row, unless it holds by structure; closes: one of a joint that closes a loop, which may hold by numbers, too."""
-        regular = any(not is_zero(e) for e in row.jacobian)
-        if regular and not closes:
+        if not closes and any(not is_zero(e) for e in row.jacobian):
             self.rows.append(row)
             return True
-        if (is_zero(row.value) and is_zero(row.rate) and not regular) or self._vanish([row.value, row.rate, *row.jacobian]):
+        numbers = self._at([row.value if row.holonomic else row.rate, row.rate, *row.jacobian])
+        if not (np.abs(numbers[:, 2:]) <= ROUNDING).all():
+            self.rows.append(row)
+            return True
+        if (np.abs(numbers) <= ROUNDING).all():
             self.trivial.append(row.name)
             return False
-        if regular:
-            self.rows.append(row)
-            return True
         what = row.value if row.holonomic else row.rate
-        number = self._at([what])[0, 0]
-        if isinstance(what, Node) and what.mask & TIME:
+        mask = what.mask if isinstance(what, Node) else 0
+        if mask & ~(TIME | PARAMETER) and np.ptp(numbers[:, 0]) > ROUNDING:
+            self.faults.append(f"{row.name} holds nothing: its derivatives by all coordinates and speeds vanish at every state; "
+                               "remove it, or correct it")
+        elif mask & TIME:
             self.faults.append(f"{row.name} holds what is prescribed as a function of time: no coordinate of the system is in "
                                "it; remove it, or replace the prescribed motion by a coordinate")
-        elif isinstance(what, Node) and what.mask & PARAMETER:
+        elif mask & PARAMETER:
             self.faults.append(f"{row.name} is an equation between parameters alone, which no motion of the system changes; "
                                "remove it, or choose points and axes so that it holds by itself")
         else:
-            self.faults.append(f"{row.name} demands {number:.6g} = 0, which no motion of the system changes: it contradicts "
-                               "the other joints; remove it, or correct the points and axes")
+            self.faults.append(f"{row.name} demands {numbers[0, 0]:.6g} = 0, which no motion of the system changes: it "
+                               "contradicts the other joints; remove it, or correct the points and axes")
         return False
 
-    def _vanish(self, values: Sequence[Any]) -> bool:
-        """Whether values are zero but for rounding, at random states and parameters."""
-        return bool((np.abs(self._at(values)) <= ROUNDING).all())
-
     def _at(self, values: Sequence[Any]) -> np.ndarray:
-        """Values at a few random states, (s, n), with random parameters near their defaults."""
+        """Values at a few random states, (s, n), at one time and with random parameters near their defaults."""
         if not any(isinstance(v, Node) for v in values):
             return np.array([[float(v) for v in values]])
         tape = Tape.of(self.algebra.recorder, values=np.array(list(values), dtype=object))
@@ -173,14 +191,34 @@ class Gathered:
         parameters = {p.name: float(v) for p, v in self.model.defaults.items()}
         numbers: dict[str, Any] = {}
         for leaf in tape.inputs:
-            drawn = stream.uniform(0.2, 1.2, STATES)
-            name = leaf.args[1]
+            moving = leaf.mask & ~(TIME | PARAMETER)
+            name, drawn = leaf.args[1], stream.uniform(0.2, 1.2, STATES if moving else None)
             numbers[name] = parameters[name] * (1 + drawn / 100) if parameters.get(name) else drawn
         for joint in (j for j in self.model.joints if isinstance(getattr(j, "orientation", None), EulerParameters)):
             group = [q.name for q in joint.coordinates[-4:] if q.name in numbers]
             norm = np.sqrt(sum(numbers[name] ** 2 for name in group))
             numbers.update({name: numbers[name] / norm for name in group})
         return evaluate_rows(tape, numbers, STATES)["values"]
+
+
+def unit_of(expression: sp.Expr, units: Mapping[sp.Symbol, str]) -> str:
+    """The unit of an expression of lengths, or of their rates: "m", "rad" (no length in it), "m^2", ...; "" if its terms differ.
+
+    Found by its values with all lengths doubled and trebled.
+    """
+    symbols = sorted(expression.free_symbols, key=str)
+    lengths = [s for s in symbols if units.get(s) in ("m", "m/s")]
+    stream = np.random.default_rng(5)
+    values = {s: sp.Float(v, 30) for s, v in zip(symbols, stream.uniform(0.3, 1.3, len(symbols)), strict=True)}
+    try:
+        first, *others = [complex(expression.xreplace({**values, **{s: k * values[s] for s in lengths}}).evalf(25))
+                          for k in (1, 2, 3)]
+    except (TypeError, ValueError):
+        return ""
+    for power in range(4):
+        if all(abs(v - first * k**power) <= 1e-12 * abs(v) for k, v in zip((2, 3), others, strict=True)):
+            return ("rad", "m")[power] if power < 2 else f"m^{power}"
+    return ""
 
 
 def expression_row(algebra: Any, constraint: Constraint, coordinates: Sequence[sp.Symbol], rates: Sequence[Any],

@@ -88,6 +88,10 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
     """Rows that are the same combination of others at all states, but for a constant that is not zero."""
     order = sorted(kept, key=lambda k: not holonomic[k])
     gradients = {k: draw.C_r[:, k].ravel() for k in order}
+    if order:
+        directions = np.array([g / np.linalg.norm(g) for g in gradients.values()])
+        if np.linalg.eigvalsh(directions @ directions.T)[0] > 1e-9:  # no row depends on the others
+            return []
     independent: list[int] = []
     found = []
     for k in order:

@@ -16,6 +16,8 @@ from symdyn.tape.floats import evaluate_rows
 RANK_TOLERANCE = 1e-8
 # Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
 WALKS, STEPS, STRIDE = 6, 12, 0.25
+# Starts that are tried, the initial state and others up to 1 m or 1 rad away.
+STARTS = 8
 
 
 @dataclass(frozen=True)
@@ -32,17 +34,21 @@ class Ranks:
 
 
 def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
-    """The rank of the constraints at consistent states; None where parameters have no numbers, or the initial state is far
-    from any consistent one."""
+    """The rank of the constraints at consistent states; None where parameters have no numbers, or no consistent one
+    is found near the initial one."""
     symbols = equations.symbols
     if any(p not in symbols.defaults for p in symbols.parameters):
         return None
     states = ConstraintStates(equations, symbols.defaults)
     start = np.array([[float(symbols.initial.get(q, 0.0)) for q in symbols.coordinates]])
-    q, residual = states.nearest(start)
-    if not residual[0] < FULFILLED:
+    stream = np.random.default_rng(seed)
+    near = stream.uniform(-1, 1, (STARTS, start.shape[1]))
+    near[0] = 0  # the initial state itself; from a singular one no step leads on
+    q, residual = states.nearest(start + near)
+    if not (residual < FULFILLED).any():
         return None
-    places = np.concatenate([q, *walked(states, q, np.random.default_rng(seed))])
+    q = q[int(np.argmax(residual < FULFILLED))][None]
+    places = np.concatenate([q, *walked(states, q, stream)])
     samples = scaled(states, places)
     sizes = np.linalg.svd(samples, compute_uv=False)
     counts = (sizes > RANK_TOLERANCE * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)

@@ -45,7 +45,7 @@ class Equations:
     frames       axes that quantities are formed in: "body", or "parallel" where links keep those of the link before
     candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
     constraints  names of the constraint rows; holonomic: whether each holds positions; bodies: names
-    joints       of those in `reactions`: name, parent, child
+    joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     identification   what records regressors and base parameters; None without bodies
     """
@@ -66,7 +66,7 @@ class Equations:
     constraints: tuple[str, ...] = ()
     holonomic: tuple[bool, ...] = ()
     bodies: tuple[str, ...] = ()
-    joints: tuple[tuple[str, str, str], ...] = ()
+    joints: tuple[tuple[str, str, str, str], ...] = ()
     otherwise: Equations | None = None
     identification: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -20,6 +20,8 @@ from symdyn.tape.node import Node, is_zero
 SMALLEST_PIVOT = 1e-3
 # Pivots at the sample state are at least this part of the largest that there is.
 ADMITTED = 0.2
+# So few independent speeds are no reason to wait for their accelerations.
+FEW = 1
 
 
 class NullSpaceSolver:
@@ -38,6 +40,7 @@ class NullSpaceSolver:
                 self.Z[k, place] = 1
                 self.Z[self.d, place] = algebra.name(f"Z_{k + 1}", columns[place])
         with algebra.section("mass matrix of the independent speeds"):
+            self.MZ = M @ self.Z if self.i else zeros(len(M), 0)
             reduced = congruence(M, self.Z)
             algebra.name("Mi", reduced)
             reasons = [f"the mass matrix under the constraints is not positive definite at {speeds[k]}" for k in self.i]
@@ -50,10 +53,18 @@ class NullSpaceSolver:
         left = f - self.M @ g
         v = self.factors.solve(vector(*[inner(self.Z[:, k], left) for k in range(len(self.i))]))
         x = g + (self.Z @ v if len(v) else zeros(len(f)))
-        rest = f[self.d] - self.M[self.d] @ x if len(self.d) else zeros(0)
         lam = zeros(len(d))
-        lam[self.rows] = self._solve_transposed(rest)
+        lam[self.rows] = self._multipliers(left, v)
         return x, lam
+
+    def _multipliers(self, left: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """lam of C_d^T lam = (f - M x)_d, f - M x = left - M Z v; of few v column by column, so that little waits for them."""
+        if len(v) > FEW:
+            return self._solve_transposed(left[self.d] - self.MZ[self.d] @ v)
+        lam = self._solve_transposed(left[self.d])
+        for k, speed_rate in enumerate(v):
+            lam = lam - self._solve_transposed(self.MZ[self.d, k]) * speed_rate
+        return lam
 
     # -- C_d = L U by blocks of one or two rows, in the order of the pivots; U with ones on its diagonal blocks
 

@@ -39,14 +39,16 @@ class End:
 
 
 class Relative:
-    """The tree seen from one of its links, or from the ground."""
+    """The tree seen from one of its links, or from the ground.
 
-    def __init__(self, tree: Tree, base: int) -> None:
+    weight   whether the ground accelerates upwards in place of the weight: the motions that the equations need anyway
+    """
+
+    def __init__(self, tree: Tree, base: int, weight: bool = True) -> None:
         self.tree, self.base = tree, base
-        # With the weight as acceleration of the ground these are the motions that the equations need anyway.
-        weight = zeros(3) if base != GROUND else -tree.algebra.constants(tree.model.gravity)
+        upwards = -tree.algebra.constants(tree.model.gravity) if base == GROUND and weight else zeros(3)
         self._frames: dict[int, tuple[np.ndarray, np.ndarray]] = {base: (identity(), zeros(3))}
-        self._motions: dict[int, LinkMotion] = {base: base_motion(weight)}
+        self._motions: dict[int, LinkMotion] = {base: base_motion(upwards)}
 
     def end(self, pose: Pose, point: np.ndarray, rotation: np.ndarray) -> End:
         """A point of a body, body axes, and a frame on it, frame to body components."""

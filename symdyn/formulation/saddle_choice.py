@@ -77,13 +77,13 @@ def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None)
         if all(p in symbols.defaults for p in symbols.parameters):
             warnings.warn(f"{equations.name}: no state was found that fulfils the constraints "
                           f"{', '.join(equations.constraints)}; check the numbers in defaults, or give a state near one in "
-                          "initial", ModelWarning, stacklevel=6)
+                          "initial", ModelWarning, stacklevel=5)
         return []
     if found.rank < len(symbols.speeds):
         return []
     if all(is_zero(e) for e in quantities.C_t()):
         warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {found.rank}, as many as there are "
-                      "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=6)
+                      "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=5)
     return ["motion: the constraints determine every speed, so that the forces do not change the motion"]
 
 

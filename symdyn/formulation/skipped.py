@@ -6,6 +6,10 @@ import numpy as np
 
 from symdyn.formulation.equations import Equations
 from symdyn.tape.node import INPUT, PARAMETER, TIME, Node
+from symdyn.tape.tape import Tape
+
+# How the note on accelerations begins where the factors of the mass matrix are used.
+BY_FACTORS = "accelerations by Schur complement"
 
 
 def skipped(equations: Equations) -> list[str]:
@@ -19,8 +23,10 @@ def skipped(equations: Equations) -> list[str]:
         notes.append("time: nothing depends on t, so no function takes it")
     if not kinds & INPUT:
         notes.append("inputs: there are none")
+    if equations.constraints:
+        notes += _constraints(equations, tape)
     if equations.formulation != "recursive":
-        notes += _mass_matrix(equations.quantity("M_tilde"))
+        notes += _mass_matrix(equations)
     if not any(isinstance(e, Node) for e in equations.quantity("k_tilde")):
         notes.append("k_tilde: zero by structure")
     if tape.prologue:
@@ -29,18 +35,40 @@ def skipped(equations: Equations) -> list[str]:
     return notes
 
 
-def _mass_matrix(M: np.ndarray) -> list[str]:
+def _constraints(equations: Equations, tape: Tape) -> list[str]:
+    """What the right-hand side does without, of what there is to constraints."""
+    notes = []
+    steps = set(tape.steps)
+    lam = [e for e in equations.quantity("lam") if isinstance(e, Node)]
+    if lam and not any(e in steps for e in lam):
+        notes.append("multipliers: accelerations do without them; they are computed where lam or reactions are asked for")
+    if not any(isinstance(e, Node) for e in equations.quantity("C_t")):
+        notes.append("C_t: zero by structure, the constraints do not move by themselves" if not any(equations.quantity("C_t"))
+                     else "C_t: constant")
+    if all(not isinstance(e, Node) or not e.mask & ~PARAMETER for e in equations.quantity("C_r").ravel()):
+        notes.append("C_r: constant, and what depends on it alone is computed in the prologue")
+    if not any(isinstance(e, Node) or e for e in equations.quantity("F_d")):
+        notes.append("F_d: zero by structure")
+    return notes
+
+
+def _mass_matrix(equations: Equations) -> list[str]:
+    """What its structure saves. With constraints it need not be factorized, and they couple what it does not."""
+    M = equations.quantity("M_tilde")
     n = len(M)
     notes = []
     entries = [M[i, j] for i in range(n) for j in range(i + 1)]
-    if n and all(not isinstance(e, Node) or not e.mask & ~PARAMETER for e in entries):
-        notes.append("factorization: the mass matrix is constant and is factorized once, in the prologue")
+    constant = all(not isinstance(e, Node) or not e.mask & ~PARAMETER for e in entries)
+    factorized = not equations.constraints or any(note.startswith(BY_FACTORS) for note in equations.notes)
+    if n and constant:
+        notes.append("factorization: the mass matrix is constant and is factorized once, in the prologue" if factorized else
+                     "mass matrix: constant")
     zero = sum(1 for e in entries if not isinstance(e, Node) and e == 0)
     if zero:
-        notes.append(f"{zero} of the {len(entries)} entries of the mass matrix (symmetric ones once): zero by structure, "
-                     "and so left out of its factors")
+        notes.append(f"{zero} of the {len(entries)} entries of the mass matrix (symmetric ones once): zero by structure"
+                     f"{', and so left out of its factors' * factorized}")
     parts = _components(M)
-    if len(parts) > 1:
+    if len(parts) > 1 and not equations.constraints:
         groups = "; ".join(", ".join(str(k + 1) for k in part) for part in parts[:6])
         notes.append(f"coupling: speeds {groups}{'; ...' if len(parts) > 6 else ''} do not act on each other through the "
                      "mass matrix and are solved for separately")

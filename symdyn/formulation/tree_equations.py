@@ -14,7 +14,7 @@ from symdyn.formulation.equations import Symbols
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
-from symdyn.model.joints import Fixed
+from symdyn.model.joints import Fixed, Joint
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model
 from symdyn.tape.recorder import Recorder
@@ -31,7 +31,8 @@ def derive_tree(model: Model, formulation: str, frames: str, derivation: type[Tr
     """
     if model.constraints or model.loops:
         count = len(model.constraints) + len(model.loops)
-        raise ModelError([f"the model has {count} constraints or closed loops; the {formulation} form takes trees only: use "
+        what = "a constraint or closed loop" if count == 1 else f"{count} constraints or closed loops"
+        raise ModelError([f"the model has {what}; the {formulation} form takes trees only: use "
                           "system.augmented(), or let joints take expressions of fewer coordinates"], model.name)
     quantities = derivation(tree_of(model, frames))
     quantities.demand_inertia()
@@ -55,8 +56,17 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body", identification=quantities.identification,
                   bodies=tuple(b.name for b in model.bodies),
-                  joints=tuple((j.name, *[getattr(b, "name", b) for b in (j.parent, j.child)]) for j in quantities.reacting),
+                  joints=_joints(quantities),
                   **more)
+
+
+def _joints(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]:
+    """Name, parent, child and kind of the joints that react; for a carrier the body that is fixed to it."""
+    def name(body: Any) -> str:
+        return str(getattr(body, "name", body))
+
+    carried = {name(c.parent): name(c.child) for c in quantities.model.loops if isinstance(c, Joint) and c.inner}
+    return tuple((j.name, name(j.parent), carried.get(name(j.child), name(j.child)), j.kind) for j in quantities.reacting)
 
 
 def _notes(model: Model, tree: Tree) -> list[str]:

@@ -41,7 +41,7 @@ class TreeQuantities(Motion):
 
     @property
     def reacting(self) -> tuple[Joint, ...]:
-        """The joints in the rows of `reactions`."""
+        """The joints in the rows of `reactions` and `joint_points`."""
         return self.model.joints
 
     def demand_inertia(self) -> None:
@@ -52,7 +52,8 @@ class TreeQuantities(Motion):
         """name -> function that records it."""
         own = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde, "J": self.J, "Jdot": self.Jdot,
                "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
-               "reactions": self.reactions, "energy": self.energy, "power": self.power, "power_x": self.power_x,
+               "joint_points": self.joint_points, "reactions": self.reactions, "energy": self.energy,
+               "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         return {**super().quantities(), **own, **self.identification.quantities()}
 
@@ -114,6 +115,12 @@ class TreeQuantities(Motion):
         for pose in self.tree.poses:
             rows.append([*self.kinematics.position(pose, zeros(3)), *self.kinematics.rotation(pose).ravel()])
         return np.array(rows, dtype=object).reshape(-1, 12)
+
+    def joint_points(self) -> np.ndarray:
+        """Where each joint sits on its parent, then on its child, n-frame, m, (n_joints, 6)."""
+        ends = [end for j in self.reacting for end in ((j.parent, j.parent_point), (j.child, j.child_point))]
+        return np.array([self.kinematics.position(self.loads.pose(body), self.algebra.constants(point)) for body, point in ends],
+                        dtype=object).reshape(-1, 6)
 
     def reactions(self) -> np.ndarray:
         """Force and moment of each joint on its child, at its point on the child, n-frame, (n_joints, 6)."""

@@ -23,7 +23,7 @@ class Rod(Joint):
                  child_point: Any = (0, 0, 0)) -> None:
         super().__init__(name, parent, child, (), None, parent_point, child_point, None, None)
         self.length = self.faults.expression(length, f"rod {name!r}: length (m)")
-        if self.length.is_number and not self.length > 0:
+        if not self.faults and self.length.is_number and not self.length > 0:
             self.faults.append(f"rod {name!r}: length is {self.length} m; pass a positive length (for two points that coincide: "
                                "Spherical, or Revolute in a plane)")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.bodies import Body
-from symdyn.model.closures import Constraint, Gear
+from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Custom, Fixed, Free, Helical, Joint
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate
 
@@ -49,13 +49,15 @@ def carried(joint: Joint) -> tuple[Body, Joint, Joint]:
     moving.child, moving.child_point = carrier, sp.ImmutableMatrix(sp.zeros(3, 1))
     moving.child_rotation = sp.ImmutableMatrix(sp.eye(3))
     closure = Fixed(f"{joint.name}_closure", carrier, joint.child, (0, 0, 0), joint.child_point, None, joint.child_rotation)
+    closure.inner = True
     return carrier, moving, closure
 
 
 def loop_faults(loops: Iterable[Joint | Gear], joints: Mapping[str, Joint],
                 resolve: Callable[[Any, str], int | None]) -> list[str]:
     """What is wrong with the loops; resolve(body, where) gives a body's number and reports unknown ones itself."""
-    faults: list[str] = []
+    faults = [f"rod {j.name!r} cannot carry a body in the tree; join the bodies by other joints and pass the rod to close_loop"
+              for j in joints.values() if isinstance(j, Rod)]
     for loop in loops:
         if isinstance(loop, Gear):
             faults += _gear_faults(loop, joints)
@@ -64,6 +66,10 @@ def loop_faults(loops: Iterable[Joint | Gear], joints: Mapping[str, Joint],
         child = resolve(loop.child, f"joint {loop.name!r}: child")
         if parent is not None and parent == child:
             faults.append(f"joint {loop.name!r} closes a loop from a body onto itself; pass two different bodies")
+        given = [str(q) for q in loop.coordinates if not isinstance(q, Coordinate)]
+        if given and not loop.faults:
+            faults.append(f"joint {loop.name!r} closes a loop, where its motion follows from the others; it cannot be given as "
+                          f"{', '.join(given)}: put this joint into the tree, and close the loop at another")
         if isinstance(loop, Free):
             faults.append(f"joint {loop.name!r} is free and constrains nothing; leave out close_loop")
     return faults

@@ -100,7 +100,8 @@ class System:
     def close_loop(self, joint: Closure) -> Closure:
         """A joint between two bodies that are already in the tree, an sd.Rod, or an sd.Gear: it becomes constraints.
 
-        A joint's coordinates do not become coordinates of the system, except those of Helical and Custom joints.
+        Joints of all kinds but Free close loops: Fixed, Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Helical,
+        Custom. Their coordinates do not become coordinates of the system, except those of Helical and Custom joints.
         """
         if not isinstance(joint, (Joint, Gear)):
             self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...), an sd.Rod or an sd.Gear")
@@ -188,7 +189,10 @@ class System:
     def add_constraint(self, expression: Any, name: str = "") -> None:
         """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
         label = name or f"constraint_{len(self.constraints) + 1}"
-        self.constraints.append(Constraint(label, self._faults.expression(expression, label)))
+        faults = len(self._faults)
+        taken = self._faults.expression(expression, label)
+        if len(self._faults) == faults:
+            self.constraints.append(Constraint(label, taken))
 
     # -- what comes of it
 
@@ -222,7 +226,8 @@ class System:
 
         coordinates   "relative": the tree as it is, constraints close its loops; "absolute": every body has coordinates of
                       its own (planar x, y, theta; spatial x, y, z of its origin and its orientation in the n-frame), and every
-                      joint becomes constraints
+                      joint becomes constraints; joints that are driven, geared or used in expressions keep their coordinates
+                      besides
         orientation   of the bodies in absolute coordinates: EulerParameters(), the default, or EulerAngles(...)
         frames        as for `embedding`
         Raises ModelError with every fault found, and for constraints that cannot hold or move nothing.
@@ -249,7 +254,8 @@ class System:
         return diagnose(self, q, params, t, coordinates, reach)
 
     def equations(self, tune: bool = False) -> MotionEquations:
-        """The equations in the formulation that computes accelerations in the least predicted time.
+        """The equations in the formulation that computes accelerations in the least predicted time; of a system with loops or
+        constraints the augmented ones in relative coordinates.
 
         tune   compile the candidates and time them, instead of predicting from their operations
         The result's `candidates` tells what it was chosen from. Raises ModelError with every fault found.

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 from symdyn.choice import HEADING, Candidate
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.skipped import skipped
+from symdyn.tape.tape import Tape
+
+# What the report counts besides the standard functions where there are constraints.
+OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", "reactions", "position_correction", "velocity_correction")
+# The right-hand side by the numeric algorithm, which takes over where a pivot vanishes.
+OTHERWISE = "rhs, algorithm"
 
 
 @dataclass(frozen=True)
@@ -57,17 +63,24 @@ class Report:
         return str(self)
 
 
+def _row(name: str, tape: Tape) -> Row:
+    return Row(name, tape.count(), sum(tape.count_prologue().values()), tape.longest_chain())
+
+
 def report(equations: Equations, backend: str, fallback: str = "") -> Report:
     """The report of equations on a backend; counts after hoisting, one each for + - * / sqrt sin cos."""
     from symdyn.pipeline import STANDARD, function_tape, has_function
 
     rows = []
-    for name in STANDARD:
+    for name in (*STANDARD, *OF_CONSTRAINTS * bool(equations.constraints)):
         if has_function(equations, name):
-            tape = function_tape(equations, name)
-            rows.append(Row(name, tape.count(), sum(tape.count_prologue().values()), tape.longest_chain()))
+            rows.append(_row(name, function_tape(equations, name)))
+            if name == "rhs" and equations.otherwise is not None:
+                rows.append(_row(OTHERWISE, function_tape(equations.otherwise, name)))
     s = equations.symbols
     sizes = {"coordinates": len(s.coordinates), "speeds": len(s.speeds), "extra states": len(s.states),
              "inputs": len(s.inputs), "parameters": len(s.parameters)}
+    if equations.constraints:
+        sizes["constraints"] = len(equations.constraints)
     return Report(f"{equations.name}: {equations.formulation} equations of motion", backend, fallback, sizes, tuple(rows),
                   tuple(skipped(equations)), equations.candidates)

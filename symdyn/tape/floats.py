@@ -38,8 +38,9 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
                 done[node] = _function(node.op)(*[number(a) for a in node.args])
     result = {}
     for name, output in tape.outputs.items():
-        columns = [np.broadcast_to(np.asarray(number(e), dtype=float), (n,)) for e in output.entries]
-        flat = np.stack(columns, axis=1) if columns else np.zeros((n, 0))
+        flat = np.empty((n, len(output.entries)))
+        for k, e in enumerate(output.entries):
+            flat[:, k] = number(e)
         result[name] = flat.reshape((n, *output.shape))
     return result
 

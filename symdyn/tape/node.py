@@ -63,8 +63,16 @@ class Node:
         return self.recorder.pow(self, exponent) if isinstance(exponent, (Node, Number)) else NotImplemented
 
     def __repr__(self) -> str:
-        name = self.recorder.names.get(self)
-        return f"<{name or self.index}: {self.op}{self.args!r}>" if self.op != "leaf" else f"<{self.args[1]}>"
+        """The operation with its arguments by name or number: a tape is too long to be told whole."""
+        if self.op == "leaf":
+            return f"<{self.args[1]}>"
+        listed = ", ".join(a.label if isinstance(a, Node) else repr(a) for a in self.args)
+        return f"<{self.label}: {self.op}({listed})>"
+
+    @property
+    def label(self) -> str:
+        """Its name, or its number on the recorder."""
+        return str(self.args[1]) if self.op == "leaf" else self.recorder.names.get(self, f"#{self.index}")
 
 
 def exact(value: Any) -> int | Fraction:

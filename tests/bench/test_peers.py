@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,10 @@ import pytest
 from symdyn import systems
 from symdyn.bench.peers import command, toolchain
 from symdyn.bench.peers.casadi_peer import CasadiPeer
-from symdyn.bench.peers.contest import Row, cases, contest, random_state
+from symdyn.bench.peers.contest import Row, contest, random_state
 from symdyn.bench.peers.contestant import Contestant, unsorted
 from symdyn.bench.peers.description import Description, describe
-from symdyn.bench.peers.models import CASES, Bound, turbine_tree
+from symdyn.bench.peers.models import CASES, Bound, cases, turbine_tree
 from symdyn.bench.peers.race import agree, race
 from symdyn.bench.peers.table import heading, line, record, verdict
 from symdyn.cli import main
@@ -125,11 +127,16 @@ def test_contestants_take_turns_and_must_agree(monkeypatch: pytest.MonkeyPatch) 
     assert calls[-6:] == ["a", "b"] * 3
     with pytest.raises(SymdynError, match="mechanism: c and a do not compute the same accelerations"):
         agree([*contestants, counting("c", 1.1, calls)], "mechanism")
+    held = [dataclasses.replace(c, multipliers=partial(np.full, 1, 1.0 + k)) for k, c in enumerate(contestants)]
+    with pytest.raises(SymdynError, match="mechanism: b and a do not compute the same multipliers"):
+        agree(held, "mechanism")
 
 
 def test_names_of_cases() -> None:
-    assert list(cases(["spatial_chain", "turbine_tree"])) == [*[f"spatial_chain({n})" for n in (4, 6, 7, 12)], "turbine_tree"]
-    with pytest.raises(SymdynError, match=r"no benchmark model crane; there are n_link_pendulum\(5\)"):
+    found, loop = cases(["spatial_chain", "turbine_tree"])
+    assert list(found) == [*[f"spatial_chain({n})" for n in (4, 6, 7, 12)], "turbine_tree"] and not loop
+    assert cases(["four_bar"]) == ({}, True) and cases(None) == (CASES, True)
+    with pytest.raises(SymdynError, match=r"no benchmark model crane; there are n_link_pendulum\(5\).*, four_bar"):
         cases(["crane"])
 
 

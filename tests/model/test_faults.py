@@ -254,9 +254,10 @@ SPATIAL: dict[str, Case] = {
     "state is a coordinate": (lambda s: s.add_state(q1, 1), "q1 is a coordinate and a state at once"),
     "state rate text": (lambda s: s.add_state(q9, "1"), "rate of state q9 is the text '1'"),
     "constraint": (lambda s: s.add_constraint(q1 - q2),
-                   "the model has 1 constraints or closed loops|takes trees only|remove them"),
-    "constraint text": (lambda s: s.add_constraint("q1 - q2"), "constraint 1 is the text 'q1 - q2'"),
-    "loop": (lambda s: s.close_loop(sd.Revolute("close", "lower", s.ground, q9)), "1 constraints or closed loops|remove them"),
+                   "the model has a constraint or closed loop|the embedding form takes trees only|use system.augmented()"),
+    "constraint text": (lambda s: s.add_constraint("q1 - q2"), "constraint_1 is the text 'q1 - q2'|never evaluated"),
+    "loop": (lambda s: s.close_loop(sd.Revolute("close", "lower", s.ground, q9)),
+             "a constraint or closed loop|use system.augmented()"),
     "loop no joint": (lambda s: s.close_loop("elbow"), "close_loop was given 'elbow'|sd.Revolute"),
     "loop to nobody": (lambda s: s.close_loop(sd.Fixed("close", "lower", "wall")), "joint 'close': child is 'wall'"),
     # ground

@@ -40,3 +40,56 @@ def test_long_equations_are_not_written_out_in_notebooks():
     long = sd.systems.get("spatial_chain").embedding()._repr_latex_()
     assert r"\ddot" in short
     assert "operations" in long and len(long) < 300
+
+
+# -- with constraints
+
+
+def augmented_report(system: sd.System, **options) -> str:
+    return str(system.augmented(**options).compile(backend="numpy").report())
+
+
+def row_of(text: str, name: str) -> list[str]:
+    return next(line for line in text.splitlines() if line.startswith(f"  {name:20}"))[22:].split()
+
+
+def test_both_ways_to_the_accelerations_are_counted():
+    text = augmented_report(sd.systems.get("four_bar"))
+    equations = sd.systems.get("four_bar").augmented()
+    assert int(row_of(text, "rhs")[0]) == function_tape(equations, "rhs").operations
+    assert int(row_of(text, "rhs, algorithm")[0]) == function_tape(equations.otherwise, "rhs").operations
+    assert "accelerations by " in text and "the numeric algorithm, which takes over where a pivot vanishes" in text
+    assert "2 constraints" in text and all(row_of(text, name) for name in ("C", "C_r", "F_d", "lam", "reactions"))
+
+
+def test_dependent_and_trivial_rows_are_told():
+    assert "they depend on the others at every state tried" in augmented_report(sd.systems.get("bricard"))
+    q = sd.coordinates("q1:4")
+    system, parent, at = sd.System("parallel", gravity=[0, 0, -9.81]), None, [0, 0, 0]
+    for k, length in enumerate((1, 2, 2)):
+        bar = system.add_body(f"bar{k}", mass=1, inertia=[1, 1, 1], com=[length / 2, 0, 0])
+        system.add_joint(sd.Revolute(f"hinge{k}", parent or system.ground, bar, q[k], axis=[0, 0, 1], parent_point=at))
+        parent, at = bar, [length, 0, 0]
+    system.close_loop(sd.Revolute("close", system.ground, parent, axis=[0, 0, 1], parent_point=[2, 0, 0], child_point=at))
+    system.initial = {q[0]: 1.25, q[1]: -0.7, q[2]: -2.13}
+    assert "close_z, close_tilt_1, close_tilt_2: they hold by structure" in augmented_report(system)
+
+
+def test_nothing_is_claimed_of_the_mass_matrix_that_constraints_change():
+    x, y, z = sd.coordinates("x y z")
+    m, g, h = sd.parameters("m g h")
+    eq = sd.augmented([x, y, z], [m, m, m], [0, -m * g, 0], [x - y, y - 2 * z], name="slide")
+    text = str(eq.compile(backend="numpy").report())
+    assert "do not act on each other" not in text and "C_r: constant" in text and "F_d: zero by structure" in text
+    assert "C_t: zero by structure" in text
+    held = str(sd.augmented([x, y, z], [m, m, 0], [0, -m * g, h], [x - y, z - y]).compile(backend="numpy").report())
+    assert "left out of its factors" not in held and "factorized once" not in held
+
+
+def test_multipliers_are_left_out_where_accelerations_do_without():
+    told = "multipliers: accelerations do without them"
+    for name in ("four_bar", "particle_on_moving_slope"):
+        equations = sd.systems.get(name).augmented()
+        steps = set(equations.tape("rhs").steps)
+        needed = any(e in steps for e in equations.quantity("lam"))
+        assert (told in str(equations.compile(backend="numpy").report())) == (not needed)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.bench.loop_cases import REFERENCE
 from symdyn.runtime.compiler import find_compiler
 
-REFERENCE = json.loads((Path(__file__).parent / "loops_reference.json").read_text())
 VARIANTS = [*[(name, {}) for name in sd.systems.names(constrained=True)], ("n_four_bar", {"n": 1}),
             ("particle_on_moving_slope", {"rocking": True}), ("flyball_governor", {"links": "rods"})]
 

@@ -23,6 +23,12 @@ for system in (sd.systems.get("double_pendulum"), sd.systems.get("spatial_chain"
         for name, text in emit(equations, backend).files.items():
             print("=====", system.name, backend, name)
             print(text)
+for name in ("four_bar", "bricard", "rolling_disc"):
+    equations = sd.systems.get(name).augmented()
+    for backend in ("c", "numpy"):
+        for file, text in emit(equations, backend, ["rhs", "lam"], standalone=False).files.items():
+            print("=====", name, backend, file)
+            print(text)
 print(sd.systems.get("double_pendulum").embedding().explicit("M_tilde", simplify=False))
 """
 
@@ -45,7 +51,7 @@ def test_same_text_for_every_hash_seed(texts: list[str]) -> None:
 
 
 def test_both_backends_were_emitted(texts: list[str]) -> None:
-    for system in ("double_pendulum", "spatial_chain_3", "kitchen_sink"):
+    for system in ("double_pendulum", "spatial_chain_3", "kitchen_sink", "four_bar", "bricard"):
         for ending in (".c", ".py"):
             assert any(line.startswith(f"===== {system}") and line.endswith(ending) for line in texts[0].splitlines())
 

@@ -264,4 +264,4 @@ def test_names_and_sections(r: Recorder, xyz: list[Node]) -> None:
 
 def test_repr_tells_the_operation(r: Recorder, xyz: list[Node]) -> None:
     product = r.name("p", xyz[0] * xyz[1])
-    assert repr(product) == "<p: mul(<x>, <y>)>"
+    assert repr(product) == "<p: mul(x, y)>"

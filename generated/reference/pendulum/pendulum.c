@@ -804,7 +804,6 @@ static void pendulum_dop853_attempt(pendulum_dop853 *run, const pendulum_problem
     run->unstored = 1;
     if (run->t == run->t_end)
         run->status = pendulum_DOP853_DONE;
-    /* Here is the place for what follows an accepted step: projecting x (and xd anew), events. */
 }
 
 /* ---- Runs -------------------------------------------------------------------------------- */

@@ -28,6 +28,8 @@ CASADI_SYMBOL_EXPORT void loop(long n, long fed, double *q, const double *u, con
     double *res[{sz_res}] = {{out}}, w[{sz_w}];
     casadi_int iw[{sz_iw}];
     const double start = q[fed];
+    // CasADi's code asks whether an argument is there, wherever it takes an entry; here the compiler knows.
+    if (!q || !u || !p || !c || !out) return;
     for (long i = 0; i < n; i++) {{
         accelerations(arg, res, iw, w, 0);
         q[fed] = start + 1e-9 * out[{last}];
@@ -88,8 +90,9 @@ def casadi_contestant(casadi: Any, compiler: Compiler, form: Form, state: State,
         generator.add(function)
     n_u = len(u_order)
     sizes = {f"sz_{what}": max(4, *[getattr(f, f"sz_{what}")() for f in functions]) for what in ("arg", "res", "iw", "w")}
-    text = generator.dump() + _LOOP.format(**sizes, last=n_u - 1,
-                                           prologue="prologue(arg, res, iw, w, 0);" if form.prologue else "")
+    evaluation = "int accelerations("
+    text = generator.dump().replace(f"CASADI_SYMBOL_EXPORT {evaluation}", f"static {evaluation}") + _LOOP.format(
+        **sizes, last=n_u - 1, prologue="prologue(arg, res, iw, w, 0);" if form.prologue else "")
     library = cache.load(text, "casadi_peer", compiler)
     c = np.zeros(max(1, form.prologue.numel_out(0) if form.prologue else 1))
     library.prepare(address(p), address(c))

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from symdyn.bench.peers import arm
 from symdyn.bench.peers.casadi_peer import CasadiPeer
-from symdyn.bench.peers.contest import cases, contest, fastest
-from symdyn.bench.peers.pinocchio_peer import PinocchioPeer
+from symdyn.bench.peers.contest import contest, fastest
+from symdyn.bench.peers.four_bar import four_bar_contest
+from symdyn.bench.peers.kane_peer import KanePeer
+from symdyn.bench.peers.kkt_peer import KktPeer
+from symdyn.bench.peers.loop_table import LEGEND as LOOP_LEGEND
+from symdyn.bench.peers.loop_table import loop_lines, loop_record
+from symdyn.bench.peers.models import Case, cases
+from symdyn.bench.peers.pinocchio_peer import PinocchioLoopPeer, PinocchioPeer
 from symdyn.bench.peers.table import LEGEND, heading, line, record
 from symdyn.bench.peers.toolchain import version
 from symdyn.errors import MissingExtra, SymdynError
@@ -20,13 +26,24 @@ from symdyn.model.system import System
 from symdyn.runtime.compiler import require_compiler
 
 Peer = CasadiPeer | PinocchioPeer
+LoopPeer = KktPeer | KanePeer | PinocchioLoopPeer
+Made = TypeVar("Made")
 
 
 def find_peers() -> tuple[list[Peer], list[str]]:
     """The peers that can be measured here, and one sentence for each of the others: what is missing, and what to do."""
-    found: list[Peer] = []
+    return _found((("CasADi", CasadiPeer), ("Pinocchio", PinocchioPeer)))
+
+
+def find_loop_peers() -> tuple[list[LoopPeer], list[str]]:
+    """The same for a mechanism with a closed loop. SymPy is always there."""
+    return _found((("CasADi", KktPeer), ("SymPy's Kane's method", KanePeer), ("Pinocchio", PinocchioLoopPeer)))
+
+
+def _found(kinds: Sequence[tuple[str, Callable[[], Made]]]) -> tuple[list[Made], list[str]]:
+    found: list[Made] = []
     faults: dict[str, SymdynError] = {}
-    for name, make in (("CasADi", CasadiPeer), ("Pinocchio", PinocchioPeer)):
+    for name, make in kinds:
         try:
             found.append(make())
         except SymdynError as error:
@@ -51,24 +68,47 @@ def run(names: Sequence[str] | None = None, repeats: int = 40, to_json: Path | N
     to_json          file for everything that was measured
     make_equations   symdyn's equations of a System
     """
-    chosen = cases(names)
+    chosen, loop = cases(names)
     if repeats < 1:
         raise SymdynError(f"{repeats} repeats were asked for; pass 1 or more")
     compiler = require_compiler()
-    peers, notes = find_peers()
-    for note in notes:
-        print(note)
-    print(heading(), flush=True)
-    rows = []
-    for name, case in chosen.items():
-        rows.append(contest(name, case, peers, repeats, make_equations))
-        print(line(rows[-1]), flush=True)
-    print(LEGEND)
-    print(arm.line())
+    result: dict[str, Any] = {
+        "machine": platform.machine(), "compiler": compiler.version, "repeats": repeats, "notes": [],
+        "versions": {name: version(name) for name in ("symdyn", "pin", "casadi", "sympy")}, "models": [], "loops": []}
+    if chosen:
+        _trees(chosen, repeats, make_equations, result)
+    if loop:
+        _loop(repeats, make_equations, result)
     if to_json is not None:
-        result: dict[str, Any] = {
-            "machine": platform.machine(), "compiler": compiler.version, "repeats": repeats, "notes": notes,
-            "versions": {name: version(name) for name in ("symdyn", "pin", "casadi")}, "models": [record(row) for row in rows]}
         to_json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         print(f"wrote {to_json}")
-    return sum(bool(row.misses()) for row in rows) + bool(arm.misses())
+    return sum(bool(row["missed"]) for row in (*result["models"], *result["loops"])) + bool(chosen and arm.misses())
+
+
+def _trees(chosen: Mapping[str, Case], repeats: int, make_equations: Callable[[System], Equations],
+           result: dict[str, Any]) -> None:
+    """Measure mechanisms without loops, print a line of each, and add their records to the result."""
+    peers, notes = find_peers()
+    _noted(notes, result)
+    print(heading(), flush=True)
+    for name, case in chosen.items():
+        row = contest(name, case, peers, repeats, make_equations)
+        print(line(row), flush=True)
+        result["models"].append(record(row))
+    print(LEGEND)
+    print(arm.line())
+
+
+def _loop(repeats: int, make_equations: Callable[[System], Equations], result: dict[str, Any]) -> None:
+    """The same for the mechanism with a closed loop."""
+    peers, notes = find_loop_peers()
+    _noted(notes, result)
+    row = four_bar_contest(peers, repeats, make_equations)
+    print("\n".join([*loop_lines(row), LOOP_LEGEND]))
+    result["loops"].append(loop_record(row))
+
+
+def _noted(notes: Sequence[str], result: dict[str, Any]) -> None:
+    result["notes"] += notes
+    for note in notes:
+        print(note)

@@ -10,11 +10,10 @@ import numpy as np
 from symdyn.bench.peers.casadi_peer import CasadiPeer
 from symdyn.bench.peers.contestant import State
 from symdyn.bench.peers.description import describe
-from symdyn.bench.peers.models import CASES, Bound, Case
+from symdyn.bench.peers.models import Bound, Case
 from symdyn.bench.peers.pinocchio_peer import PinocchioPeer
 from symdyn.bench.peers.race import agree, race
 from symdyn.bench.peers.symdyn_peer import symdyn_contestant
-from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.pipeline import function_tape
@@ -110,16 +109,3 @@ def random_state(equations: Equations) -> State:
     used = {leaf.args[1] for leaf in accelerations.inputs}
     fed = next((k for k, s in enumerate(symbols.coordinates) if s.name in used), 0)
     return State(q, u, fed)
-
-
-def cases(names: Sequence[str] | None) -> dict[str, Case]:
-    """The named mechanisms, all by default; `spatial_chain` stands for those of every length.
-
-    Raises SymdynError for a name that there is not.
-    """
-    if not names:
-        return CASES
-    unknown = [n for n in names if not any(n in (c, c.partition("(")[0]) for c in CASES)]
-    if unknown:
-        raise SymdynError(f"there is no benchmark model {', '.join(unknown)}; there are {', '.join(CASES)}")
-    return {c: case for c, case in CASES.items() if c in names or c.partition("(")[0] in names}

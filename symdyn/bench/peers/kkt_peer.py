@@ -17,8 +17,6 @@ PARAMETERS = tuple("g m1 lc1 I1 m2 lc2 I2 m3 lc3 I3 l1 l2 l3 d".split())
 class KktPeer:
     """The generator. Raises MissingExtra or CompilerNotFound, whose messages tell what to install."""
 
-    name = "CasADi"
-
     def __init__(self) -> None:
         package_folder("casadi")
         self.compiler = c_compiler()
@@ -27,10 +25,10 @@ class KktPeer:
         self.casadi = casadi
 
     def forms(self) -> list[Form]:
-        """Every way in which CasADi solves with symbols that does not exchange rows; the last is the one with the fewest
-        operations, and what depends on parameters alone computed before.
+        """The ways in which CasADi solves with symbols; the last is the one with the fewest operations again, with what
+        depends on parameters alone computed before.
 
-        Not among them is minimum degree ordering for LDL^T: it may put a multiplier first, whose pivot is 0.
+        LDL^T takes the speeds before the multipliers: in CasADi's order of minimum degree a pivot is 0.
         """
         ca = self.casadi
         q, u, p = (ca.SX.sym(name, n) for name, n in (("q", 3), ("u", 3), ("p", len(PARAMETERS))))

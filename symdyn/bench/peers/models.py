@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from symdyn.errors import SymdynError
 from symdyn.model.joints import Free, Revolute
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.symbols import coordinates, parameters
@@ -89,3 +90,19 @@ CASES: dict[str, Case] = {
     "turbine_tree": Case(turbine_tree, Bound(950, 0.80)),
     "turbine_tree_body_rates": Case(lambda: turbine_tree(body_rates=True)),
 }
+# The mechanism with a closed loop; see symdyn.bench.peers.four_bar.
+LOOP = "four_bar"
+
+
+def cases(names: Sequence[str] | None) -> tuple[dict[str, Case], bool]:
+    """The named mechanisms, all by default, and whether LOOP is one; `spatial_chain` stands for those of every length.
+
+    Raises SymdynError for a name that there is not.
+    """
+    there = [*CASES, LOOP]
+    if not names:
+        return CASES, True
+    unknown = [n for n in names if not any(n in (c, c.partition("(")[0]) for c in there)]
+    if unknown:
+        raise SymdynError(f"there is no benchmark model {', '.join(unknown)}; there are {', '.join(there)}")
+    return {c: case for c, case in CASES.items() if c in names or c.partition("(")[0] in names}, LOOP in names

@@ -44,8 +44,6 @@ class PinocchioPeer:
 class PinocchioLoopPeer:
     """The compiled constrained dynamics, for one loop closed at a point of the ground. Raises as PinocchioPeer does."""
 
-    name = "Pinocchio"
-
     def __init__(self) -> None:
         package_folder("pinocchio")
         text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_loop.cpp"))

@@ -51,6 +51,8 @@ class Joint:
     # Whether R = 1 and d = 0 where every coordinate is zero, and a single rotation about a coordinate axis turns by its
     # coordinate times its entry of S.
     identity_at_zero = True
+    # Whether the derivation has made it, so that the user knows nothing of it.
+    inner = False
 
     def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None, speeds: Sequence[Any] | None,
                  parent_point: Any, child_point: Any, parent_rotation: Any, child_rotation: Any) -> None:

@@ -1,8 +1,8 @@
 """Pictures of a motion: curves over time, and the moving bodies. No display is needed; pyplot's state is not touched.
 
-Bodies are drawn as lines: from the point they share with the body that carries them, over their frame's origin, to
-the points that carry others or are outputs. These points are found in the motion itself, so that every mechanism can
-be drawn whose module gives frames or centres of mass.
+Bodies are drawn as lines through the points of their joints and those that are outputs. Where a module does not give the
+joints, a tree of them is found in the motion itself, so that every mechanism can be drawn whose module gives frames or
+centres of mass.
 """
 
 from __future__ import annotations

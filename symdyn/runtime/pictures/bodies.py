@@ -53,23 +53,25 @@ def draw_path(figure: Figure, place: Any, drawing: Drawing) -> None:
 
 
 def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
-    """Empty curves for rails, arms, bodies and centres of mass, in the order of `_points`."""
+    """Empty curves for rails, arms, rods, bodies, sliders and centres of mass, in the order of `points_at`."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
     colors = colors_of(len(drawing.lines))
     if len(drawing.pivots):
         axes.plot(*drawing.pivots.T, linestyle="", marker="^", color="0.3", markersize=9, zorder=4)
     style = {"alpha": alpha, "solid_capstyle": "round", "solid_joinstyle": "round"}
     width = 4.0 if len(drawing.lines) <= MANY else 2.0
-    shapes = [{"marker": "s", "markersize": 3.5 * width} if k in drawing.sliders else {"marker": "o", "markersize": width}
-              for k in range(len(drawing.lines))]
     return [axes.plot(*empty, color="0.6", linestyle=":", linewidth=1.2, alpha=alpha)[0],
             axes.plot(*empty, color="0.4", linewidth=1.0, alpha=alpha)[0],
-            *[axes.plot(*empty, color=c, linewidth=width, **shape, **style)[0] for c, shape in zip(colors, shapes)],
+            axes.plot(*empty, color="0.4", linewidth=0.6 * width, marker="o", markersize=0.8 * width, **style)[0],
+            *[axes.plot(*empty, color=c, linewidth=width, marker="o", markersize=width, **style)[0] for c in colors],
+            *[axes.plot(*empty, color=colors[k], linestyle="", marker="s", markersize=3.5 * width, alpha=alpha)[0]
+              for k in drawing.sliders],
             axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0]]
 
 
 def points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
-    return [points[index] for points in (drawing.rails, drawing.arms, *drawing.lines, drawing.centres)]
+    slides = [drawing.lines[k][:, places] for k, places in drawing.sliders.items()]
+    return [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides, drawing.centres)]
 
 
 def move(artist: Any, points: np.ndarray) -> None:

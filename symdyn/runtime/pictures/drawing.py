@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.runtime.pictures.jointed import carriers, jointed_skeleton, placed_joints
 from symdyn.runtime.pictures.points import points_of
-from symdyn.runtime.pictures.skeleton import bare_skeleton, make_skeleton
+from symdyn.runtime.pictures.skeleton import Skeleton, bare_skeleton, guess_skeleton
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -22,17 +23,19 @@ class Drawing:
     """A mechanism as lines over time, in the axes that are shown.
 
     lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted
-    arms       from each body's origin to its centre of mass, joined in one line; rails: from slider to slider
+    arms       from each body's first point to its centre of mass, joined in one line; rails: from slider to slider;
+               rods: massless ones between two bodies
     centres    centres of mass (n_t, n_b, 2 or 3); pivots: points that hold the mechanism to the ground, (n, 2 or 3)
-    sliders    the bodies that slide; labels: of the axes
+    sliders    the bodies that slide, and which points of their lines do; labels: of the axes
     """
 
     lines: list[np.ndarray]
     arms: np.ndarray
     rails: np.ndarray
+    rods: np.ndarray
     centres: np.ndarray
     pivots: np.ndarray
-    sliders: Sequence[int]
+    sliders: Mapping[int, Sequence[int]]
     labels: Sequence[str]
 
     @property
@@ -42,18 +45,13 @@ class Drawing:
     @classmethod
     def of(cls, solution: Solution) -> Drawing | None:
         """What can be drawn of a motion; None if the module gives no positions, or nothing moves."""
-        functions, n_t = solution.module.functions, len(solution.t)
-        if "positions" not in functions:
+        if "positions" not in solution.module.functions:
             return None
-        centres = solution.module.evaluate("positions", solution.t, solution.x, solution.params, solution.inputs)
-        centres = centres.reshape(n_t, -1, 3)
+        centres = solution.rows("positions").reshape(len(solution.t), -1, 3)
         if not centres.shape[1] or not np.isfinite(centres).all():
             return None
-        if "frames" in functions:
-            frames = solution.frames.reshape(n_t, -1, 12)
-            skeleton = make_skeleton(frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3), centres, _ends(solution))
-        else:
-            skeleton = bare_skeleton(centres)
+        skeleton, kept = _skeleton(solution, centres)
+        centres = centres[:, kept]
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
                                      skeleton.pivots])
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
@@ -62,8 +60,9 @@ class Drawing:
             return None
         if len(shown) == 1:
             shown = sorted({*shown, 1 if shown[0] != 1 else 0})
-        return cls([line[..., shown] for line in skeleton.lines], skeleton.arms[..., shown], skeleton.rails[..., shown],
-                   centres[..., shown], skeleton.pivots[..., shown], skeleton.sliders, ["xyz"[k] for k in shown])
+        arms, rails, rods, centres, pivots, *lines = [points[..., shown] for points in (
+            skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, *skeleton.lines)]
+        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown])
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""
@@ -71,9 +70,9 @@ class Drawing:
         right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
         a, b = order[right - 1], order[right]
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
-        arms, rails, centres, *lines = [points[a] * (1 - w) + points[b] * w
-                                        for points in (self.arms, self.rails, self.centres, *self.lines)]
-        return Drawing(lines, arms, rails, centres, self.pivots, self.sliders, self.labels)
+        arms, rails, rods, centres, *lines = [points[a] * (1 - w) + points[b] * w for points in
+                                              (self.arms, self.rails, self.rods, self.centres, *self.lines)]
+        return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""
@@ -85,11 +84,25 @@ class Drawing:
         return np.column_stack([(low + high) / 2 - half, (low + high) / 2 + half])
 
 
-def _ends(solution: Solution) -> list[tuple[int, np.ndarray]]:
-    """Outputs that are positions on bodies: body, (n_t, 3)."""
+def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[int]]:
+    """Lines of the bodies, and which bodies these are: all but massless carriers."""
+    module, n_t = solution.module, len(solution.t)
+    kept = list(range(centres.shape[1]))
+    if "frames" not in module.functions:
+        return bare_skeleton(centres), kept
+    frames = solution.frames.reshape(n_t, -1, 12)
+    if "joint_points" not in module.functions:
+        return guess_skeleton(frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3), centres, _ends(solution, kept)), kept
+    kept = [k for k in kept if k not in carriers(module.metadata)]
+    joints = placed_joints(module.metadata, kept, solution.rows("joint_points").reshape(n_t, -1, 6))
+    return jointed_skeleton(joints, frames[:, kept, :3], centres[:, kept], _ends(solution, kept)), kept
+
+
+def _ends(solution: Solution, bodies: Sequence[int]) -> list[tuple[int, np.ndarray]]:
+    """Outputs that are positions on bodies: place among these, (n_t, 3)."""
     found = []
     for name, point in points_of(solution).items():
-        if point.quantity == "position":
+        if point.quantity == "position" and point.body in bodies:
             given = solution.outputs[name]
-            found.append((point.body, np.pad(given, ((0, 0), (0, 3 - given.shape[1])))))
+            found.append((bodies.index(point.body), np.pad(given, ((0, 0), (0, 3 - given.shape[1])))))
     return found

@@ -1,0 +1,205 @@
+"""Motions at more digits than floats have, from the same tape as the generated code: yardsticks for `symdyn bench loops`.
+
+`python -m symdyn.bench.extended andrews_squeezer` makes the end of a motion anew, at two tolerances, and stores the digits in
+extended.json beside this module.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mpmath
+
+from symdyn.bench.extrapolation import integrate
+from symdyn.bench.loop_cases import CASES
+from symdyn.bench.precise import Lost, decimal, program
+from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
+from symdyn.systems import get
+
+STORE = Path(__file__).with_name("extended.json")
+# Decimal digits of a stored motion's local errors; the second run that shows convergence has four more.
+DIGITS = 26
+# Computed with this many more digits than the local errors have.
+SPARE = 12
+_ROUNDS = 8
+HOW = ("Gragg-Bulirsch-Stoer extrapolation of the accelerations on the tape with mpmath, projected onto the constraints after "
+       "every step; parameters and start are the catalogue's decimal numbers, the start projected; made by "
+       "python -m symdyn.bench.extended")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The end of a motion: numbers of an mpmath context, in SI units.
+
+    q, u, u_dot   coordinates, speeds, accelerations; lam: multipliers, (n_c,)
+    n_steps, n_evaluations   what it took; digits: of the tolerance
+    """
+
+    t: Any
+    q: list[Any]
+    u: list[Any]
+    u_dot: list[Any]
+    lam: list[Any]
+    digits: int
+    n_steps: int
+    n_evaluations: int
+
+
+class Precise:
+    """The equations of a mechanism with numbers of `digits` decimal digits: parameters and start as decimals."""
+
+    def __init__(self, equations: Equations, digits: int) -> None:
+        self.equations, self.digits = equations, digits
+        self.context = mpmath.mp.clone()
+        self.context.dps = digits
+        symbols = equations.symbols
+        names = lambda group: [s.name for s in group]
+        initial = {str(key): value for key, value in symbols.initial.items()}
+        defaults = {str(key): value for key, value in symbols.defaults.items()}
+        self.leaves = ["t", *names(symbols.coordinates), *names(symbols.speeds), *names(symbols.states)]
+        self.n_q, self.n_u = len(symbols.coordinates), len(symbols.speeds)
+        self.fixed = {name: decimal(self.context, (defaults | initial).get(name, 0.0))
+                      for name in (*names(symbols.parameters), *names(symbols.inputs))}
+        self.start = [decimal(self.context, initial.get(name, 0.0)) for name in self.leaves[1:]]
+        self.n_c = len(equations.constraints)
+        self._programs: dict[str, Callable[[Sequence[Any]], list[Any]]] = {}
+
+    def __call__(self, name: str, t: Any, x: Sequence[Any]) -> list[Any]:
+        """A quantity at a state, its entries one after the other; where its divisors vanish the equations for that case."""
+        return self._program(name)([t, *x])
+
+    def _program(self, name: str) -> Callable[[Sequence[Any]], list[Any]]:
+        if name not in self._programs:
+            usual = self._made(self.equations, name)
+            self._programs[name] = usual
+            if self.equations.otherwise is not None:
+                known: list[Callable[[Sequence[Any]], list[Any]]] = []
+
+                def either(x: Sequence[Any]) -> list[Any]:
+                    try:
+                        return usual(x)
+                    except Lost:
+                        if not known:
+                            known.append(self._made(self.equations.otherwise, name))
+                        return known[0](x)
+
+                self._programs[name] = either
+        return self._programs[name]
+
+    def _made(self, equations: Any, name: str) -> Callable[[Sequence[Any]], list[Any]]:
+        return program(equations.tape(name), self.context, self.fixed, self.leaves)
+
+    def projected(self, t: Any, x: list[Any]) -> list[Any]:
+        """The state on the constraints to all digits but a few, by the smallest change in the metric of the mass matrix.
+
+        Raises SymdynError if there is no way back.
+        """
+        if not self.n_c:
+            return x
+        x = list(x)
+        for name, part in (("position_correction", slice(0, self.n_q)),
+                           ("velocity_correction", slice(self.n_q, self.n_q + self.n_u))):
+            before = self.context.inf
+            for _ in range(_ROUNDS):
+                row = self(name, t, x)
+                left = max(abs(e) for e in row[:self.n_c])
+                enough = self.context.mpf(10) ** (4 - self.digits) * max([1, *[abs(e) for e in x[part]]])
+                if left <= enough or left >= before:
+                    break
+                before = left
+                x[part] = [a + b for a, b in zip(x[part], row[self.n_c:], strict=True)]
+            if left > 1e6 * enough:
+                raise SymdynError(f"{self.equations.name}: constraints stay violated by {self.context.nstr(left, 3)} at t = "
+                                  f"{self.context.nstr(t, 10)}")
+        return x
+
+
+def motion(equations: Equations, end: Any, digits: int = DIGITS) -> Motion:
+    """The motion from the catalogue's start at t = 0 until `end` (s), local errors of 10^-digits."""
+    precise = Precise(equations, digits + SPARE)
+    context = precise.context
+    zero, last = context.mpf(0), decimal(context, end)
+    n_q, n_u = precise.n_q, precise.n_u
+    run = integrate(lambda t, x: precise("rhs", t, x), (zero, last), precise.projected(zero, precise.start),
+                    context.mpf(10) ** -digits, [slice(0, n_q), slice(n_q, n_q + n_u), slice(n_q + n_u, None)], context,
+                    precise.projected)
+    lam = precise("lam", last, run.x) if precise.n_c else []
+    return Motion(last, run.x[:n_q], run.x[n_q:n_q + n_u], precise("rhs", last, run.x)[n_q:n_q + n_u], lam, digits, run.n_steps,
+                  run.n_evaluations)
+
+
+def agreement(a: Motion, b: Motion) -> float:
+    """The largest difference of q, u, u_dot, lam, relative, entry by entry; entries below 1e-6 of the largest count as that."""
+    worst = 0.0
+    for name in ("q", "u", "u_dot", "lam"):
+        ours, others = getattr(a, name), getattr(b, name)
+        least = max((abs(e) for e in others), default=0) / 10**6 or 1
+        worst = max(worst, *[float(abs(e - f) / max(abs(f), least)) for e, f in zip(ours, others, strict=True)], 0.0)
+    return worst
+
+
+def record(equations: Equations, end: Any, digits: int = DIGITS) -> dict[str, Any]:
+    """What is stored of a motion: the digits in which runs at two tolerances agree, and what they took."""
+    coarse, fine = motion(equations, end, digits), motion(equations, end, digits + 4)
+    differ = agreement(coarse, fine)
+    kept = min(digits, int(-mpmath.log10(max(differ, 1e-50))))
+    text = {"q": fine.q, "q_dot": fine.u, "q_ddot": fine.u_dot, "lambda": fine.lam}
+    return {"source": HOW, "t": float(end), "digits": kept, "tolerances": [f"1e-{digits}", f"1e-{digits + 4}"],
+            "runs_differ_by": float(f"{differ:.2g}"), "steps": [coarse.n_steps, fine.n_steps],
+            "evaluations": [coarse.n_evaluations, fine.n_evaluations],
+            **{name: [mpmath.nstr(e, kept, min_fixed=-5, max_fixed=30, strip_zeros=False) for e in values]
+               for name, values in text.items()}}
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """Every stored motion, by the name of its system."""
+    return json.loads(STORE.read_text(encoding="utf-8")) if STORE.exists() else {}  # type: ignore[no-any-return]
+
+
+def known(name: str) -> Mapping[str, Any] | None:
+    """The stored end of a system's motion, numbers as text; None if there is none."""
+    return stored().get(name)
+
+
+def store(name: str, made: Mapping[str, Any]) -> None:
+    """Put a motion into the file."""
+    everything = dict(sorted({**stored(), name: dict(made)}.items()))
+    text = json.dumps(everything, indent=1)
+    text = re.sub(r"\[\s+((?:[^\[\]{}]+?))\s+\]", lambda m: "[" + re.sub(r",\s+", ", ", m[1]) + "]", text)
+    STORE.write_text(text + "\n", encoding="utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.extended", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("systems", metavar="NAME", nargs="+",
+                        help="of the catalogue, or a variant such as 'flyball_governor(rods)'")
+    parser.add_argument("--t", metavar="END", type=float, help="s (default: the system's duration, which is the published one)")
+    parser.add_argument("--digits", type=int, default=DIGITS, help=f"of the local errors (default: {DIGITS})")
+    parser.add_argument("--print", action="store_true", help="print only, store nothing")
+    given = parser.parse_args(arguments)
+    for name in given.systems:
+        begun = clock.perf_counter()
+        system = CASES[name].system() if name in CASES else get(name)
+        made = record(system.equations(), given.t or system.duration, given.digits)
+        print(f"{name} at t = {made['t']:g} s: {made['digits']} digits, runs of tolerance {' and '.join(made['tolerances'])} "
+              f"differ by {made['runs_differ_by']:.2g}; {made['steps']} steps, {made['evaluations']} evaluations, "
+              f"{clock.perf_counter() - begun:.0f} s")
+        for what in ("q", "q_dot", "q_ddot", "lambda"):
+            print(f"  {what}: {', '.join(made[what])}")
+        if not given.print:
+            store(name, made)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
