@@ -12,11 +12,11 @@ import numpy as np
 from symdyn.diagnosis.mobility import Mobility, mobility
 from symdyn.diagnosis.paths import LOST, NEAR, STEP, Near, Scaled, follow
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState
-from symdyn.errors import ModelError, SymdynError
+from symdyn.errors import ArgumentError, ModelError, SymdynError
 from symdyn.formulation.consistent_states import ConstraintStates
 from symdyn.formulation.dependent_rows import ranks
 from symdyn.model.loop_check import CARRIER
-from symdyn.runtime.arguments import some, take
+from symdyn.runtime.arguments import number, some, take
 from symdyn.tape.floats import evaluate_rows
 
 if TYPE_CHECKING:
@@ -49,6 +49,10 @@ def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, 
 
     if coordinates not in COORDINATES:
         raise SymdynError(f"coordinates {coordinates!r} asked for; there are {' and '.join(map(repr, COORDINATES))}")
+    t = number(t, "a finite number of seconds as t", system.name)
+    asked, reach = reach, number(reach, f"an angle from 0 on as reach, rad (default: {REACH:.4g})", system.name)
+    if reach < 0:
+        raise ArgumentError(f"{system.name}: pass an angle from 0 on as reach, rad (default: {REACH:.4g}), found {asked!r}")
     model = system.check()
     if coordinates == "absolute":
         rewritten = in_absolute_coordinates(model)
@@ -64,7 +68,7 @@ def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, 
     names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
     equations = tree_result(quantities, "augmented", AugmentedEquations, lambda: equations, **names)
     faults = tuple(contradictions(equations)) if gathered.rows else ()
-    return _Examination(model, quantities, equations, q, params, float(t), reach).diagnosis(faults)
+    return _Examination(model, quantities, equations, q, params, t, reach).diagnosis(faults)
 
 
 @dataclass(frozen=True)

@@ -36,9 +36,15 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
     moving: list[tuple[Joint, int, int]] = []
     closing: list[Joint | Gear] = []
     bodies: list[Body] = list(model.bodies)
+    # A screw or custom joint that closes a loop carries a massless body already.
+    carriers = {getattr(c.parent, "name", c.parent) for c in model.loops if isinstance(c, Joint) and c.inner}
+    carried_already: set[int] = set()
     for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True):
         if parent == -1 and _allows_everything(joint, model.planar):
             free[child] = joint
+        elif model.bodies[child].name in carriers:
+            moving.append((joint, parent, child))
+            carried_already.add(child)
         elif _needs_coordinates(joint, used):
             carrier, carrying, closure = carried(joint)
             closure.name = _new(closure.name, names)
@@ -48,9 +54,9 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
         elif not isinstance(joint, Free):
             closing.append(joint)
     for k, body in enumerate(model.bodies):
-        if k not in free:
+        if k not in free and k not in carried_already:
             free[k] = _own_joint(body, model.planar, orientation, taken, names)
-    order = [(free[k], -1, k) for k in range(len(model.bodies))] + moving
+    order = [(free[k], -1, k) for k in range(len(model.bodies)) if k in free] + moving
     joints = tuple(j for j, _, _ in order)
     coordinates = dict.fromkeys(q for j in joints for q in j.coordinates if isinstance(q, Coordinate))
     speeds = dict.fromkeys(u for j in joints for q, u in _pairs(j) if isinstance(q, Coordinate) and u is not None)

@@ -26,6 +26,7 @@ from symdyn.formulation.tree import Tree
 from symdyn.formulation.tree_equations import tree_of, tree_result
 from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.joints import Joint
+from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.record import Model
 from symdyn.spatial.vectors import inner, vector
 from symdyn.tape.differentiate import jacobian
@@ -91,10 +92,24 @@ class ConstrainedTree(Constrained, TreeQuantities):
         return [self.model.units.get(u) == "rad/s" for u in self.model.speeds]
 
 
-def augment(model: Model, coordinates: str = "relative", orientation: Any = None, frames: str = "body") -> AugmentedEquations:
+def _demand_orientation(model: Model, coordinates: str, orientation: Any) -> None:
+    """Raises SymdynError for an orientation that is none, or that nothing takes."""
+    if not isinstance(orientation, (EulerAngles, EulerParameters)):
+        raise SymdynError(f"orientation is {orientation!r}; it tells how bodies turn in absolute coordinates: pass "
+                          "sd.EulerParameters() or sd.EulerAngles('ZYX')")
+    unused = "coordinates are 'relative'" if coordinates != "absolute" else "the system is planar" if model.planar else ""
+    if unused:
+        raise SymdynError(f"orientation {type(orientation).__name__} is given, but {unused}: it tells how bodies turn in absolute "
+                          "coordinates in space; leave it out" +
+                          (", or pass coordinates='absolute'" if coordinates != "absolute" and not model.planar else ""))
+
+
+def augment(model: Model, coordinates: str = "relative", orientation: Any = None, frames: str = "parallel") -> AugmentedEquations:
     """The augmented equations of a checked model; see System.augmented."""
     if coordinates not in COORDINATES:
         raise SymdynError(f"coordinates {coordinates!r} asked for; there are {' and '.join(map(repr, COORDINATES))}")
+    if orientation is not None:
+        _demand_orientation(model, coordinates, orientation)
     again = partial(augment, model, coordinates, orientation, frames)
     if coordinates == "absolute":
         rewritten = in_absolute_coordinates(model, orientation)

@@ -70,23 +70,27 @@ class AugmentedEquations(MotionEquations):
         rows = self.C_r * self.accelerations
         return (*motion, *[sp.Eq(a, b, evaluate=False) for a, b in zip(rows, self.F_d, strict=True)])
 
-    def without_multipliers(self, dependent: Sequence[Any]) -> tuple[sp.Eq, ...]:
+    def without_multipliers(self, dependent: Sequence[Any] | sp.Symbol | str) -> tuple[sp.Eq, ...]:
         """The equations of motion with the multipliers eliminated by the rows of dependent speeds.
 
-        dependent   n_c coordinates or speeds, such that their columns of C_r make a regular matrix
+        dependent   n_c coordinates or speeds, as symbols or names, such that their columns of C_r make a regular matrix; a
+                    single one stands for itself
         With r = M u_dot + k - F = -C_r^T lam: (C_r)_i^T (C_r)_d^-T r_d - r_i = 0, times the determinant of (C_r)_d, and without
         factors that all terms share. Together with C_r u_dot = F_d these are n_u equations. Raises SymdynError for a wrong
         number of speeds or a singular choice.
         """
-        names = [str(getattr(d, "name", d)) for d in dependent]
+        single = isinstance(dependent, (str, sp.Basic)) or not hasattr(dependent, "__iter__")
+        given = [dependent] if single else list(dependent)
+        names = [str(getattr(d, "name", d)) for d in given]
         speeds = self.symbols.speeds
         known = {s.name: k for k, s in enumerate(speeds)}
         known |= {q.name: known[f"{q.name}_dot"] for q in self.symbols.coordinates if f"{q.name}_dot" in known}
         wrong = [n for n in names if n not in known]
         n_c = len(self.constraints)
-        if wrong or len(set(names)) != n_c:
-            raise SymdynError(f"{self.name}: dependent is {', '.join(names) or 'empty'}; pass {n_c} different ones of "
-                              f"{', '.join(known)}")
+        if wrong or len(names) != n_c or len(set(names)) != n_c:
+            listed = f"a list of {n_c} different ones" if n_c > 1 else "one" if n_c else "an empty list: there are no constraints"
+            raise SymdynError(f"{self.name}: dependent is {', '.join(names) or 'empty'}; pass {listed}"
+                              f"{f' of {", ".join(known)}' if n_c else ''}")
         d = [known[n] for n in names]
         i = [k for k in range(len(speeds)) if k not in d]
         C = self.C_r

@@ -7,6 +7,7 @@ Systems, section 6.5 (mass-orthogonal).
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -20,9 +21,14 @@ from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.kernels import DAMPED, SMOOTHED
+from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
 
 BAUMGARTE = "(baumgarte)"
+# Units of rows by the power of lengths in them.
+POWERS = {"rad": 0, "m": 1, "m^2": 2, "m^3": 3}
+# Rows with derivatives smaller than this, lengths by lengths, are left to the numeric algorithm.
+VANISHING = Fraction(1, 1000)
 UNHELD = "a speed is held neither by mass nor by a constraint"
 
 
@@ -83,8 +89,7 @@ class Constrained(Motion):
     def C_scale(self) -> np.ndarray:
         """What makes every row a length, m; rows of unknown unit are divided by their gradient."""
         with self.algebra.section("scale of the constraints"):
-            powers = {"rad": 0, "m": 1, "m^2": 2, "m^3": 3}
-            return vector(*[self.length / self.length ** powers[r.unit] if r.unit in powers else self._by_gradient(r)
+            return vector(*[self.length / self.length ** POWERS[r.unit] if r.unit in POWERS else self._by_gradient(r)
                             for r in self.rows])
 
     def _by_gradient(self, row: Row) -> Any:
@@ -112,12 +117,23 @@ class Constrained(Motion):
                                 smoothed)
         kept = list(range(len(self.rows)) if self.independent is None else self.independent)
         C_r, names = self.C_r()[kept], [self.rows[k].name for k in kept]
+        least = [self._least(k) for k in kept]
         if self.pivots is not None:
             pivots = [(kept.index(row), column) for row, column in self.pivots]
-            solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds)
+            solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds,
+                                                   least)
         else:
-            solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names)
+            solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, least)
         return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))
+
+    def _least(self, k: int) -> Any:
+        """Square of a size of row k so small that it is no constraint any more: positions where it vanishes as a whole."""
+        row = self.rows[k]
+        if row.unit not in POWERS:
+            return 0
+        turning = all(is_zero(e) or turns for e, turns in zip(row.jacobian, self.angular, strict=True))
+        natural = self.length ** POWERS[row.unit] / (1 if turning else self.length)
+        return VANISHING**2 * (natural * natural)
 
     def _columns(self) -> list[Any]:
         return [1 / self.length if turning else 1 for turning in self.angular]
@@ -145,7 +161,9 @@ class Constrained(Motion):
         return np.block([[self.recall("M_tilde"), C_r.T], [C_r, zeros(n_c, n_c)]])
 
     def right_side(self) -> np.ndarray:
-        return np.concatenate([-self.recall("bias"), self.F_d()])
+        """[F_tilde - k_tilde; F_d], to be read."""
+        forces = self.quantities()  # of the formulation that this is mixed into
+        return np.concatenate([forces["F_tilde"]() - forces["k_tilde"](), self.F_d()])
 
     def jacobian(self, by: Any) -> np.ndarray:
         """d x_dot / d by, exact, differentiated implicitly: the matrix is not, only what it multiplies."""

@@ -62,12 +62,12 @@ def augmented(coordinates: Sequence[Any], mass: Any, force: Any, constraints: An
     single = isinstance(constraints, (sp.Expr, int, float))
     rows = [constraints] if single else constraints
     labels = _labels(given, names, len(rows) if hasattr(rows, "__len__") else 0)
-    expressions = [Constraint(label, e) for label, e in zip(labels, given.column(rows, "constraints", labels), strict=False)]
+    expressions, sound = _taken(given, rows, labels)
     speeds = [c.dot for c in q]
     # Inputs in constraints are told by constraint_faults.
     parts = [Part(c.name, [c.expression], speeds=True, inputs=True) for c in expressions]
     parameters, inputs = given.symbols([Part("mass", list(M), moving=False), Part("force", F, speeds=True, inputs=True), *parts])
-    faults += constraint_faults(expressions, [*q, *speeds], (), speeds)
+    faults += constraint_faults(sound, [*q, *speeds], (), speeds)
     numbers = given.numbers(defaults, parameters, "defaults", "parameter")
     start = given.numbers(initial, [*q, *speeds], "initial", "coordinate or speed")
     if faults:
@@ -91,6 +91,20 @@ def _labels(given: ByHand, names: Any, n: int) -> list[str]:
         given.faults.append(f"names has {len(names)} entries, there are {n} constraints; give each a name")
         return [f"constraint_{k + 1}" for k in range(n)]
     return [str(label) for label in names]
+
+
+def _taken(given: ByHand, rows: Any, labels: Sequence[str]) -> tuple[list[Constraint], list[Constraint]]:
+    """The constraints, and those of them that are expressions."""
+    if not isinstance(rows, (list, tuple)):
+        every = [Constraint(label, e) for label, e in zip(labels, given.column(rows, "constraints", labels), strict=False)]
+        return every, every
+    every, sound = [], []
+    for label, row in zip(labels, rows, strict=False):
+        known = len(given.faults)
+        every.append(Constraint(label, given.expression(row, label)))
+        if len(given.faults) == known:
+            sound.append(every[-1])
+    return every, sound
 
 
 @dataclass(frozen=True)

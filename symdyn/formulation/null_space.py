@@ -25,11 +25,16 @@ FEW = 1
 
 
 class NullSpaceSolver:
-    """As statements; pivots: (row, column) of C in the order of elimination; names: of the rows."""
+    """As statements.
+
+    pivots   (row, column) of C in the order of elimination; names: of the rows
+    least    squares of what the rows are compared with where they are small as a whole, (m,); default 0
+    """
 
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],
-                 speeds: Sequence[Any]) -> None:
+                 speeds: Sequence[Any], least: Sequence[Any] = ()) -> None:
         self.algebra, self.M, self.C = algebra, M, C
+        self.least = least or [0] * len(C)
         self.rows, self.d = [r for r, _ in pivots], [c for _, c in pivots]
         self.i = [k for k in range(C.shape[1]) if k not in self.d]
         with algebra.section("dependent speeds: C_r u_dot = F_d solved for them"):
@@ -75,7 +80,8 @@ class NullSpaceSolver:
         self.inverse: list[np.ndarray] = []
         for b in self.blocks:
             k, after = list(b), list(range(b.stop, n))
-            sizes = [inner(row, row) for row in self.C[np.ix_([self.rows[p] for p in b], self.d)]]
+            rows = [self.rows[p] for p in b]
+            sizes = [inner(self.C[row, self.d], self.C[row, self.d]) + self.least[row] for row in rows]
             label = " and ".join(names[self.rows[p]] for p in b)
             self.inverse.append(self._inverse(A[np.ix_(k, k)], sizes, label, b.start))
             if after:

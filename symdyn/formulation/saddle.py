@@ -15,7 +15,7 @@ import numpy as np
 from symdyn.formulation.composite import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
-from symdyn.tape.node import is_zero
+from symdyn.tape.node import PARAMETER, Node, is_zero
 
 # A pivot of the Schur complement below this part of its diagonal entry leaves too few digits: a constraint nearly depends
 # on the others, and the kernel takes over. The digits lost are those of this number.
@@ -32,9 +32,10 @@ class RangeSolver:
     """By the Schur complement S = C M^-1 C^T, with M = L^T D L factorized already.
 
     names   of the rows
+    least   squares of the rows below which they are no constraint any more, (m,); default: none
     """
 
-    def __init__(self, algebra: Any, factors: Factors, C: np.ndarray, names: Sequence[str]) -> None:
+    def __init__(self, algebra: Any, factors: Factors, C: np.ndarray, names: Sequence[str], least: Sequence[Any] = ()) -> None:
         self.factors, self.C = factors, C
         n = len(factors.inverse_D)
         with algebra.section("Schur complement C_r M^-1 C_r^T"):
@@ -49,6 +50,10 @@ class RangeSolver:
             order = fewest_neighbours(S)
             self.order = order
             reasons = [f"constraint {names[k]} depends on the others here" for k in order]
+            for k, bound in enumerate(least):
+                if isinstance(S[k, k], Node) and any(isinstance(e, Node) and e.mask & ~PARAMETER for e in C[k]):
+                    margin = inner(C[k], C[k]) - bound
+                    S[k, k] = algebra.recorder.guard(S[k, k], margin, f"constraint {names[k]} holds nothing here")
             self.S = factorize(algebra, S[np.ix_(order, order)], reasons, "S", SMALLEST_PIVOT)
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

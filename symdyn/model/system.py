@@ -221,7 +221,8 @@ class System:
 
         return recursive(self.check(), frames)
 
-    def augmented(self, coordinates: str = "relative", orientation: Any = None, frames: str = "body") -> AugmentedEquations:
+    def augmented(self, coordinates: str = "relative", orientation: Any = None,
+                  frames: str = "parallel") -> AugmentedEquations:
         """The augmented equations M u_dot + C_r^T lam = F - k, C_r u_dot = F_d with multipliers lam.
 
         coordinates   "relative": the tree as it is, constraints close its loops; "absolute": every body has coordinates of
@@ -229,7 +230,7 @@ class System:
                       joint becomes constraints; joints that are driven, geared or used in expressions keep their coordinates
                       besides
         orientation   of the bodies in absolute coordinates: EulerParameters(), the default, or EulerAngles(...)
-        frames        as for `embedding`
+        frames        as for `embedding`; parallel ones, where there are any, print F_d in absolute angles
         Raises ModelError with every fault found, and for constraints that cannot hold or move nothing.
         """
         from symdyn.formulation.augmented import augment

@@ -8,13 +8,13 @@ of Multibody Systems, chapter 3.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.arguments import take
+from symdyn.runtime.arguments import number, take
 from symdyn.runtime.constraints import (
     CONSISTENT,
     as_velocities,
@@ -64,7 +64,7 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
 
 
 def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
-               keep: Collection[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
+               keep: Collection[Any] | None = ()) -> tuple[np.ndarray, np.ndarray]:
     """The consistent state near a guess: q (n_q,) and u (n_u,); see Module.consistent."""
     metadata = module.metadata
     p = module.parameters(params)
@@ -72,8 +72,14 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     q0, u0 = (take(values, metadata[what], what, {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
               for what, values in (("q", q), ("u", u)))
     x = np.concatenate([q0, u0, np.zeros(metadata["sizes"]["z"])])
-    if isinstance(keep, str) or hasattr(keep, "name"):
+    t = number(t, "a finite number of seconds as t", module.name)
+    if keep is None:
+        keep = ()
+    elif isinstance(keep, str) or hasattr(keep, "name"):
         keep = (keep,)
+    elif not isinstance(keep, Iterable):
+        raise ArgumentError(f"{module.name}: pass coordinates and speeds as keep, by name or symbol, or None for none of them, "
+                            f"found {keep!r}")
     kept = [str(getattr(k, "name", k)) for k in keep]
     unknown = [k for k in kept if k not in metadata["q"] and k not in metadata["u"]]
     if unknown:
@@ -82,7 +88,7 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     x = normalised(module, x)
     if not names(module):
         return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
-    search = _Search(module, float(t), p, kept)
+    search = _Search(module, t, p, kept)
     x = search.speeds(search.positions(x))
     return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
 

@@ -96,8 +96,8 @@ class Solution:
     def energies(self) -> np.ndarray:
         """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not tell it."""
         if "energy" not in self.module.functions:
-            raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not tell the energy; compute it from "
-                                "sol.q and sol.u, or describe the mechanism by bodies and joints")
+            raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not tell the energy; compute it "
+                                "from sol.q and sol.u, or describe the mechanism by bodies and joints")
         return self._rows("energy")
 
     @property

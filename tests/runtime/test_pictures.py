@@ -262,6 +262,96 @@ def test_bodies_at_rest_are_drawn() -> None:
     assert plot(solution)._repr_png_()
 
 
+# -- closed loops
+
+
+def loop(name: str, coordinates: str = "relative", t: Any = (0.0, 0.2), **options: Any) -> Solution:
+    """A short motion of a mechanism with constraints."""
+    key = f"{name} {coordinates} {options}"
+    if key not in _modules:
+        _modules[key] = systems.get(name, **options).augmented(coordinates).compile("numpy")
+    return _modules[key].simulate(t, rtol=1e-6)
+
+
+def ends_of(solution: Solution, joint: str) -> tuple[tuple[str, np.ndarray], tuple[str, np.ndarray]]:
+    """Name of the parent and the joint's point on it, (n_t, 3); the same of the child."""
+    metadata = solution.module.metadata
+    k = metadata["reactions"].index(joint)
+    points = solution.rows("joint_points")[:, k]
+    parent, child = metadata["reaction_bodies"][k]
+    return (parent, points[:, :3]), (child, points[:, 3:])
+
+
+def missed(points: np.ndarray, wanted: np.ndarray) -> float:
+    """How far the nearest of the points (n_t, n, 2 or 3) is from what is wanted, (n_t, 2 or 3)."""
+    return float(np.nanmin(np.abs(points - wanted[:, None]).max(axis=(0, 2))))
+
+
+@pytest.mark.parametrize("name, coordinates, options", [
+    ("four_bar", "relative", {}), ("four_bar", "absolute", {}), ("n_four_bar", "relative", {"n": 3}),
+    ("andrews_squeezer", "relative", {}), ("bricard", "relative", {}), ("spatial_slider_crank", "relative", {}),
+    ("spatial_slider_crank", "absolute", {}), ("double_wishbone", "relative", {}),
+    ("flyball_governor", "relative", {"links": "rods"})])
+def test_bodies_meet_at_every_joint_of_their_loops(name: str, coordinates: str, options: dict[str, Any]) -> None:
+    solution = loop(name, coordinates, (0.0, 0.01 if name == "andrews_squeezer" else 0.1), **options)
+    drawing, metadata = Drawing.of(solution), solution.module.metadata
+    assert drawing is not None
+    shown = ["xyz".index(label) for label in drawing.labels]
+    size = np.ptp(drawing.limits(), axis=1).max()
+    for joint, kind in zip(metadata["reactions"], metadata["reaction_kinds"], strict=True):
+        ends = ends_of(solution, joint)
+        if kind not in ("rod", "prismatic"):
+            assert np.abs(ends[0][1] - ends[1][1]).max() < 1e-6 * size, joint
+        elif kind == "rod":
+            assert np.ptp(np.linalg.norm(ends[0][1] - ends[1][1], axis=1)) < 1e-6 * size
+            assert all(missed(drawing.rods, point[:, shown]) < 1e-12 for _, point in ends)
+        for body, point in ends:
+            if body != "ground":
+                assert missed(drawing.lines[metadata["bodies"].index(body)], point[:, shown]) < 1e-5 * size, f"{joint} on {body}"
+            elif kind != "prismatic":
+                assert missed(np.broadcast_to(drawing.pivots, (len(point), *drawing.pivots.shape)), point[:, shown]) < 1e-12
+    for line in drawing.lines:
+        assert np.ptp(np.linalg.norm(np.diff(line, axis=1), axis=2), axis=0).max(initial=0.0) < 1e-6 * size
+
+
+@pytest.mark.parametrize("coordinates", ["relative", "absolute"])
+def test_the_rocker_of_a_four_bar_linkage_reaches_to_the_ground(coordinates: str) -> None:
+    solution = loop("four_bar", coordinates)
+    drawing = Drawing.of(solution)
+    assert drawing is not None and np.allclose(drawing.pivots, [[0.0, 0.0], [2.0, 0.0]])
+    assert [line.shape[1] for line in drawing.lines] == [2, 2, 2]
+    lengths = [np.linalg.norm(np.diff(line, axis=1), axis=2) for line in drawing.lines]
+    assert all(np.allclose(found, wanted, atol=1e-6) for found, wanted in zip(lengths, (0.8, 2.0, 1.6), strict=True))
+
+
+def test_a_screw_in_absolute_coordinates_has_no_carrier_in_its_picture() -> None:
+    system = symdyn.System("screw", gravity=[0, 0, -9.81])
+    arm = system.add_body("arm", mass=1, inertia=[1, 1, 1], com=[0.5, 0, 0])
+    nut = system.add_body("nut", mass=3, inertia=[2, 3, 4], com=[0.3, 0.1, 0.2])
+    system.add_joint(symdyn.Revolute("pin", system.ground, arm, axis=[0, 1, 0]))
+    system.add_joint(symdyn.Helical("thread", arm, nut, pitch=0.1, parent_point=[1, 0, 0], child_point=[0.2, 0.3, 0]))
+    solution = system.augmented("absolute").compile("numpy").simulate((0.0, 0.5))
+    assert solution.module.metadata["bodies"] == ["arm", "nut", "thread_carrier"]
+    drawing = Drawing.of(solution)
+    assert drawing is not None and len(drawing.lines) == drawing.centres.shape[1] == 2 and dict(drawing.sliders) == {1: [0]}
+    place = solution.frames[:, 1, :3] + solution.frames[:, 1, 3:].reshape(-1, 3, 3) @ [0.2, 0.3, 0]
+    assert np.abs(drawing.lines[1][:, 0] - place).max() < 1e-6
+    assert np.allclose(solution.reaction("thread", "child"), solution.reaction("thread", "nut"))
+
+
+def test_bodies_without_joints_that_are_told_are_joined_as_they_move() -> None:
+    solution = motion("double_pendulum")
+    told = Drawing.of(solution)
+    metadata = solution.module.metadata
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(metadata, "functions", [f for f in metadata["functions"] if f != "joint_points"])
+        assert "joint_points" not in solution.module.functions
+        guessed = Drawing.of(solution)
+    assert told is not None and guessed is not None and np.allclose(told.pivots, guessed.pivots)
+    for a, b in zip(told.lines, guessed.lines, strict=True):
+        assert np.abs(a[:, 0] - b[:, 0]).max() < 1e-6
+
+
 # -- films
 
 

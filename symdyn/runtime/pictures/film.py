@@ -61,6 +61,7 @@ def _palette(image: Image.Image) -> Image.Image:
     """Colours that all pictures of a film share; the paper stays white."""
     shared = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     colors = np.array(shared.getpalette(), dtype=np.uint8).reshape(-1, 3)
-    colors[(colors > 248).all(axis=1)] = 255
+    # Pillow takes white for (252, 252, 252) when it looks for the nearest colour: none may be nearer to that than white.
+    colors[(colors > 245).all(axis=1)] = 255
     shared.putpalette(colors.tobytes())
     return shared

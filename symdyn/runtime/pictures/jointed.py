@@ -72,7 +72,7 @@ def jointed_skeleton(joints: Sequence[PlacedJoint], origins: np.ndarray, centres
         for body, point in ((joint.child, joint.child_point), (joint.parent, joint.parent_point)):
             if body != GROUND:
                 place = _add(points[body], point, near)
-                if slides and body == joint.child:
+                if slides and (body == joint.child or joint.child == GROUND):
                     sliders.setdefault(body, []).append(place)
             elif not slides and np.ptp(point, axis=0).max() < near:
                 pivots.append(point[0])
