@@ -202,6 +202,16 @@ def test_parameters_without_numbers() -> None:
         s.diagnose(params={"k": 1})
 
 
+@pytest.mark.parametrize(("asked", "message"), [
+    ({"t": "x"}, "four_bar: pass a finite number of seconds as t, found 'x'"),
+    ({"t": float("inf")}, "seconds as t, found inf"), ({"reach": None}, "from 0 on as reach, .* found None"),
+    ({"reach": "x"}, "pass an angle from 0 on as reach, rad .default: 3.142., found 'x'"),
+    ({"reach": -1}, "pass an angle from 0 on as reach, rad .default: 3.142., found -1")])
+def test_what_is_no_time_or_reach(asked: dict, message: str) -> None:
+    with pytest.raises(sd.SymdynError, match=message):
+        sd.systems.get("four_bar").diagnose(**asked)
+
+
 def test_absolute_coordinates() -> None:
     found = sd.systems.get("four_bar").diagnose(coordinates="absolute", reach=0.5)
     assert (found.speeds, found.rows, found.by_rank) == (9, 8, 1) and found.healthy

@@ -16,7 +16,8 @@ from symdyn.errors import ArgumentError, ModelError, SymdynError
 from symdyn.formulation.consistent_states import ConstraintStates
 from symdyn.formulation.dependent_rows import ranks
 from symdyn.model.loop_check import CARRIER
-from symdyn.runtime.arguments import number, some, take
+from symdyn.runtime.arguments import some, take
+from symdyn.runtime.consistent import number
 from symdyn.tape.floats import evaluate_rows
 
 if TYPE_CHECKING:

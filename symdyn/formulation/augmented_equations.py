@@ -88,9 +88,8 @@ class AugmentedEquations(MotionEquations):
         wrong = [n for n in names if n not in known]
         n_c = len(self.constraints)
         if wrong or len(names) != n_c or len(set(names)) != n_c:
-            listed = f"a list of {n_c} different ones" if n_c > 1 else "one" if n_c else "an empty list: there are no constraints"
-            raise SymdynError(f"{self.name}: dependent is {', '.join(names) or 'empty'}; pass {listed}"
-                              f"{f' of {", ".join(known)}' if n_c else ''}")
+            those = f"{n_c} different ones of {', '.join(known)}" if n_c else "an empty list, there are no constraints"
+            raise SymdynError(f"{self.name}: dependent is {', '.join(names) or 'empty'}; pass {those}")
         d = [known[n] for n in names]
         i = [k for k in range(len(speeds)) if k not in d]
         C = self.C_r

@@ -95,7 +95,9 @@ def _labels(given: ByHand, names: Any, n: int) -> list[str]:
 
 def _taken(given: ByHand, rows: Any, labels: Sequence[str]) -> tuple[list[Constraint], list[Constraint]]:
     """The constraints, and those of them that are expressions."""
-    if not isinstance(rows, (list, tuple)):
+    if isinstance(rows, sp.MatrixBase) and 1 in rows.shape:
+        rows = list(rows)
+    if not isinstance(rows, (list, tuple, np.ndarray)):
         every = [Constraint(label, e) for label, e in zip(labels, given.column(rows, "constraints", labels), strict=False)]
         return every, every
     every, sound = [], []

@@ -18,7 +18,7 @@ from symdyn.model.bodies import Body, Point
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint
 from symdyn.model.loads import Force, JointForce
-from symdyn.model.loop_check import constraint_faults, loop_faults, with_carriers
+from symdyn.model.loop_check import constraint_faults, idle_coordinate_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.record import Model, joint_speeds
@@ -62,6 +62,8 @@ class _Checker:
             self.faults += plane_faults([*self.joints, *(j for j in s.loops if isinstance(j, Joint))], s.ground_motion)
         self._coordinates()
         self._symbols()
+        elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in _symbols_in(expressions)]
+        self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
         self._loads()
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
         initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states],

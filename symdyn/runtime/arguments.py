@@ -35,17 +35,6 @@ def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, fl
     return array
 
 
-def number(value: Any, what: str, owner: str) -> float:
-    """A finite number; raises ArgumentError, with `what` as what to pass, for anything else."""
-    try:
-        found = float(value)
-    except (TypeError, ValueError):
-        found = float("nan")
-    if not np.isfinite(found):
-        raise ArgumentError(f"{owner}: pass {what}, found {value!r}")
-    return found
-
-
 def some(values: Any, names: Sequence[str], what: str, owner: str) -> dict[str, float]:
     """Those values that are given, by name; None for none of them.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.arguments import number, take
+from symdyn.runtime.arguments import take
 from symdyn.runtime.constraints import (
     CONSISTENT,
     as_velocities,
@@ -91,6 +91,17 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     search = _Search(module, t, p, kept)
     x = search.speeds(search.positions(x))
     return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
+
+
+def number(value: Any, what: str, owner: str) -> float:
+    """A finite number; raises ArgumentError, with `what` as what to pass, for anything else."""
+    try:
+        found = float(value)
+    except (TypeError, ValueError):
+        found = float("nan")
+    if not np.isfinite(found):
+        raise ArgumentError(f"{owner}: pass {what}, found {value!r}")
+    return found
 
 
 class _Search:

@@ -574,3 +574,38 @@ def compare_with_kane(system: sd.System, kane: Any, scene: Scene, names: list[st
     wanted = solved(kane, scene, names, {p.name: v for p, v in model.defaults.items()}, q, u)
     given = dict(zip([s.name for s in model.speeds], u.tolist(), strict=True))
     assert close(at(equations, "accelerations", **given)["accelerations"], wanted)
+
+
+def test_reactions_of_a_closing_screw_turn_into_the_axes_of_its_child() -> None:
+    s = sd.System("screwed", gravity=[0, 0, -9.81])
+    upper, lower = (s.add_body(name, mass=1, inertia=[1, 1, 1], com=[0.5, 0, 0]) for name in ("upper", "lower"))
+    s.add_joint(sd.Revolute("shoulder", s.ground, upper))
+    s.add_joint(sd.Cylindrical("elbow", upper, lower, parent_point=[1, 0, 0]))
+    s.close_loop(sd.Helical("screw", s.ground, "lower", pitch=0.1))
+    s.initial = {"q_shoulder": 0.3}
+    found = {}
+    for coordinates in ("relative", "absolute"):
+        equations = s.augmented(coordinates)
+        assert ("screw", "ground", "lower", "helical") in equations.joints
+        assert len({*equations.bodies}) == len(equations.bodies)
+        solution = equations.compile("numpy").simulate([0, 0.05])
+        found[coordinates] = solution.reaction("screw", "child")
+        assert np.array_equal(found[coordinates], solution.reaction("screw", "lower"))
+    assert close(found["absolute"][0], found["relative"][0], 10.0)
+
+
+ORIENTATIONS = {
+    "relative": ({"orientation": sd.EulerParameters()}, False, "orientation EulerParameters is given, but coordinates are 'relative'"),
+    "planar": ({"orientation": sd.EulerAngles("XYZ"), "coordinates": "absolute"}, True, "but the system is planar.*leave it out"),
+    "text": ({"orientation": "XYZ", "coordinates": "absolute"}, False, "orientation is 'XYZ'; it tells how bodies turn.*sd.EulerAngles"),
+}
+
+
+@pytest.mark.parametrize("name", ORIENTATIONS)
+def test_orientations_that_nothing_takes(name: str) -> None:
+    options, planar, message = ORIENTATIONS[name]
+    s = sd.System("one", gravity=[0, -9.81] if planar else [0, 0, -9.81])
+    s.add_joint(sd.Revolute("hinge", s.ground, s.add_body("body", mass=1, inertia=1 if planar else [1, 1, 1], com=[1, 0]
+                                                           if planar else [1, 0, 0])))
+    with pytest.raises(SymdynError, match=message):
+        s.augmented(**options)

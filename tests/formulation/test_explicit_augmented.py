@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.errors import ModelError, SymdynError
 from symdyn.runtime.compiler import find_compiler
 from tests.helpers import close, largest, quantities, state
 
@@ -470,3 +471,22 @@ def test_all_faults_at_once():
     with pytest.raises(sd.ModelError) as caught:
         sd.augmented([x, 3], [m], [0, 0, 0], [x.dot**2, "y", F_x, l], names=["one"], defaults={"k": 1}, initial={z: 1})
     assert len(caught.value.faults) >= 9
+
+
+@pytest.mark.parametrize("dependent", [y, "y", ["y"], (y,), sp.Matrix([y])])
+def test_one_dependent_speed_stands_for_itself(dependent: Any) -> None:
+    assert fixed_track().without_multipliers(dependent) == fixed_track().without_multipliers([y])
+
+
+@pytest.mark.parametrize("dependent", [None, (), "q2", 3, [x, y], [y, y], [None]])
+def test_dependent_speeds_that_do_not_fit(dependent: Any) -> None:
+    with pytest.raises(SymdynError, match="fixed_track: dependent is .*; pass 1 different ones of x_dot, y_dot, x, y"):
+        fixed_track().without_multipliers(dependent)
+
+
+@pytest.mark.parametrize("wrong", ["x - 1", sp.nan, sp.Eq(x, y), None, [x], sp.oo])
+def test_a_constraint_that_is_none_has_one_fault(wrong: Any) -> None:
+    for rows in ([wrong], [x - y, wrong], np.array([wrong, x - y], dtype=object) if not isinstance(wrong, list) else [wrong]):
+        with pytest.raises(ModelError) as caught:
+            sd.augmented([x, y], [m, m], None, rows)
+        assert len(caught.value.faults) == 1, caught.value.faults

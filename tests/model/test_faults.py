@@ -256,7 +256,7 @@ SPATIAL: dict[str, Case] = {
     "constraint": (lambda s: s.add_constraint(q1 - q2),
                    "the model has a constraint or closed loop|the embedding form takes trees only|use system.augmented()"),
     "constraint text": (lambda s: s.add_constraint("q1 - q2"), "constraint_1 is the text 'q1 - q2'|never evaluated"),
-    "loop": (lambda s: s.close_loop(sd.Revolute("close", "lower", s.ground, q9)),
+    "loop": (lambda s: s.close_loop(sd.Revolute("close", "lower", s.ground)),
              "a constraint or closed loop|use system.augmented()"),
     "loop no joint": (lambda s: s.close_loop("elbow"), "close_loop was given 'elbow'|sd.Revolute"),
     "loop to nobody": (lambda s: s.close_loop(sd.Fixed("close", "lower", "wall")), "joint 'close': child is 'wall'"),

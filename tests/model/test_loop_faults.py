@@ -93,6 +93,9 @@ CHECKED: dict[str, Case] = {
                             "joint 'loop' uses the symbol l, not declared in the model; declared: m"),
     "its coordinate used": (lambda s: [loop(s, sd.Revolute, q3), s.add_joint_force("elbow", -q3)],
                             "joint_force_1 uses q3, which no joint and no state drives"),
+    "its coordinate used nowhere": (lambda s: loop(s, sd.Revolute, q3),
+                                    "joint 'loop' closes a loop and is given the coordinate q3; a closing joint has no "
+                                    "coordinate|leave it out"),
     "driven": (lambda s: [loop(s, sd.Revolute), s.add_joint_force("loop", 1)],
                "joint_force_1 acts on the joint 'loop', which the system does not have; joints: shoulder, elbow"),
     "given motion": (lambda s: loop(s, sd.Revolute, sp.sin(sd.t)),

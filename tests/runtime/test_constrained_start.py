@@ -105,10 +105,18 @@ def test_free_systems_and_unit_vectors() -> None:
     ({"u": {"q1_dot": 1.0}, "keep": ["q1_dot", "q2_dot"]}, "no consistent speeds .* with q1_dot, q2_dot kept: .* hinge4_y by"),
     ({"params": {"d": 10.0}}, "no consistent positions found near the guess: .*hinge4_x by .*begin with another guess"),
     ({"keep": ["q9"]}, "keep names q9; there are q1, q2, q3, q1_dot"), ({"keep": "q"}, "keep names q;"),
-    ({"q": [1.0]}, "needed are 3 numbers")])
+    ({"q": [1.0]}, "needed are 3 numbers"), ({"keep": 3}, "pass coordinates and speeds as keep, by name or symbol, .*found 3"),
+    ({"t": "a"}, "pass a finite number of seconds as t, found 'a'"), ({"t": None}, "seconds as t, found None"),
+    ({"t": np.nan}, "seconds as t, found nan")])
 def test_no_such_state(asked: dict[str, Any], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         module("four_bar").consistent(**asked)
+
+
+def test_nothing_kept() -> None:
+    loop = module("four_bar")
+    for with_none, plain in zip(loop.consistent(keep=None), loop.consistent(), strict=True):
+        np.testing.assert_array_equal(with_none, plain)
 
 
 # -- states that are not
