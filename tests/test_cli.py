@@ -418,6 +418,22 @@ def test_simulate_tells_how_constraints_are_kept(here: Path, capsys: pytest.Capt
     assert kept["projection"] < 1e-13 < kept["none"]
 
 
+@pytest.mark.parametrize("kept", [[], ["q1", "q1_dot"]])
+def test_simulate_begins_with_a_consistent_state(kept: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy", "--q", "q1=0.5", "--u", "q1_dot=1"]
+    assert "begin with the nearest consistent state" in refused(capsys, *arguments)
+    assert main([*arguments, "--consistent", *(["--keep", *kept] if kept else [])]) == 0
+    said = capsys.readouterr().out
+    assert "four_bar: the start is made consistent: " in said and "q2 from " in said and "q2_dot from 0 to " in said
+    assert ("q1 from 0.5 to" in said) == ("q1_dot from 1 to" in said) == (not kept)
+
+
+def test_simulate_tells_that_a_start_is_consistent(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy", "--consistent"]
+    assert main([*arguments, "--stabilization", "baumgarte=20"]) == 0
+    assert "four_bar: the start is consistent as it is" in capsys.readouterr().out
+
+
 def test_coordinates_are_remembered_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy"]
     assert main(arguments) == 0 and "q1 = " in capsys.readouterr().out
@@ -449,6 +465,12 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["derive", "four_bar", "--formulation", "recursive"], "the recursive form takes trees only"),
     (["derive", "pendulum", "--formulation", "embedding", "--coordinates", "absolute"], "they are for 'augmented' alone"),
     (["simulate", "four_bar", "--stabilization", "hope"], "invalid choice: 'hope'"),
+    (["simulate", "four_bar", "--stabilization", "baumgarte=much"], "'much' is not a number"),
+    (["simulate", "four_bar", "--stabilization", "baumgarte=-1"], "must be a positive number, 1/s, found -1"),
+    (["simulate", "four_bar", "--stabilization", "none=1"], "invalid choice: 'none=1'"),
+    (["simulate", "four_bar", "--keep", "q1"], "--keep goes with --consistent"),
+    (["simulate", "four_bar", "--consistent", "--keep", "q9"], "keep names q9; there are q1"),
+    (["derive", "zzzz"], "no system 'zzzz'; it has pendulum"),
     (["simulate", "four_bar", "--method", "BDF", "--stabilization", "projection"], "builds on earlier steps"),
     (["diagnose", "four_bar", "--reach", "-1"], "--reach takes a distance from 0 on"),
     (["derive", "pendulm"], "no system 'pendulm'; did you mean pendulum"),

@@ -207,7 +207,8 @@ CASES = {case.label: case for case in (
     Case("vehicle_on_track_absolute", reference=_track),
     Case("vehicle_on_rotating_track_absolute", reference=_rotating_track, long=5.0),  # then its track stands upright
     Case("particle_on_moving_slope", reference=_slope, long=3.0),  # its distance grows as exp(2 t)
-    Case("particle_on_moving_slope", {"rocking": True}, long=3.0),
+    # Far out the coordinates carry the constraint to eps of the distance only, 4e30 m after 100 s; in 15 s it gets to 3e4 m.
+    Case("particle_on_moving_slope", {"rocking": True}, long=15.0),
     Case("four_bar"),
     Case("slider_crank", reference=_slider_crank),
     Case("n_four_bar", {"n": 1}, reference=lambda: _windows(1)),

@@ -16,6 +16,7 @@ from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.report import report
 from symdyn.cli.simulate import simulate
+from symdyn.cli.values import stabilization
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -84,14 +85,19 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="END or START END, s (default: the system's)")
     parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance of a step (default: 1e-8)")
     parser.add_argument("--atol", type=float, help="absolute tolerance of a step (default: as rtol)")
-    parser.add_argument("--method", help="dop853 (compiled), or RK23, RK45, DOP853, Radau, BDF, LSODA of SciPy")
+    parser.add_argument("--method", help="dop853 (compiled), or RK23, RK45, DOP853, Radau, BDF, LSODA of SciPy; with "
+                        "constraints also ggl (pip install 'symdyn[dae]')")
     parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
     for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1"),
                        ("--u", "initial speeds, such as q1_dot=1"), ("--z", "initial extra states"),
                        ("--input", "constant inputs, such as F=1")):
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
-    parser.add_argument("--stabilization", choices=("projection", "baumgarte", "none"), help="what keeps constraints (default: "
-                        "projection; with BDF and LSODA baumgarte)")
+    parser.add_argument("--consistent", action="store_true", help="begin with the nearest state that fulfils the constraints, "
+                        "and tell what it changes")
+    parser.add_argument("--keep", metavar="NAME", nargs="+", action="extend", default=[], help="coordinates and speeds that "
+                        "--consistent leaves as they are given")
+    parser.add_argument("--stabilization", metavar="WAY", type=stabilization, help="what keeps constraints: projection, "
+                        "baumgarte, baumgarte=GAIN (1/s) or none (default: projection; with BDF and LSODA baumgarte)")
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--gif", action="store_true", help="save an animation too")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")

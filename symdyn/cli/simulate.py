@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from symdyn.cli.find import find_module
 from symdyn.cli.messages import INTERRUPTED, STOPPED, Stop, complain
 from symdyn.cli.save import save
 from symdyn.cli.summary import summarize
 from symdyn.cli.values import numbers
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
 
 
 def simulate(arguments: argparse.Namespace) -> int:
@@ -23,7 +27,11 @@ def simulate(arguments: argparse.Namespace) -> int:
     values = {what: numbers(items, flag) for what, flag, items in (
         ("params", "--set", arguments.set), ("q", "--q", arguments.q), ("u", "--u", arguments.u), ("z", "--z", arguments.z),
         ("inputs", "--input", arguments.input))}
+    if arguments.keep and not arguments.consistent:
+        raise Stop("--keep goes with --consistent")
     module = find_module(arguments)
+    if arguments.consistent:
+        _make_consistent(module, values, t[0] if t else 0.0, arguments.keep)
     folder = arguments.output or Path("generated") / module.name
     folder.mkdir(parents=True, exist_ok=True)
     warnings.simplefilter("ignore", SimulationWarning)
@@ -39,3 +47,17 @@ def simulate(arguments: argparse.Namespace) -> int:
     summarize(solution)
     save(solution, folder, picture=not arguments.no_picture, film=arguments.gif)
     return code
+
+
+def _make_consistent(module: Module, values: dict[str, Any], t: float, keep: list[str]) -> None:
+    """Put the nearest consistent q and u in place of those given, and print what changed."""
+    q, u = module.consistent(values["q"], values["u"], values["params"], t=t, keep=keep)
+    changed = []
+    for what, found in (("q", q), ("u", u)):
+        given = {**module.metadata["initial"], **(values[what] or {})}
+        for name, after in zip(module.metadata[what], map(float, found), strict=True):
+            before = float(given.get(name, 0.0))
+            if abs(after - before) > 1e-12 * max(1.0, abs(before)):
+                changed.append(f"{name} from {before:.6g} to {after:.6g}")
+    print(f"{module.name}: the start is " + (f"made consistent: {', '.join(changed)}" if changed else "consistent as it is"))
+    values["q"], values["u"] = q, u

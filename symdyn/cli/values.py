@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from collections.abc import Iterable
 
@@ -30,6 +31,19 @@ def numbers(items: Iterable[str], what: str) -> dict[str, float] | None:
         except ValueError:
             raise Stop(f"{what} {name}={text}: {text!r} is not a number") from None
     return found or None
+
+
+def stabilization(text: str) -> str | tuple[str, float]:
+    """projection, baumgarte or none; of baumgarte=GAIN the pair."""
+    way, sign, gain = text.partition("=")
+    if way not in ("projection", "baumgarte", "none") or (sign and way != "baumgarte"):
+        raise argparse.ArgumentTypeError(f"invalid choice: {text!r} (choose from projection, baumgarte, baumgarte=GAIN, none)")
+    if not sign:
+        return way
+    try:
+        return way, float(gain)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: {gain!r} is not a number; write baumgarte=GAIN, 1/s") from None
 
 
 def value_of(text: str) -> bool | int | float | str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from symdyn.errors import ModelWarning
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.tree_equations import tree_of
 from symdyn.model.joints import Free, Joint
@@ -44,7 +46,14 @@ def absolute_start(relative: Model, absolute: Model) -> dict[sp.Symbol, float]:
     found = {name: array[0] for name, array in evaluate_rows(tape, values, 1).items()}
     start: dict[sp.Symbol, float] = {}
     for k, joint in own:
-        start |= _of_joint(joint, found["poses"][k], found["rates"][k])
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            start |= _of_joint(joint, found["poses"][k], found["rates"][k])
+        if any("imbal" in str(warning.message) for warning in caught):
+            angles: Any = getattr(joint, "orientation", None)
+            warnings.warn(f"{relative.name}: the Euler angles {angles.sequence} of {absolute.bodies[k].name} are singular at the "
+                          "initial state (gimbal lock), so that they have no derivatives there; pass an orientation of another "
+                          "sequence, or sd.EulerParameters()", ModelWarning, stacklevel=5)
     return start
 
 

@@ -18,7 +18,7 @@ from symdyn.formulation.augmented_equations import AugmentedEquations
 from symdyn.formulation.constrained import Constrained
 from symdyn.formulation.constraints import Gathered
 from symdyn.formulation.contradictions import contradictions
-from symdyn.formulation.dependent_rows import ranks
+from symdyn.formulation.dependent_rows import search
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.reactions import reactions
 from symdyn.formulation.saddle_choice import choose
@@ -48,6 +48,25 @@ class ConstrainedTree(Constrained, TreeQuantities):
         self.pivots = pivots
         if self.gathered.trivial:
             self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
+
+    @property
+    def prescribed(self) -> list[str]:
+        """Joints in loops whose motion is given."""
+        model = self.model
+        number = {body.name: k for k, body in enumerate(model.bodies)}
+        above = {child: (joint, parent) for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True)}
+
+        def path(body: Any) -> set[str]:
+            place, names = number.get(getattr(body, "name", body), -1), set()
+            while place in above:
+                joint, place = above[place]
+                names.add(joint.name)
+            return names
+
+        inside: set[str] = set().union(*[path(c.joint.parent) ^ path(c.joint.child) for c in self.gathered.closures])
+        known = set(model.coordinates)
+        return [j.name for j in model.joints if j.name in inside and j.coordinates
+                and not any(q.free_symbols & known for q in j.coordinates)]
 
     @property
     def reacting(self) -> tuple[Joint, ...]:
@@ -99,8 +118,8 @@ def _demand_orientation(model: Model, coordinates: str, orientation: Any) -> Non
                           "sd.EulerParameters() or sd.EulerAngles('ZYX')")
     unused = "coordinates are 'relative'" if coordinates != "absolute" else "the system is planar" if model.planar else ""
     if unused:
-        raise SymdynError(f"orientation {type(orientation).__name__} is given, but {unused}: it tells how bodies turn in absolute "
-                          "coordinates in space; leave it out" +
+        raise SymdynError(f"orientation {type(orientation).__name__} is given, but {unused}: it tells how bodies turn in "
+                          "absolute coordinates in space; leave it out" +
                           (", or pass coordinates='absolute'" if coordinates != "absolute" and not model.planar else ""))
 
 
@@ -121,8 +140,8 @@ def augment(model: Model, coordinates: str = "relative", orientation: Any = None
     def result(quantities: ConstrainedTree, otherwise: Equations | None) -> AugmentedEquations:
         return tree_result(quantities, "augmented", AugmentedEquations, again, otherwise=otherwise, **names)
 
-    equations = choose(lambda *way: ConstrainedTree(tree, gathered, *way), result, ranks)
-    faults = contradictions(equations.otherwise or equations) if gathered.rows else []
-    if faults:
-        raise ModelError(faults, model.name)
-    return equations
+    if gathered.rows:
+        faults = contradictions(result(ConstrainedTree(tree, gathered, True), None))
+        if faults:
+            raise ModelError(faults, model.name)
+    return choose(lambda *way: ConstrainedTree(tree, gathered, *way), result, search)

@@ -79,8 +79,8 @@ class AugmentedEquations(MotionEquations):
         factors that all terms share. Together with C_r u_dot = F_d these are n_u equations. Raises SymdynError for a wrong
         number of speeds or a singular choice.
         """
-        single = isinstance(dependent, (str, sp.Basic)) or not hasattr(dependent, "__iter__")
-        given = [dependent] if single else list(dependent)
+        several = isinstance(dependent, sp.MatrixBase) or (hasattr(dependent, "__iter__") and not isinstance(dependent, str))
+        given = list(dependent) if several else [dependent]
         names = [str(getattr(d, "name", d)) for d in given]
         speeds = self.symbols.speeds
         known = {s.name: k for k, s in enumerate(speeds)}

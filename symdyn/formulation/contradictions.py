@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from symdyn.errors import ModelWarning
 from symdyn.formulation.equations import Equations
 from symdyn.tape.floats import evaluate_rows
 
 STATES = 12
+# Sets of numbers for parameters that a contradiction must outlast.
+TRIALS = 16
 TOLERANCE = 1e-9
 
 
@@ -38,12 +42,13 @@ class _Conflict:
 def contradictions(equations: Equations) -> list[str]:
     """What is wrong with the constraints at every state, in sentences.
 
-    Parameters take their defaults, else random numbers; what shows with some of these numbers only is not told.
+    Parameters take their defaults, else random numbers; what shows with some of these numbers only is not told. Warns
+    (ModelWarning) of constraints that contradict each other unless parameters without defaults have certain numbers.
     """
     symbols = equations.symbols
     numbers = {p.name: float(v) for p, v in symbols.defaults.items()}
     free = [p.name for p in symbols.parameters if p.name not in numbers]
-    draws = [d for seed in range(2 if free else 1) if (d := _draw(equations, numbers, free, seed)) is not None]
+    draws = [d for seed in range(2 if free else 1) if (d := _draw(equations, numbers | _some(free, seed))) is not None]
     if not draws:
         return []
     names = equations.constraints
@@ -54,11 +59,21 @@ def contradictions(equations: Equations) -> list[str]:
     kept = [k for k in range(len(names)) if k not in empty]
     first, *others = [_conflicts(d, kept, equations.holonomic) for d in draws]
     for conflict in first:
+        listed = ", ".join(names[j] for j in conflict.others)
         if all(any(_same(conflict, c) for c in found) for found in others):
-            listed = ", ".join(names[j] for j in conflict.others)
             faults.append(f"{names[conflict.k]} contradicts {listed}: together they demand {conflict.defect:.6g} = 0 of the "
                           f"{conflict.of}{'' if free or not symbols.parameters else ' with the numbers in defaults'}; remove or "
                           "correct one of them")
+        elif all(any(_alike(conflict, c) for c in found) for found in others):
+            matter = _parameters_in(equations, conflict, numbers, free, kept)
+            given = ", ".join(p.name for p in matter)
+            if _always(equations, conflict, numbers, free, matter, kept):
+                faults.append(f"{names[conflict.k]} contradicts {listed}: what they demand of the {conflict.of} together differs "
+                              f"for all positive numbers of {given}; remove or correct one of them")
+            else:
+                warnings.warn(f"{equations.name}: {names[conflict.k]} and {listed} contradict each other unless parameters make "
+                              f"the difference in what they demand of the {conflict.of} = 0; it depends on {given}: give "
+                              "numbers in defaults, or remove one of the constraints", ModelWarning, stacklevel=5)
     loose = [_loose(d) for d in draws]
     if all(entries is not None for entries in loose):
         found = sorted(set.intersection(*[entries for entries in loose if entries is not None]))
@@ -69,15 +84,18 @@ def contradictions(equations: Equations) -> list[str]:
     return faults
 
 
-def _draw(equations: Equations, numbers: Mapping[str, float], free: Sequence[str], seed: int) -> _Draw | None:
-    """The same states for every seed, other numbers for the free parameters; None where hardly any state is defined."""
+def _some(free: Sequence[str], seed: int) -> dict[str, float]:
+    stream = np.random.default_rng(11 + seed)
+    return {name: stream.uniform(0.5, 1.5) for name in free}
+
+
+def _draw(equations: Equations, numbers: Mapping[str, float]) -> _Draw | None:
+    """The same states for all numbers of the parameters; None where hardly any state is defined."""
     symbols = equations.symbols
     stream = np.random.default_rng(7)
     values: dict[str, Any] = {"t": 0.37, **numbers}
     for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
         values |= {s.name: stream.uniform(0.5, 1.5, STATES) for s in group}
-    other = np.random.default_rng(11 + seed)
-    values |= {name: other.uniform(0.5, 1.5) for name in free}
     found = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
     arrays = [found[name] for name in ("C", "C_r", "C_t", "M_tilde")]
     defined = np.all([np.isfinite(a.reshape(STATES, -1)).all(axis=1) for a in arrays], axis=0)
@@ -119,8 +137,40 @@ def _conflicts(draw: _Draw, kept: Sequence[int], holonomic: Sequence[bool]) -> l
     return found
 
 
+def _alike(a: _Conflict, b: _Conflict) -> bool:
+    """Whether two conflicts are between the same rows."""
+    return (a.k, a.others, a.of) == (b.k, b.others, b.of)
+
+
+def _defect(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], kept: Sequence[int]) -> float:
+    """That of the same rows with other numbers of the parameters; 0 where they do not contradict each other."""
+    draw = _draw(equations, numbers)
+    found = _conflicts(draw, kept, equations.holonomic) if draw is not None else []
+    return next((c.defect for c in found if _alike(conflict, c)), 0.0)
+
+
+def _parameters_in(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], free: Sequence[str],
+                   kept: Sequence[int]) -> list[Any]:
+    """Parameters without numbers that change the defect."""
+    usual = _some(free, 0)
+    changed = {name: _defect(equations, conflict, {**numbers, **usual, name: 1.7 * usual[name]}, kept) for name in free}
+    return [p for p in equations.symbols.parameters if p.name in changed
+            and abs(changed[p.name] - conflict.defect) > TOLERANCE * abs(conflict.defect)]
+
+
+def _always(equations: Equations, conflict: _Conflict, numbers: Mapping[str, float], free: Sequence[str],
+            matter: Sequence[Any], kept: Sequence[int]) -> bool:
+    """Whether the defect has one sign for all numbers that the parameters can have, as far as these are positive."""
+    if not all(p.is_positive for p in matter):
+        return False
+    stream = np.random.default_rng(13)
+    trials = [dict.fromkeys(free, 1.0)]
+    trials += [{name: float(10 ** stream.uniform(-2, 2)) for name in free} for _ in range(TRIALS)]
+    return all(_defect(equations, conflict, {**numbers, **trial}, kept) * conflict.defect > 0 for trial in trials)
+
+
 def _same(a: _Conflict, b: _Conflict) -> bool:
-    return (a.k, a.others, a.of) == (b.k, b.others, b.of) and abs(a.defect - b.defect) <= TOLERANCE * abs(a.defect)
+    return _alike(a, b) and abs(a.defect - b.defect) <= TOLERANCE * abs(a.defect)
 
 
 def _loose(draw: _Draw) -> set[int] | None:

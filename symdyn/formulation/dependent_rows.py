@@ -4,7 +4,7 @@ the initial one, and those that are reached from there by walking along the moti
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,10 @@ RANK_TOLERANCE = 1e-8
 WALKS, STEPS, STRIDE = 6, 12, 0.25
 # Starts that are tried, the initial state and others up to 1 m or 1 rad away.
 STARTS = 8
+# Sets of random numbers that are tried for parameters without numbers.
+TRIES = 4
+# Derivatives smaller than this part of those beside a state vanish there.
+VANISHING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,36 @@ class Ranks:
     """rank: the largest found, of the scaled C_r; independent: rows that have it, far from losing it at all states.
 
     samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
+    vanishing   rows whose derivatives vanish at all these states, but not beside them
     """
 
     rank: int
     independent: tuple[int, ...]
     samples: np.ndarray
     mass: np.ndarray
+    vanishing: tuple[int, ...] = ()
+
+
+def search(equations: Equations, tries: int = TRIES) -> Ranks | None:
+    """The same as `ranks` where parameters have no numbers, too: these take random ones, a few times.
+
+    Random numbers make no rows dependent that are not with all numbers.
+    """
+    symbols = equations.symbols
+    missing = [p for p in symbols.parameters if p not in symbols.defaults]
+    if not missing:
+        return ranks(equations)
+    stream = np.random.default_rng(3)
+    initial = dict(symbols.initial)
+    for group in equations.unit_groups:
+        if not any(initial.get(q) for q in group):
+            initial[group[0]] = 1.0
+    for _ in range(tries):
+        numbers = {**symbols.defaults, **{p: float(stream.uniform(0.5, 1.5)) for p in missing}}
+        found = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=initial)))
+        if found is not None:
+            return found
+    return None
 
 
 def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
@@ -56,7 +84,15 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     samples = samples[counts == rank]
     values = {**states.values, **dict(zip(states.names, q[0], strict=True))}
     mass = evaluate_rows(equations.tape("M_tilde"), values, 1)["M_tilde"][0]
-    return Ranks(rank, _independent(samples, rank), samples, mass)
+    return Ranks(rank, _independent(samples, rank), samples, mass, _vanishing(states, places, stream))
+
+
+def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
+    """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those beside them."""
+    here = np.abs(states.at(places)["C_r"]).max(axis=(0, 2), initial=0.0)
+    beside = np.abs(states.at(places + stream.uniform(-0.5, 0.5, places.shape))["C_r"]).max(axis=2, initial=0.0)
+    beside = np.where(np.isfinite(beside), beside, 0.0).max(axis=0, initial=0.0)
+    return tuple(int(k) for k in np.flatnonzero(states.holonomic & (here <= VANISHING * beside)))
 
 
 def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator) -> Iterator[np.ndarray]:

@@ -81,7 +81,7 @@ class NullSpaceSolver:
         for b in self.blocks:
             k, after = list(b), list(range(b.stop, n))
             rows = [self.rows[p] for p in b]
-            sizes = [inner(self.C[row, self.d], self.C[row, self.d]) + self.least[row] for row in rows]
+            sizes = [inner(self.C[row], self.C[row]) + self.least[row] for row in rows]
             label = " and ".join(names[self.rows[p]] for p in b)
             self.inverse.append(self._inverse(A[np.ix_(k, k)], sizes, label, b.start))
             if after:

@@ -74,11 +74,22 @@ def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None)
     """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
     symbols = equations.symbols
     if found is None:
-        if all(p in symbols.defaults for p in symbols.parameters):
+        used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
+        lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
+        if not lacking:
+            given = getattr(quantities, "prescribed", ())
+            drives = f"; the motion of {', '.join(given)} in the loops is prescribed and may leave none" if given else ""
             warnings.warn(f"{equations.name}: no state was found that fulfils the constraints "
-                          f"{', '.join(equations.constraints)}; check the numbers in defaults, or give a state near one in "
-                          "initial", ModelWarning, stacklevel=5)
-        return []
+                          f"{', '.join(equations.constraints)}{drives}; check the numbers in defaults, or give a state near one "
+                          f"in initial{', or a coordinate to one of these joints' if given else ''}", ModelWarning, stacklevel=5)
+            return []
+        return [f"constraints: whether they depend on each other is unknown, because {', '.join(lacking)} "
+                f"{'has no number' if len(lacking) == 1 else 'have no numbers'} in defaults"]
+    if found.vanishing:
+        rows = ", ".join(equations.constraints[k] for k in found.vanishing)
+        warnings.warn(f"{equations.name}: all derivatives of {rows} vanish at every consistent state found, so that it holds "
+                      "nothing there; pass a constraint that changes its sign where it is fulfilled, for a square its root",
+                      ModelWarning, stacklevel=5)
     if found.rank < len(symbols.speeds):
         return []
     if all(is_zero(e) for e in quantities.C_t()):

@@ -80,15 +80,13 @@ def idle_coordinate_faults(loops: Iterable[Joint | Gear], used: Iterable[sp.Basi
     faults = []
     used = set(used)
     for joint in loops:
-        if not isinstance(joint, Joint) or joint.inner or joint.faults or isinstance(joint, Free):
+        if not isinstance(joint, Joint) or joint.inner or joint.faults or joint.unnamed or isinstance(joint, Free):
             continue
-        own = f"q_{joint.name}"  # what a joint calls its coordinates where none are given
-        idle = [q for q in joint.coordinates if isinstance(q, Coordinate) and not q.name.startswith(own)
-                and not used & {q, q.dot}]
+        idle = [q for q in joint.coordinates if isinstance(q, Coordinate) and not used & {q, q.dot}]
         if idle:
-            faults.append(f"joint {joint.name!r} closes a loop and is given the coordinate {', '.join(map(str, idle))}; a closing "
-                          "joint has no coordinate, its motion follows from the others: leave it out, or put this joint into the "
-                          "tree and close the loop at another")
+            faults.append(f"joint {joint.name!r} closes a loop and is given the coordinate {', '.join(map(str, idle))}; a "
+                          "closing joint has no coordinate, its motion follows from the others: leave it out, or put this "
+                          "joint into the tree and close the loop at another")
     return faults
 
 

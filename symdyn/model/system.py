@@ -101,7 +101,8 @@ class System:
         """A joint between two bodies that are already in the tree, an sd.Rod, or an sd.Gear: it becomes constraints.
 
         Joints of all kinds but Free close loops: Fixed, Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Helical,
-        Custom. Their coordinates do not become coordinates of the system, except those of Helical and Custom joints.
+        Custom. Their coordinates do not become coordinates of the system, except those of Helical and Custom joints: give none to
+        the others.
         """
         if not isinstance(joint, (Joint, Gear)):
             self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...), an sd.Rod or an sd.Gear")
@@ -231,7 +232,8 @@ class System:
                       besides
         orientation   of the bodies in absolute coordinates: EulerParameters(), the default, or EulerAngles(...)
         frames        as for `embedding`; parallel ones, where there are any, print F_d in absolute angles
-        Raises ModelError with every fault found, and for constraints that cannot hold or move nothing.
+        Raises ModelError with every fault found, and for constraints that cannot hold or move nothing; SymdynError for an
+        orientation that nothing takes: in relative coordinates or in a plane.
         """
         from symdyn.formulation.augmented import augment
 

@@ -172,21 +172,27 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
     if stopped:
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _FIELD_FAILED:
-        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], run.unit.reason(int(report[5])))
+        x_fail = report[8 + n:8 + 2 * n]
+        why = _dependent(module, run, report[7], x_fail)
+        return describe_stop(metadata, report[7], x_fail, run.unit.reason(int(report[5])) + why)
     if status == _NOT_FINITE:
         bad = int(report[6])
         name = metadata["x"][bad] if 0 <= bad < n else "the state"
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], f"the derivative of {name} is not finite")
-    own, p = module.metadata["sizes"], run.request.p
     if status == _PROJECTION_FAILED:
         x_fail = report[8 + n:8 + 2 * n]
-        why = lost_rank(module, report[7], x_fail[:own["x"]], p, run.request.x0[:own["x"]], run.request.span[0])
+        why = _dependent(module, run, report[7], x_fail)
         return describe_stop(metadata, report[7], x_fail, f"no way back onto the constraints: {_off(module, run, report)}{why}")
     if status == _STEP_TOO_SMALL:
-        why = nearly_singular(module, t, x[:own["x"]], p) + lost_rank(module, t, x[:own["x"]], p,
-                                                                      run.request.x0[:own["x"]], run.request.span[0])
+        why = nearly_singular(module, t, x[:module.metadata["sizes"]["x"]], run.request.p) + _dependent(module, run, t, x)
         return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
     return describe_stop(metadata, t, x, f"the integrator refused (status {status})")
+
+
+def _dependent(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
+    """What to add to a message where constraints depend on each other, unlike at the start."""
+    n, request = module.metadata["sizes"]["x"], run.request
+    return lost_rank(module, t, x[:n], request.p, request.x0[:n], request.span[0])
 
 
 def _off(module: Module, run: _Run, report: np.ndarray) -> str:

@@ -59,6 +59,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
     if request.first_step:
         options["first_step"] = request.first_step
     trouble: list[str] = []  # why the step under way could not be evaluated
+    failed: list[tuple[float, np.ndarray]] = []  # where
     raised: list[Exception] = []
 
     def given(s: float, x: np.ndarray) -> np.ndarray:
@@ -91,7 +92,14 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         except EvaluationError as error:
             if np.isfinite(x).all():
                 trouble.append(str(error).removeprefix(f"{module.name}: "))
+                failed[:] = [(s, x.copy())]
             return np.full(len(x), np.nan)
+
+    def dependent(x: np.ndarray) -> str:
+        """What to add to a message where constraints depend on each other, unlike at the start."""
+        places = [(here, x), *(failed if trouble else ())]
+        told = (lost_rank(module, s, at[:n_state], request.p, request.x0[:n_state], t0) for s, at in places)
+        return next(filter(None, told), "")
 
     t0, t_end = request.span
     ts, xs = [t0], [request.x0]
@@ -112,6 +120,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                 if solver.status == "failed" or not np.isfinite(solver.y).all():
                     message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
                         module, here, state[:n_state], request.p) if note else "the state is not finite"
+                    message += dependent(state)
                     break
                 trouble.clear()
                 # The polynomial of the step ends where the step did, before the projection.
@@ -137,7 +146,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                 if bar is not None:
                     bar.update(abs(solver.t - before))
                 if watch is not None and watch(here, state):
-                    message = watch(here, state) + lost_rank(module, here, state[:n_state], request.p, request.x0[:n_state], t0)
+                    message = watch(here, state) + dependent(state)
                     break
                 if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
                     message = f"stopped after {accepted} steps, as asked"
@@ -145,11 +154,11 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
     except KeyboardInterrupt:
         interrupted, message = True, "interrupted"
     except ProjectionFailed as error:
-        message = str(error) + lost_rank(module, here, state[:n_state], request.p, request.x0[:n_state], t0)
+        message = str(error) + dependent(state)
     except (ValueError, ArithmeticError) as error:
         if error in raised:
             raise
-        message = trouble[-1] if trouble else str(error)
+        message = (trouble[-1] if trouble else str(error)) + dependent(state)
     done = not message
     n = min(len(ts), len(xs))  # an interrupt may come between the two
     if not done:

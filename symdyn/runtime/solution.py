@@ -48,7 +48,8 @@ class Solution:
         self._n_c = len(names(module))
 
     def __getitem__(self, name: Any) -> np.ndarray:
-        """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...).
+        """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
+        multipliers, the name of a constraint, with or without lam_ before it, for its multiplier.
 
         Raises ArgumentError for an unknown name.
         """
@@ -60,7 +61,12 @@ class Solution:
             return self.inputs[:, metadata["inputs"].index(name)]
         if name in self.outputs:
             return self.outputs[name]
-        known = [*metadata["x"], *metadata["inputs"], *self.outputs]
+        constraints = names(self.module)
+        if self._n_c and name == "lam":
+            return self.lam
+        if name in constraints or name.removeprefix("lam_") in constraints:
+            return self.lam[:, constraints.index(name if name in constraints else name.removeprefix("lam_"))]
+        known = [*metadata["x"], *metadata["inputs"], *self.outputs, *(["lam", *constraints] if self._n_c else ())]
         near = difflib.get_close_matches(name, known, 3)
         raise ArgumentError(f"{self.module.name}: the solution has no {name!r}; "
                             + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
@@ -203,7 +209,7 @@ class Solution:
         return animate(self, path, fps, speed)
 
     def save(self, path: Any) -> Path:
-        """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs and outputs in columns).
+        """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs, outputs and multipliers in columns).
 
         Raises ArgumentError for another ending.
         """
@@ -233,6 +239,8 @@ class Solution:
                 flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
                 titles += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
                 columns += list(flat.T)
+            titles += [f"lam_{name}" for name in names(self.module)]
+            columns += list(self.lam.T)
             with path.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)
                 writer.writerow(titles)

@@ -19,8 +19,11 @@ WAYS = ("projection", "baumgarte", "none")
 LOST = 1e-2
 _ROUNDS = 12
 # Residuals of positions relative to the length, of speeds relative to the largest: what rounding leaves, what is a failure.
-_ROUNDING = 1e-13
+# Coordinates are known to eps |q| only, |q| the largest of them in m (angles times the length): of positions rounding leaves
+# 4 eps |q| / length where that is more, and a failure is more than four times that. Within 100 lengths or rad it is not felt.
+_ROUNDING = np.array([1e-13, 1e-13])
 _TOO_MUCH = np.array([1e-9, 1e-8])
+_RESOLVED = 9e-16
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,8 @@ class Projector:
         self.groups = [[module.metadata["x"].index(name) for name in group] for group in module.metadata.get("unit_groups", ())]
         self.length = length(module, params) if self.n_c else 1.0
         self.velocities = as_velocities(module, params) if self.n_c else np.ones(self.n_u)
+        units = module.metadata["units"]
+        self.lengths = np.array([self.length if units.get(q) in ("rad", "1") else 1.0 for q in module.metadata["q"]])
         self.n_evaluations, self.n_steps = 0, 0
         self.largest = np.zeros(2)
         self._evaluators = {}
@@ -130,10 +135,10 @@ class Projector:
     def _correct(self, t: float, x: np.ndarray) -> None:
         """Corrections until residuals are at rounding level, or shrink no further."""
         q, u = x[:self.n_q], x[self.n_q:self.n_q + self.n_u]
-        left = np.full(2, np.inf)
+        left, rounding = np.full(2, np.inf), _ROUNDING
         for _ in range(_ROUNDS):
             before = left
-            if left[0] > _ROUNDING:
+            if left[0] > rounding[0]:
                 row = self._evaluate("position_correction", t, x)
                 if np.abs(row[:self.n_c]).max() > 4e-16 * self.length:
                     q += row[self.n_c:]
@@ -142,10 +147,13 @@ class Projector:
             residuals = np.abs(self._evaluate("violation", t, x)).reshape(2, self.n_c)
             speed = max(1e-5 * self.length, np.abs(u * self.velocities).max(initial=0.0))
             left = residuals.max(axis=1) / [self.length, speed]
-            if not ((left > _ROUNDING) & (left < 0.7 * before)).any():
+            far = np.abs(q * self.lengths).max(initial=0.0) / self.length
+            rounding = np.maximum(_ROUNDING, [_RESOLVED * far, 0.0])
+            if not ((left > rounding) & (left < 0.7 * before)).any():
                 break
-        if (left > _TOO_MUCH).any():
-            of_speeds = bool(left[0] <= _TOO_MUCH[0])
+        too_much = np.maximum(_TOO_MUCH, [4 * rounding[0], 0.0])
+        if (left > too_much).any():
+            of_speeds = bool(left[0] <= too_much[0])
             worst = int(residuals[int(of_speeds)].argmax())
             raise ProjectionFailed("no way back onto the constraints: " + not_converged(
                 names(self.module)[worst], float(residuals[int(of_speeds), worst]), of_speeds))

@@ -38,15 +38,27 @@ def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.nda
     try:
         J = scaled_jacobian(module, t, x, p)
         before = int(rank(module, t0, x0, p))
+        usual = float(np.linalg.norm(scaled_jacobian(module, t0, x0, p), 2))
     except (EvaluationError, np.linalg.LinAlgError):
         return ""
     U, values, _ = np.linalg.svd(J)
-    now = int((values > 1e-4 * values[0]).sum())
+    small = 1e-4 * max(values[0], usual)
+    now = int((values > small).sum())
     if now >= before:
         return ""
     share = np.abs(U[:, now:before]).max(axis=1)
-    among = ", ".join(name for name, s in zip(names(module), share, strict=True) if s > 0.1 * share.max())
-    return f"; the constraints nearly lose rank there ({now} instead of {before}): {among} nearly depend on each other"
+    among = np.flatnonzero(share > 0.1 * share.max())
+    flat = np.linalg.norm(J[among], axis=1) <= small
+    if len(among) - int(flat.sum()) < 2:  # one alone depends on no other
+        flat[:] = True
+    vanishing, tied = ([names(module)[k] for k in rows] for rows in (among[flat], among[~flat]))
+    told = []
+    if vanishing:
+        told.append(f"the gradient of {vanishing[0]} nearly vanishes" if len(vanishing) == 1 else
+                    f"the gradients of {', '.join(vanishing)} nearly vanish")
+    if tied:
+        told.append(f"{', '.join(tied)} nearly depend on each other")
+    return f"; the constraints nearly lose rank there ({now} instead of {before}): {'; '.join(told)}"
 
 
 def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:

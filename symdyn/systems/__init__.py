@@ -67,8 +67,8 @@ def get(name: str, **options: Any) -> System:
     """
     if name not in _CATALOGUE:
         near = difflib.get_close_matches(str(name), _CATALOGUE, n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(near)}? " if near else ""
-        raise SymdynError(f"the catalogue has no system {name!r}; {hint}It has {', '.join(_CATALOGUE)}")
+        hint = f"did you mean {' or '.join(near)}? It has" if near else "it has"
+        raise SymdynError(f"the catalogue has no system {name!r}; {hint} {', '.join(_CATALOGUE)}")
     return _function(name)(**options)
 
 

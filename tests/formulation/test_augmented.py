@@ -577,27 +577,29 @@ def compare_with_kane(system: sd.System, kane: Any, scene: Scene, names: list[st
 
 
 def test_reactions_of_a_closing_screw_turn_into_the_axes_of_its_child() -> None:
-    s = sd.System("screwed", gravity=[0, 0, -9.81])
-    upper, lower = (s.add_body(name, mass=1, inertia=[1, 1, 1], com=[0.5, 0, 0]) for name in ("upper", "lower"))
-    s.add_joint(sd.Revolute("shoulder", s.ground, upper))
-    s.add_joint(sd.Cylindrical("elbow", upper, lower, parent_point=[1, 0, 0]))
-    s.close_loop(sd.Helical("screw", s.ground, "lower", pitch=0.1))
-    s.initial = {"q_shoulder": 0.3}
+    s = sd.System("screwed", gravity=[1, 2, -9.81])
+    nut = s.add_body("nut", mass=1, inertia=[1, 1, 1], com=[0.5, 0, 0])
+    s.add_joint(sd.Cylindrical("guide", s.ground, nut))
+    s.close_loop(sd.Helical("screw", s.ground, nut, pitch=0.1))
+    s.initial = {"q_guide_1": 0.3, "q_guide_2": 0.03, "q_screw": 0.3}
     found = {}
     for coordinates in ("relative", "absolute"):
         equations = s.augmented(coordinates)
-        assert ("screw", "ground", "lower", "helical") in equations.joints
+        assert ("screw", "ground", "nut", "helical") in equations.joints
         assert len({*equations.bodies}) == len(equations.bodies)
         solution = equations.compile("numpy").simulate([0, 0.05])
         found[coordinates] = solution.reaction("screw", "child")
-        assert np.array_equal(found[coordinates], solution.reaction("screw", "lower"))
-    assert close(found["absolute"][0], found["relative"][0], 10.0)
+        assert np.array_equal(found[coordinates], solution.reaction("screw", "nut"))
+    along = [2, 5]  # the rest the guide shares
+    assert close(found["absolute"][0][along], found["relative"][0][along], 10.0)
 
 
-ORIENTATIONS = {
-    "relative": ({"orientation": sd.EulerParameters()}, False, "orientation EulerParameters is given, but coordinates are 'relative'"),
+ORIENTATIONS: dict[str, tuple[dict[str, Any], bool, str]] = {
+    "relative": ({"orientation": sd.EulerParameters()}, False,
+                 "orientation EulerParameters is given, but coordinates are 'relative'"),
     "planar": ({"orientation": sd.EulerAngles("XYZ"), "coordinates": "absolute"}, True, "but the system is planar.*leave it out"),
-    "text": ({"orientation": "XYZ", "coordinates": "absolute"}, False, "orientation is 'XYZ'; it tells how bodies turn.*sd.EulerAngles"),
+    "text": ({"orientation": "XYZ", "coordinates": "absolute"}, False,
+             "orientation is 'XYZ'; it tells how bodies turn.*sd.EulerAngles"),
 }
 
 
@@ -609,3 +611,30 @@ def test_orientations_that_nothing_takes(name: str) -> None:
                                                            if planar else [1, 0, 0])))
     with pytest.raises(SymdynError, match=message):
         s.augmented(**options)
+
+
+@pytest.mark.parametrize("coordinates", ["relative", "absolute"])
+def test_dependent_constraints_without_numbers(coordinates: str) -> None:
+    s = sd.systems.bricard()
+    s.defaults = {}
+    notes = s.augmented(coordinates).notes
+    assert any("they depend on the others at every state tried" in note for note in notes)
+
+
+def test_dependence_is_unknown_where_random_numbers_leave_no_state() -> None:
+    s = sd.System("far", gravity=[0, -9.81])
+    body = s.add_body("body", mass=1, inertia=1)
+    s.add_joint(sd.Revolute("hinge", s.ground, body))
+    far = sd.parameters("far")
+    s.close_loop(sd.Rod("rod", s.ground, body, far, parent_point=[100, 0], child_point=[1, 0]))
+    assert any("whether they depend on each other is unknown, because far has no number" in n for n in s.augmented().notes)
+
+
+def test_euler_angles_at_gimbal_lock() -> None:
+    s = sd.System("upright", gravity=[0, 0, -9.81])
+    bar = s.add_body("bar", mass=1, inertia=[1, 1, 1], com=[1, 0, 0])
+    hinge = s.add_joint(sd.Revolute("hinge", s.ground, bar, axis=[0, 1, 0]))
+    s.initial = {hinge.coordinates[0]: np.pi / 2}
+    with pytest.warns(sd.ModelWarning, match=r"upright: the Euler angles ZYX of bar are singular.*or sd.EulerParameters\(\)"):
+        s.augmented("absolute", sd.EulerAngles("ZYX"))
+    s.augmented("absolute")

@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import ModelError, SymdynError
+from symdyn.errors import ModelError, ModelWarning, SymdynError
 from symdyn.runtime.compiler import find_compiler
 from tests.helpers import close, largest, quantities, state
 
@@ -440,7 +440,8 @@ def test_contradictions(rows, parts):
 
 
 def test_contradiction_by_the_numbers_in_defaults():
-    assert sd.augmented([x, y], [m, m], None, [x - l, x - a]).constraints  # l = a may come
+    with pytest.warns(ModelWarning, match="unless parameters make"):  # l = a may come
+        assert sd.augmented([x, y], [m, m], None, [x - l, x - a]).constraints
     with pytest.raises(sd.ModelError, match="with the numbers in defaults"):
         sd.augmented([x, y], [m, m], None, [x - l, x - a], defaults={m: 1, l: 1, a: 2})
     eq = sd.augmented([x, y], [m, m], None, [x - l, x - a], defaults={m: 1, l: 1, a: 1})
@@ -480,7 +481,7 @@ def test_one_dependent_speed_stands_for_itself(dependent: Any) -> None:
 
 @pytest.mark.parametrize("dependent", [None, (), "q2", 3, [x, y], [y, y], [None]])
 def test_dependent_speeds_that_do_not_fit(dependent: Any) -> None:
-    with pytest.raises(SymdynError, match="fixed_track: dependent is .*; pass 1 different ones of x_dot, y_dot, x, y"):
+    with pytest.raises(SymdynError, match=r"fixed_track: dependent is .*; pass 1 different ones of x_dot, y_dot, x, y"):
         fixed_track().without_multipliers(dependent)
 
 
@@ -490,3 +491,33 @@ def test_a_constraint_that_is_none_has_one_fault(wrong: Any) -> None:
         with pytest.raises(ModelError) as caught:
             sd.augmented([x, y], [m, m], None, rows)
         assert len(caught.value.faults) == 1, caught.value.faults
+
+
+l_p, a_p, b_p = sd.parameters("l_p a_p b_p", positive=True)
+
+
+@pytest.mark.parametrize("rows", [[x - l_p, x - 2 * l_p], [x - l_p, y - 2 * l_p, x + y - 4 * l_p]])
+def test_contradictions_for_all_positive_numbers(rows: list[Any]) -> None:
+    with pytest.raises(ModelError, match=r"contradicts constraint_1.*differs for all positive numbers of l_p; remove") as caught:
+        sd.augmented([x, y], [m, m], None, rows)
+    assert len(caught.value.faults) == 1
+
+
+@pytest.mark.parametrize(("rows", "given"), [
+    ([x - l, x - 2 * l], "l"), ([x - l, y - 2 * l, x + y - 4 * l], "l"), ([x - a, x - w], "a, w|w, a"),
+    ([x - a_p, x - b_p], "a_p, b_p"), ([x - a_p**2 - b_p**2, x - 2 * a_p * b_p], "a_p, b_p")])
+def test_contradictions_unless_parameters_forbid(rows: list[Any], given: str) -> None:
+    with pytest.warns(ModelWarning, match=rf"contradict each other unless parameters make .* = 0; it depends on ({given}):"):
+        sd.augmented([x, y], [m, m], None, rows)
+
+
+def test_no_state_without_numbers_that_do_not_matter() -> None:
+    with pytest.warns(ModelWarning, match="no state was found that fulfils the constraints constraint_1"):
+        sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 + 1])
+
+
+def test_a_row_whose_derivatives_vanish_wherever_it_is_fulfilled() -> None:
+    with pytest.warns(ModelWarning, match="all derivatives of square vanish at every consistent state found"):
+        sd.augmented([x, y, z], [m, m, m], None, [(x - 1)**2, y - x], names=["square", "line"])
+    for rows in ([x**3 - 1], [x**2 + y**2 - l**2], [x**2 - 1e-4], [sp.sin(x)]):
+        sd.augmented([x, y], [m, m], None, rows)

@@ -309,3 +309,42 @@ def test_out_of_reach_is_told_as_a_warning() -> None:
     loop(s, sd.Revolute, parent_point=[5, 0], child_point=[1, 0])
     with pytest.warns(ModelWarning, match="no state was found that fulfils the constraints loop_x, loop_y"):
         s.augmented()
+
+
+def test_contradictions_come_without_warnings_of_the_same_cause() -> None:
+    s = arm()
+    for name, expression in (("a", q1 - 1), ("b", q1 - 2)):
+        s.add_constraint(expression, name=name)
+    with warnings.catch_warnings(), pytest.raises(ModelError, match="b contradicts a"):
+        warnings.simplefilter("error")
+        s.augmented()
+
+
+@pytest.mark.parametrize("positive", [True, False])
+def test_contradictions_between_parameters_without_numbers(positive: bool) -> None:
+    a = sd.parameters("a", **({"positive": True} if positive else {}))
+    s = arm()
+    for k in (1, 2):
+        s.add_constraint(q1 - k * a)
+    if positive:
+        one(faults_of(s), "constraint_2 contradicts constraint_1|for all positive numbers of a; remove or correct one")
+    else:
+        with pytest.warns(ModelWarning, match="constraint_2 and constraint_1 contradict each other unless"):
+            s.augmented()
+
+
+def test_out_of_reach_names_the_prescribed_joints_of_the_loop() -> None:
+    s = arm(planar=True)
+    beside = s.add_body("beside", mass=1, inertia=1)
+    s.add_joint(sd.Revolute("spin", s.ground, beside, sp.sin(sd.t)))
+    s.joints[0].coordinates = (sd.t,)
+    loop(s, sd.Revolute, parent_point=[5, 0], child_point=[1, 0])
+    with pytest.warns(ModelWarning, match="no state was found.*; the motion of shoulder in the loops is prescribed"):
+        s.augmented()
+
+
+def test_a_square_of_an_angle_is_warned_of() -> None:
+    s = arm()
+    s.add_constraint((q1 - 1)**2, name="square")
+    with pytest.warns(ModelWarning, match="all derivatives of square vanish at every consistent state found"):
+        s.augmented()

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.stops import lost_rank
 from tests.runtime.constrained import module
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow", "-fsyntax-only"]
@@ -188,6 +190,25 @@ def test_nothing_to_stabilize() -> None:
         free.simulate(stabilization="baumgarte")
 
 
+@pytest.mark.parametrize("method", ["dop853", "DOP853"])
+def test_far_from_the_origin(method: str) -> None:
+    """x, y grow to 4e30 m, where they carry the constraint to their own rounding only. Along the slope,
+    s_ddot = theta_dot^2 s - g sin theta."""
+    from scipy.integrate import solve_ivp
+
+    if method == "dop853" and find_compiler() is None:
+        pytest.skip("no C compiler here")
+    slope = systems.get("particle_on_moving_slope", rocking=True).augmented().compile(
+        backend="c" if method == "dop853" else "numpy")
+    solution = slope.simulate(np.array([0.0, 25.0, 50.0, 100.0]), rtol=1e-10, method=method)
+    assert solution.success
+    distance = np.hypot(*solution.q.T)
+    assert (np.abs(solution.rows("C")[:, 0]) <= 1e-15 * distance).all() and distance[-1] > 1e30
+    along = solve_ivp(lambda t, s: [s[1], np.cos(2 * t)**2 * s[0] - 9.81 * np.sin(0.5 * np.sin(2 * t))], (0, 25), [1.0, -0.5],
+                      method="DOP853", rtol=1e-11, atol=1e-11).y[0, -1]
+    np.testing.assert_allclose(distance[1], abs(along), rtol=1e-6)
+
+
 # -- what cannot go on
 
 
@@ -199,6 +220,28 @@ def test_no_way_back(method: str) -> None:
     assert not solution.success and 0.99 < solution.t[-1] <= 1.01 and len(solution.t) > 495
     assert worst(solution)[0] < 1e-9 and np.isfinite(solution.lam[:495]).all()
     np.testing.assert_allclose(solution["y"][:495], solution.t[:495], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+def test_no_way_back_on_numpy(method: str) -> None:
+    with pytest.warns(SimulationWarning, match="nearly lose rank there .1 instead of 2.: circle, lift nearly depend"):
+        module("driven", "numpy").simulate((0, 2), method=method)
+
+
+def test_what_is_lost_where_a_gradient_vanishes() -> None:
+    x, y = sd.coordinates("x y")
+    system = sd.System("cross", gravity=[0, 0])
+    rail, particle = system.add_body("rail", mass=1), system.add_body("particle", mass=1)
+    system.add_joint(sd.Prismatic("along", system.ground, rail, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("up", rail, particle, axis=[0, 1], coordinate=y))
+    system.add_constraint(x**2 - y**2, "cross")
+    system.initial = {x: 1, y: 1}
+    cross = system.augmented().compile(backend="numpy")
+    start, p = np.array([1.0, 1.0, 0.0, 0.0]), cross.parameters()
+    near = np.array([1e-6, 1e-6, 0.0, 0.0])
+    assert lost_rank(cross, 0.0, near, p, start, 0.0) == (
+        "; the constraints nearly lose rank there (0 instead of 1): the gradient of cross nearly vanishes")
+    assert lost_rank(cross, 0.0, start, p, start, 0.0) == ""
 
 
 @pytest.mark.parametrize("method", ["LSODA", "RK45"])

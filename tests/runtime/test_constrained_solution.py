@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -67,7 +68,21 @@ def test_saved(tmp_path: Path) -> None:
     for name in ("lam", "constraint_violation", "velocity_violation"):
         np.testing.assert_array_equal(kept[name], getattr(solution, name))
     assert json.loads(str(kept["about"]))["constraints"] == ["hinge4_x", "hinge4_y"]
-    assert solution.save(tmp_path / "four_bar.csv").read_text().startswith("t,q1,q2,q3,q1_dot")
+    with solution.save(tmp_path / "four_bar.csv").open(encoding="utf-8") as file:
+        titles, *rows = csv.reader(file)
+    assert titles[:5] == ["t", "q1", "q2", "q3", "q1_dot"] and titles[-2:] == ["lam_hinge4_x", "lam_hinge4_y"]
+    np.testing.assert_array_equal(np.array([row[-2:] for row in rows], dtype=float), solution.lam)
+
+
+def test_multipliers_by_name() -> None:
+    solution = module("four_bar").simulate((0, 1))
+    np.testing.assert_array_equal(solution["lam"], solution.lam)
+    for name in ("hinge4_y", "lam_hinge4_y"):
+        np.testing.assert_array_equal(solution[name], solution.lam[:, 1])
+    with pytest.raises(ArgumentError, match="the solution has no 'hinge4'; did you mean hinge4_"):
+        solution["hinge4"]
+    with pytest.raises(ArgumentError, match="the solution has no 'lam'"):
+        module("pendulum").simulate((0, 0.1))["lam"]
 
 
 def test_reactions() -> None:
@@ -88,7 +103,7 @@ def test_reactions() -> None:
     along = wanted[:, 0] * np.cos(angle) + wanted[:, 1] * np.sin(angle)
     np.testing.assert_allclose(solution.reaction("hinge2", "parent")[:, 0], along, rtol=0, atol=1e-9 * np.abs(wanted).max())
     np.testing.assert_array_equal(solution.reaction("hinge2", "bar1"), solution.reaction("hinge2", "parent"))
-    with pytest.raises(ArgumentError, match="no reaction of a joint .hinge. is known; did you mean hinge[1-4] or"):
+    with pytest.raises(ArgumentError, match=r"no reaction of a joint .hinge. is known; did you mean hinge[1-4] or"):
         solution.reaction("hinge")
     with pytest.raises(ArgumentError, match="no frame 'bar7'; there are ground, parent, child, bar1"):
         solution.reaction("hinge1", "bar7")

@@ -339,6 +339,31 @@ def test_a_screw_in_absolute_coordinates_has_no_carrier_in_its_picture() -> None
     assert np.allclose(solution.reaction("thread", "child"), solution.reaction("thread", "nut"))
 
 
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_loop_closed_by_a_guide_has_a_slider_on_a_rail(flipped: bool) -> None:
+    q = symdyn.coordinates("q1:4")
+    system = symdyn.System("crank", gravity=[0, -9.81, 0])
+    crank, rod, slider = [system.add_body(name, mass=1, inertia=[0.1, 0.1, 0.1], com=com)
+                          for name, com in (("crank", [0.25, 0, 0]), ("rod", [0.5, 0, 0]), ("slider", [0, 0, 0]))]
+    system.add_joint(symdyn.Revolute("A", system.ground, crank, q[0]))
+    system.add_joint(symdyn.Revolute("B", crank, rod, q[1], parent_point=[0.5, 0, 0]))
+    system.add_joint(symdyn.Revolute("C", rod, slider, q[2], parent_point=[1, 0, 0]))
+    ends = (slider, system.ground) if flipped else (system.ground, slider)
+    system.close_loop(symdyn.Prismatic("guide", *ends, axis=[1, 0, 0]))
+    lean = np.arcsin(0.5 * np.sin(0.7))
+    system.initial = {q[0]: 0.7, q[1]: -0.7 - lean, q[2]: lean}
+    drawing = Drawing.of(system.augmented().compile("numpy").simulate((0.0, 0.2)))
+    assert drawing is not None and dict(drawing.sliders) == {2: [0]} and np.allclose(drawing.pivots, 0.0)
+    assert drawing.pivots.shape == (1, 2) and missed(drawing.rails, drawing.lines[2][:, 0]) < 1e-12
+    assert missed(drawing.lines[1], drawing.lines[2][:, 0]) < 1e-6
+
+
+def test_what_a_joint_of_the_user_does_is_seen_in_its_motion() -> None:
+    for name in ("pendulum_absolute", "skate"):
+        drawing = Drawing.of(loop(name))
+        assert drawing is not None and not drawing.sliders and not len(drawing.pivots) and drawing.rails.shape[1] == 1
+
+
 def test_bodies_without_joints_that_are_told_are_joined_as_they_move() -> None:
     solution = motion("double_pendulum")
     told = Drawing.of(solution)

@@ -52,7 +52,7 @@ def test_unknown_name_offers_the_nearest() -> None:
         sd.systems.get("pendulm")
     for name in sd.systems.names():
         assert name in str(caught.value)
-    with pytest.raises(sd.SymdynError, match="It has pendulum"):
+    with pytest.raises(sd.SymdynError, match="; it has pendulum"):
         sd.systems.get("zzz")
     with pytest.raises(AttributeError, match="pendulum"):
         sd.systems.pendulm  # noqa: B018

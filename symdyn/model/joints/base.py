@@ -65,6 +65,7 @@ class Joint:
         self.child_point = faults.vector(child_point, f"{where}: child_point", planar=True)
         self.parent_rotation = self._rotation(parent_rotation, "parent_rotation")
         self.child_rotation = self._rotation(child_rotation, "child_rotation")
+        self.unnamed = coordinates is None
         self.coordinates = self._coordinates(coordinates)
         self.speeds = self._speeds(speeds)
 

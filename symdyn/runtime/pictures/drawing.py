@@ -91,11 +91,13 @@ def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[i
     if "frames" not in module.functions:
         return bare_skeleton(centres), kept
     frames = solution.frames.reshape(n_t, -1, 12)
-    if "joint_points" not in module.functions:
-        return guess_skeleton(frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3), centres, _ends(solution, kept)), kept
+    origins, rotations = frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3)
+    if "joint_points" not in module.functions or "reaction_kinds" not in module.metadata:
+        return guess_skeleton(origins, rotations, centres, _ends(solution, kept)), kept
     kept = [k for k in kept if k not in carriers(module.metadata)]
     joints = placed_joints(module.metadata, kept, solution.rows("joint_points").reshape(n_t, -1, 6))
-    return jointed_skeleton(joints, frames[:, kept, :3], centres[:, kept], _ends(solution, kept)), kept
+    ends = _ends(solution, kept)
+    return jointed_skeleton(joints, origins[:, kept], rotations[:, kept], centres[:, kept], ends), kept
 
 
 def _ends(solution: Solution, bodies: Sequence[int]) -> list[tuple[int, np.ndarray]]:

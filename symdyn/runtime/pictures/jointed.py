@@ -13,9 +13,8 @@ from symdyn.runtime.pictures.skeleton import Skeleton, connect, extent
 
 # Closer than this, relative to the mechanism, are points that are the same.
 _SAME = 1e-6
-# Of kinds of joints: those whose bodies float, and those whose points slide.
-_FLOATING = ("free", "planar")
-_SLIDING = ("prismatic", "cylindrical", "helical")
+# What kinds of joints are in a picture; others are hinges.
+_ROLES = {"free": "float", "planar": "float", "prismatic": "slider", "cylindrical": "slider", "helical": "slider", "rod": "rod"}
 
 
 @dataclass(frozen=True)
@@ -28,18 +27,27 @@ class PlacedJoint:
     child_point: np.ndarray
     kind: str
 
-    def slides(self, near: float) -> bool:
-        """Whether its points part; those of a joint that the user wrote may."""
-        return self.kind in _SLIDING or (self.kind == "custom" and _apart(self.parent_point, self.child_point) > near)
+    def role(self, rotations: np.ndarray, near: float) -> str:
+        """"slider" if its points part along a line, "float" if anyhow, "rod", else "hinge"; of a custom joint by its motion.
+
+        rotations of the bodies, (n_t, n_b, 3, 3)
+        """
+        if self.kind != "custom":
+            return _ROLES.get(self.kind, "hinge")
+        way = self.child_point - self.parent_point
+        if np.abs(way).max() <= near:
+            return "hinge"
+        if self.parent != GROUND:
+            way = np.einsum("tji,tj->ti", rotations[:, self.parent], way)
+        return "slider" if np.linalg.svd(way - way.mean(axis=0), compute_uv=False)[1:].max(initial=0.0) <= near else "float"
 
 
 def placed_joints(metadata: Mapping[str, Any], bodies: Sequence[int], points: np.ndarray) -> list[PlacedJoint]:
-    """The joints that hold these bodies to each other or to the ground; points (n_t, n_joints, 6) on parents, children."""
+    """The joints between these bodies and the ground; points (n_t, n_joints, 6) on parents, then on children."""
     places = {metadata["bodies"][body]: k for k, body in enumerate(bodies)}
-    joints = [PlacedJoint(places.get(parent, GROUND), places.get(child, GROUND), points[:, k, :3], points[:, k, 3:], kind)
-              for k, ((parent, child), kind) in enumerate(zip(metadata["reaction_bodies"], metadata["reaction_kinds"],
-                                                              strict=True))]
-    return [joint for joint in joints if joint.kind not in _FLOATING]
+    ends = zip(metadata["reaction_bodies"], metadata["reaction_kinds"], strict=True)
+    return [PlacedJoint(places.get(parent, GROUND), places.get(child, GROUND), points[:, k, :3], points[:, k, 3:], kind)
+            for k, ((parent, child), kind) in enumerate(ends)]
 
 
 def carriers(metadata: Mapping[str, Any]) -> set[int]:
@@ -49,24 +57,27 @@ def carriers(metadata: Mapping[str, Any]) -> set[int]:
     return {k for k, name in enumerate(metadata["bodies"]) if name in made}
 
 
-def jointed_skeleton(joints: Sequence[PlacedJoint], origins: np.ndarray, centres: np.ndarray,
+def jointed_skeleton(joints: Sequence[PlacedJoint], origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray,
                      ends: Sequence[tuple[int, np.ndarray]] = ()) -> Skeleton:
     """Lines of the bodies through the points of their joints; a body with one such point reaches to its centre of mass.
 
-    origins    of the bodies' frames, and centres of mass, (n_t, n_b, 3): where a body begins that no joint holds
+    origins    (n_t, n_b, 3), and rotations (n_t, n_b, 3, 3) of the bodies' frames; a body that no joint holds begins there
     ends       further points that bodies reach to: body, (n_t, 3)
     """
     n_b = centres.shape[1]
-    near = _SAME * extent(origins, centres)
+    pairs = [np.stack([joint.parent_point, joint.child_point], axis=1) for joint in joints]
+    near = _SAME * extent(np.concatenate([origins, centres, *pairs], axis=1))
     points: list[list[np.ndarray]] = [[] for _ in range(n_b)]
     rails, rods, pivots = [], [], []
     sliders: dict[int, list[int]] = {}
-    for joint in joints:
-        pair = np.stack([joint.parent_point, joint.child_point], axis=1)
-        slides = joint.slides(near)
+    for joint, pair in zip(joints, pairs, strict=True):
+        role = joint.role(rotations, near)
+        slides = role == "slider"
+        if role == "float":
+            continue
         if slides:
             rails.append(pair)
-        elif joint.kind == "rod":
+        elif role == "rod":
             rods.append(pair)
         # The point on the child first: with it the body hangs on those before.
         for body, point in ((joint.child, joint.child_point), (joint.parent, joint.parent_point)):

@@ -66,9 +66,9 @@ def guess_skeleton(origins: np.ndarray, rotations: np.ndarray, centres: np.ndarr
     return Skeleton(lines, connect(arms, n_t), connect(rails, n_t), connect([], n_t), np.array(pivots).reshape(-1, 3), sliders)
 
 
-def extent(origins: np.ndarray, centres: np.ndarray) -> float:
-    """The size of what moves, m."""
-    return float(max(np.ptp(origins, axis=(0, 1)).max(), np.ptp(centres, axis=(0, 1)).max(), 1e-12))
+def extent(*points: np.ndarray) -> float:
+    """How far points of one kind, (n_t, n, 3) each, are apart, m."""
+    return float(max(*[np.ptp(p, axis=(0, 1)).max() for p in points], 1e-12))
 
 
 def connect(parts: Sequence[np.ndarray], n_t: int) -> np.ndarray:
