@@ -73,9 +73,9 @@ def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
 def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None) -> list[str]:
     """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
     symbols = equations.symbols
+    used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
+    lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
     if found is None:
-        used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
-        lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
         if not lacking:
             given = getattr(quantities, "prescribed", ())
             drives = f"; the motion of {', '.join(given)} in the loops is prescribed and may leave none" if given else ""
@@ -92,7 +92,7 @@ def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None)
                       ModelWarning, stacklevel=5)
     if found.rank < len(symbols.speeds):
         return []
-    if all(is_zero(e) for e in quantities.C_t()):
+    if not lacking and all(is_zero(e) for e in quantities.C_t()):  # with random numbers it may be theirs
         warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {found.rank}, as many as there are "
                       "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=5)
     return ["motion: the constraints determine every speed, so that the forces do not change the motion"]
