@@ -339,7 +339,7 @@ def test_consistent_state_from_a_guess():
 
 
 @compiled
-@each
+@pytest.mark.parametrize("make", EXAMPLES[::3], ids=lambda make: make.__name__)
 def test_backends_agree(make):
     eq = make()
     c, numpy = eq.compile(backend="c"), eq.compile(backend="numpy")

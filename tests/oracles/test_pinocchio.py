@@ -22,7 +22,7 @@ FORMULATIONS = ("embedding", "recursive")
 TOLERANCE = 1e-12
 STATES = 3
 TREES = 50
-KINEMATIC_TREES = 10
+KINEMATIC_TREES = 6
 
 CATALOGUE: dict[str, Callable[[], sd.System]] = {
     **{name: getattr(sd.systems, name) for name in sd.systems.names(constrained=False)},
