@@ -180,7 +180,8 @@ def run(names: Sequence[str] | None = None, repeats: int = 5, to_json: Path | No
     print(LEGEND)
     for case in cases:
         if case.bounds:
-            print(f"{case.label}: " + ", ".join(f"{name} <= {bound:g}" for name, bound in case.bounds.items()))
+            print(f"{case.label}: " + ", ".join(f"{name} " + ("without bound" if bound is None else f"<= {bound:g}")
+                                                    for name, bound in case.bounds.items()))
     if any(case.name == "andrews_squeezer" for case in cases):
         points = sweep(repeats)
         late = not fastest(points) < FAST[1]
