@@ -126,6 +126,10 @@ class Constrained(Motion):
             solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, least)
         return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))
 
+    def _right(self) -> np.ndarray:
+        """F_d from the recursion that the equations need anyway; `F_d` itself is to be read."""
+        return vector(*[-r.remaining for r in self.rows])
+
     def _least(self, k: int) -> Any:
         """Square of a size of row k so small that it is no constraint any more: positions where it vanishes as a whole."""
         row = self.rows[k]
@@ -140,9 +144,9 @@ class Constrained(Motion):
 
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
         """u_dot and lam."""
-        right, saddle, F_d = -self.recall("bias"), self.recall("saddle"), vector(*[-r.remaining for r in self.rows])
+        right, saddle = -self.recall("bias"), self.recall("saddle")
         with self.algebra.section("accelerations and multipliers"):
-            ud, lam = saddle.solve(right, F_d)
+            ud, lam = saddle.solve(right, self._right())
             return self.algebra.name("ud", ud), self.algebra.name("lam", lam)
 
     def accelerations(self) -> np.ndarray:
@@ -152,7 +156,7 @@ class Constrained(Motion):
         """Multipliers, (n_c,); where rows depend on the others those of least norm after scaling."""
         if self.independent is not None:
             left = -self.recall("bias") - self.recall("M_tilde") @ self.accelerations()
-            return least_multipliers(self.algebra, self.C_r(), self.C_scale(), self._columns(), left, UNHELD)
+            return least_multipliers(self.algebra.recorder, self.C_r(), self.C_scale(), self._columns(), left, UNHELD)
         return self.recall("solution")[1]  # type: ignore[no-any-return]
 
     def matrix(self) -> np.ndarray:
@@ -165,23 +169,15 @@ class Constrained(Motion):
         forces = self.quantities()  # of the formulation that this is mixed into
         return np.concatenate([forces["F_tilde"]() - forces["k_tilde"](), self.F_d()])
 
-    def jacobian(self, by: Any) -> np.ndarray:
-        """d x_dot / d by, exact, differentiated implicitly: the matrix is not, only what it multiplies."""
-        recorder = self.algebra.recorder
-        ud, lam, saddle = self.accelerations(), self.recall("solution")[1], self.recall("saddle")
-        with self.algebra.section("Jacobian"):
-            held = [recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
-            C_r = self.C_r()
-            residual = [*(self.inverse_dynamics() + C_r.T @ vector(*held)), *(C_r @ self.speed_rates - self.F_d())]
-            derivatives = jacobian(recorder, residual, by)
-            at = dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
-            derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
-            n_u = len(ud)
-            columns = [saddle.solve(-derivatives[:n_u, j], -derivatives[n_u:, j])[0] for j in range(len(by))]
-            middle = np.array(columns, dtype=object).T.reshape(n_u, len(by))
-            top = jacobian(recorder, self.rates, by, "forward")
-            bottom = jacobian(recorder, self.state_rates(), by, "forward")
-            return np.vstack([top, middle, bottom])
+    def implicit(self) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
+        """As for Motion, r = [M u_dot + k - F + C_r^T lam; C_r u_dot - F_d] with the multipliers held, too."""
+        (ud, lam), saddle, C_r = self.recall("solution"), self.recall("saddle"), self.C_r()
+        held = [self.algebra.recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
+        forces = self.inverse_dynamics() + (C_r.T @ vector(*held) if held else 0)
+        residual = [*forces, *(C_r @ self.speed_rates - self._right())]
+        at = dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
+        n_u = len(ud)
+        return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
 
     # -- staying on the manifold
 

@@ -105,21 +105,25 @@ class Motion:
         rates = forward(self.algebra.recorder, values.ravel().tolist(), self.by_time())
         return vector(*rates).reshape(values.shape)
 
+    def implicit(self) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
+        """A residual r that is zero, leaves in it that stand for accelerations with their values, and the solver that gives the
+        change of u_dot from -dr at constant leaves: here r = M_tilde u_dot + k_tilde - F_tilde."""
+        ud, solver = self.recall("accelerations"), self.recall("solver")
+        return self.inverse_dynamics().tolist(), dict(zip(self.speed_rates, ud, strict=True)), solver.solve
+
     def jacobian(self, by: Sequence[Any]) -> np.ndarray:
         """d x_dot / d by, exact.
 
-        Accelerations are differentiated implicitly: with r = M_tilde u_dot + k_tilde - F_tilde = 0,
-        d u_dot = - M_tilde^-1 (dr at constant u_dot), so that the factorization is not differentiated.
+        Accelerations are differentiated implicitly (see `implicit`), so that the factorization is not differentiated.
         """
         recorder = self.algebra.recorder
-        ud, solver = self.recall("accelerations"), self.recall("solver")
+        self.recall("accelerations")  # under its own headings
         with self.algebra.section("Jacobian"):
-            residual = self.inverse_dynamics()
-            derivatives = jacobian(recorder, residual.tolist(), by)
-            at = dict(zip(self.speed_rates, ud, strict=True))
+            residual, at, solve = self.implicit()
+            derivatives = jacobian(recorder, residual, by)
             derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
-            columns = [solver.solve(-derivatives[:, j]) for j in range(len(by))]
-            middle = np.array(columns, dtype=object).T.reshape(len(ud), len(by))
+            columns = [solve(-derivatives[:, j]) for j in range(len(by))]
+            middle = np.array(columns, dtype=object).T.reshape(len(self.speeds), len(by))
             top = jacobian(recorder, self.rates, by, "forward")
             bottom = jacobian(recorder, self.state_rates(), by, "forward")
             return np.vstack([top, middle, bottom])

@@ -16,6 +16,7 @@ from symdyn.formulation.composite import Factors, factorize
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
 from symdyn.tape.node import PARAMETER, Node, is_zero
+from symdyn.tape.recorder import Recorder
 
 # A pivot of the Schur complement below this part of its diagonal entry leaves too few digits: a constraint nearly depends
 # on the others, and the kernel takes over. The digits lost are those of this number.
@@ -75,22 +76,21 @@ class KernelSolver:
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], reason: str,
                  smoothed: float = SMOOTHED) -> None:
         self.recorder, self.M, self.C, self.smoothed = algebra.recorder, M, C, smoothed
-        self.scales = [*rows, *columns]
-        self.sizes, self.reason = (C.shape[1], len(C)), reason
+        self.rows, self.columns, self.reason = rows, columns, reason
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         triangle = [self.M[i, j] for i in range(len(self.M)) for j in range(i + 1)]
-        x = vector(*self.recorder.call(Saddle(self.sizes, self.reason), [
-            Fraction(repr(self.smoothed)), *triangle, *self.C.ravel(), *self.scales, *f, *d]))
-        lam = self.recorder.call(Multipliers(self.sizes, self.reason), [*self.C.ravel(), *self.scales, *(f - self.M @ x)])
-        return x, vector(*lam)
+        m, n = self.C.shape
+        x = vector(*self.recorder.call(Saddle((n, m), self.reason), [
+            Fraction(repr(self.smoothed)), *triangle, *self.C.ravel(), *self.rows, *self.columns, *f, *d]))
+        return x, least_multipliers(self.recorder, self.C, self.rows, self.columns, f - self.M @ x, self.reason)
 
 
-def least_multipliers(algebra: Any, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], right: np.ndarray,
+def least_multipliers(recorder: Recorder, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], right: np.ndarray,
                       reason: str) -> np.ndarray:
     """lam (m,) of C^T lam = right, of least norm after scaling; scales as for KernelSolver."""
     kernel = Multipliers((C.shape[1], len(C)), reason)
-    return vector(*algebra.recorder.call(kernel, [*C.ravel(), *rows, *columns, *right]))
+    return vector(*recorder.call(kernel, [*C.ravel(), *rows, *columns, *right]))
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,13 @@ def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK_TO
     if not names(module):
         return np.zeros(np.shape(x)[:-1], dtype=int)
     values = np.linalg.svd(scaled_jacobian(module, t, x, params), compute_uv=False)
-    return (values > tolerance * np.maximum(values[..., :1], 1)).sum(axis=-1)
+    return counted(values, tolerance).sum(axis=-1)
+
+
+def counted(values: np.ndarray, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
+    """Which singular values (..., k), the largest first, are not zero; a Jacobian that vanishes as a whole has none."""
+    result: np.ndarray = values > tolerance * np.maximum(values[..., :1], 1)
+    return result
 
 
 def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
@@ -85,7 +91,7 @@ def unique(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
     if not names(module):
         return np.zeros((*np.shape(x)[:-1], 0), dtype=bool)
     U, values, _ = np.linalg.svd(scaled_jacobian(module, t, x, params), full_matrices=False)
-    kept = values > RANK_TOLERANCE * np.maximum(values[..., :1], 1)
+    kept = counted(values)
     squares: np.ndarray = (U**2 * kept[..., None, :]).sum(axis=-1)
     return squares > 1 - 1e-6
 
@@ -94,7 +100,7 @@ def undetermined(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
     """Combinations of multipliers that make no force along the speeds, as columns, (..., n_c, n_c); zero columns for the rest."""
     U, values, _ = np.linalg.svd(scaled_jacobian(module, t, x, params))
     kept = np.zeros(U.shape[:-1], dtype=bool)
-    kept[..., :values.shape[-1]] = values > RANK_TOLERANCE * np.maximum(values[..., :1], 1)
+    kept[..., :values.shape[-1]] = counted(values)
     scale = module.evaluate("C_scale", t, x, params)
     free: np.ndarray = scale[..., :, None] * U * ~kept[..., None, :]
     return free
