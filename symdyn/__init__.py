@@ -20,12 +20,17 @@ _HOME = {
     "symdyn.model.system": ("System",),
     "symdyn.formulation.explicit": ("embedding",),
     "symdyn.formulation.explicit_augmented": ("augmented",),
-    "symdyn.errors": ("ArgumentError", "CompileError", "CompilerNotFound", "EvaluationError", "MissingExtra", "ModelError",
-                      "ModelWarning", "SimulationInterrupted", "SimulationWarning", "SymdynError",
-                      "UnsupportedExpression"),
+    "symdyn.report.latex": ("latex",),
+    "symdyn.frames": ("Frame", "rate"),
+    "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
+    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EvaluationError", "GimbalLock",
+                      "MissingExtra", "ModelError", "ModelWarning", "NotARotation", "NotNormalized", "RotationError",
+                      "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase", "UnsupportedExpression",
+                      "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
-_PACKAGES = ("systems",)
+_PACKAGES = {name: f"symdyn.{name}" for name in ("frames", "rotation", "systems")} | {
+    name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]
 
@@ -34,7 +39,7 @@ def __getattr__(name: str) -> Any:
     if name == "t":
         return importlib.import_module("symdyn.model.symbols").time
     if name in _PACKAGES:
-        return importlib.import_module(f"symdyn.{name}")
+        return importlib.import_module(_PACKAGES[name])
     if name in _WHERE:
         return getattr(importlib.import_module(_WHERE[name]), name)
     raise AttributeError(f"symdyn has no {name!r}; it has {', '.join(sorted(__all__))}")

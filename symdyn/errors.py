@@ -55,5 +55,42 @@ class SimulationInterrupted(KeyboardInterrupt):
         self.solution = solution
 
 
+class RotationError(SymdynError, ValueError):
+    """A rotation cannot be described as asked; the base of the four below."""
+
+
+class GimbalLock(RotationError):
+    """At these Euler angles the rates of the angles do not exist."""
+
+
+class NotARotation(RotationError):
+    """A matrix is not orthogonal with determinant 1; the message tells how far it is from that."""
+
+
+class ZeroAxis(RotationError):
+    """An axis of length zero has no direction."""
+
+
+class NotNormalized(RotationError):
+    """Euler parameters are not a unit vector."""
+
+
+class CaseError(SymdynError, ValueError):
+    """A case of printed and derived formulas has faults; `faults` lists all of them."""
+
+    def __init__(self, faults: Sequence[str], name: str = "") -> None:
+        self.faults = tuple(faults)
+        head = f"the case {name!r} has {len(self.faults)} faults:\n" if len(self.faults) > 1 else ""
+        mark = "  - " if head else ""
+        super().__init__(head + "\n".join(mark + fault for fault in self.faults))
+
+
+class UnknownCase(SymdynError, KeyError):
+    """There is no case of that name; the message offers the nearest names."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class MissingExtra(SymdynError, ImportError):
     """Something optional is not installed; the message tells how to get it."""

@@ -118,10 +118,13 @@ def test_derive_prints_the_equations(capsys: pytest.CaptureFixture[str]) -> None
 def test_derive_prints_latex_and_single_quantities(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["derive", "pendulum", "--latex", "--quantity", "M_tilde", "Jdot"]) == 0
     first, second = capsys.readouterr().out.splitlines()
-    assert first.startswith(r"\tilde{M} = \left[\begin{matrix}") and r"l^{2}" in first
-    assert second.startswith(r"\dot{J} = ") and r"\dot{q}_{1}" in second
+    assert first.startswith(r"\tilde{\mathbf{M}} = \left[\begin{matrix}") and r"l^{2}" in first
+    assert second.startswith(r"\dot{\mathbf{J}} = ") and r"\dot{q}_{1}" in second
     assert main(["derive", "pendulum", "--no-simplify", "--quantity", "F_tilde"]) == 0
     assert "F_tilde =" in capsys.readouterr().out
+    assert main(["derive", "two_link_arm", "--latex", "--shorthand", "--intermediates", "--quantity", "k_tilde"]) == 0
+    said = capsys.readouterr().out
+    assert r"\omega_{2,z} &= " in said and r"s_{2} = \sin" in said
 
 
 def test_derive_prints_ascii_where_nothing_else_can_be_shown() -> None:
@@ -404,7 +407,7 @@ def test_derive_prints_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["derive", "pendulum", "--coordinates", "absolute", "--quantity", "C"]) == 0
     assert "constraints: pivot_x, pivot_y" in capsys.readouterr().out
     assert main(["derive", "pendulum", "--formulation", "augmented", "--latex", "--quantity", "C_dot", "M_tilde"]) == 0
-    assert r"\dot{C} = " in capsys.readouterr().out
+    assert r"\dot{\mathbf{C}} = " in capsys.readouterr().out
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")

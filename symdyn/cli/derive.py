@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 # Quantities with more operations than this, written out, are counted and not printed: nobody reads them.
 READABLE = 1000
-_LATEX = {"M_tilde": r"\tilde{M}", "k_tilde": r"\tilde{k}", "F_tilde": r"\tilde{F}", "Jdot": r"\dot{J}",
-          "Jd_qd": r"\dot{J} \dot{q}", "C_dot": r"\dot{C}", "lam": r"\lambda"}
 USUAL = ("M_tilde", "k_tilde", "F_tilde")
 OF_CONSTRAINTS = ("C_r", "F_d", "C")
 
@@ -44,8 +42,10 @@ def derive(arguments: argparse.Namespace) -> int:
             note = f"{name} ({size}): {count} operations written out, {steps} in generated code; --force prints it"
             print(f"% {note}" if arguments.latex else f"\n{note}")
             continue
-        value = equations.explicit(name, simplify=not arguments.no_simplify)
-        print(_latex(name, value) if arguments.latex else f"\n{name} =\n{_pretty(value)}")
+        if arguments.latex:
+            print(equations.latex(name, arguments.shorthand, arguments.intermediates, simplify=not arguments.no_simplify))
+        else:
+            print(f"\n{name} =\n{_pretty(equations.explicit(name, simplify=not arguments.no_simplify))}")
     return 0
 
 
@@ -80,9 +80,3 @@ def _dotted(name: str) -> Any:
 
     letters, index = re.fullmatch(r"(.*?)(_?\d*)", name.removesuffix("_dot")).groups()  # type: ignore[union-attr]
     return sp.Symbol(f"{letters}dot{index}")
-
-
-def _latex(name: str, value: Any) -> str:
-    import sympy as sp
-
-    return f"{_LATEX.get(name, sp.latex(sp.Symbol(name)))} = {sp.latex(value)}"

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.cli import bench
+from symdyn.cli.compare import compare
 from symdyn.cli.demo import demo
 from symdyn.cli.derive import READABLE, derive
 from symdyn.cli.diagnose import diagnose
@@ -59,6 +60,8 @@ def make_parser() -> argparse.ArgumentParser:
     proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
     _add_diagnose(coordinates(command("diagnose", diagnose, "what the constraints do: freedoms, redundant and contradictory "
                                       "ones, singular configurations, idle motions")))
+    _add_compare(command("compare", compare, "what slides print beside what symdyn derives, with a verdict on every entry; "
+                         "without names the cases are listed", system=False))
     _add_bench(commands.add_parser("bench", help="measure symdyn", description="Measure symdyn on this machine."))
     _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
                         system=False))
@@ -69,6 +72,8 @@ def _add_derive(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quantity", metavar="NAME", nargs="+",
                         help="what to print (default: M_tilde k_tilde F_tilde, with constraints also C_r F_d C)")
     parser.add_argument("--latex", action="store_true", help="print LaTeX")
+    parser.add_argument("--shorthand", action="store_true", help="in LaTeX s_1 for sin q_1, c_12 for cos(q_1 + q_2)")
+    parser.add_argument("--intermediates", action="store_true", help="in LaTeX velocities, forces and inertias of links by name")
     parser.add_argument("--no-simplify", action="store_true", help="print as derived")
     parser.add_argument("--force", action="store_true", help=f"print also what has more than {READABLE} operations")
 
@@ -109,6 +114,14 @@ def _add_diagnose(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
     parser.add_argument("--reach", metavar="ANGLE", type=float, default=math.pi, help="how far from the state singular "
                         "configurations are looked for: rad, or parts of the mechanism's length (default: pi)")
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("cases", metavar="NAME", nargs="*", help="a case of the lecture, or a Python file that defines CASES")
+    parser.add_argument("--all", action="store_true", help="the whole lecture: prints one table, writes reports and errata")
+    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases (default: 1)")
+    parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the reports (default with --all: "
+                        "generated/compare)")
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:

@@ -1,9 +1,9 @@
-"""A system described in a Python file of the user."""
+"""What a Python file of the user describes: a system, or cases of printed formulas. The file is a program, and is run."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,39 @@ from symdyn.cli.messages import Stop
 from symdyn.cli.options import check_options
 
 if TYPE_CHECKING:
+    from symdyn.comparison.case import Case
     from symdyn.model.system import System
 
 
 def from_file(path: Path, options: Mapping[str, Any]) -> System:
-    """What system() of a user's file returns. The file is a program, and is run."""
+    """What system() of a user's file returns."""
+    def make(module: Any) -> Any:
+        function = getattr(module, "system", None)
+        if not callable(function):
+            raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
+        check_options(f"system() of {path}", function, options)
+        return function(**options)
+
+    result = _run(path, make)
+    from symdyn.model.system import System
+
+    if not isinstance(result, System):
+        raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
+    return result
+
+
+def cases_from_file(path: Path) -> list[Case]:
+    """CASES of a user's file."""
+    from symdyn.comparison.case import Case
+
+    found = _run(path, lambda module: getattr(module, "CASES", None))
+    if not isinstance(found, (list, tuple)) or not found or not all(isinstance(c, Case) for c in found):
+        raise Stop(f"{path} must define CASES, a list of symdyn.Case; found {found!r:.80}")
+    return list(found)
+
+
+def _run(path: Path, take: Callable[[Any], Any]) -> Any:
+    """What `take` makes of the module that the file is."""
     import importlib.util
 
     if not path.is_file():
@@ -27,20 +55,11 @@ def from_file(path: Path, options: Mapping[str, Any]) -> System:
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-        make = getattr(module, "system", None)
-        if not callable(make):
-            raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
-        check_options(f"system() of {path}", make, options)
-        result = make(**options)
+        return take(module)
     except Stop:
         raise
     except (Exception, SystemExit) as error:  # whatever the user's program raises is told as its own
         raise Stop(_users_fault(error, path)) from None
-    from symdyn.model.system import System
-
-    if not isinstance(result, System):
-        raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
-    return result
 
 
 def _users_fault(error: BaseException, path: Path) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -15,6 +15,9 @@ from symdyn.tape.node import Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Tape
+
+if TYPE_CHECKING:
+    from symdyn.report.latex import Typeset
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Equations:
     joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     identification   what records regressors and base parameters; None without bodies
+    provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
 
     name: str
@@ -69,6 +73,7 @@ class Equations:
     joints: tuple[tuple[str, str, str, str], ...] = ()
     otherwise: Equations | None = None
     identification: Any = None
+    provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[str, Any] = field(default_factory=dict)
 
@@ -92,15 +97,29 @@ class Equations:
     def explicit(self, name: str, simplify: bool = True) -> Any:
         """The quantity as explicit SymPy, simplified as far as the time limit `simplify_seconds` allows."""
         if name not in self._printed or not simplify:
-            symbols = {leaf: symbol for symbol, leaf in self.leaves.items()
-                       if isinstance(leaf, Node) and leaf.op == "leaf"}
-            value = expand(self.tape(name).outputs[name], symbols)
+            value = expand(self.tape(name).outputs[name], self.printed_leaves())
             if not simplify:
                 return value
             from symdyn.report.simplify import simplified
 
             self._printed[name] = simplified(value, self.simplify_seconds)
         return self._printed[name]
+
+    def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
+              simplify: bool = True) -> Typeset:
+        """A quantity in LaTeX as the lecture writes it; prints and shows in notebooks.
+
+        shorthand       s_1 for sin q_1, c_12 for cos(q_1 + q_2), with a legend
+        intermediates   steps that the derivation names (velocities, forces, inertias of links) stand before the quantity
+        width           letters in a line: wider matrices get named entries below them, longer sums several lines
+        """
+        from symdyn.report.latex import equations_latex
+
+        return equations_latex(self, name, shorthand, intermediates, width, simplify)
+
+    def printed_leaves(self) -> dict[Node, sp.Basic]:
+        """Leaf of the tape -> the symbol it is printed as."""
+        return {leaf: symbol for symbol, leaf in self.leaves.items() if isinstance(leaf, Node) and leaf.op == "leaf"}
 
     @property
     def accelerations(self) -> sp.Matrix:

@@ -19,8 +19,9 @@ from symdyn.formulation.embedding import EmbeddedEquations
 from symdyn.formulation.equations import Symbols
 from symdyn.formulation.explicit_check import ByHand, Part, recording
 from symdyn.formulation.motion import Motion
+from symdyn.formulation.provenance import OfCoordinates
 from symdyn.formulation.rank import first_dependent
-from symdyn.model.symbols import Coordinate
+from symdyn.model.symbols import Coordinate, time
 from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape.differentiate import jacobian
 
@@ -55,17 +56,18 @@ def embedding(coordinates: Sequence[Any], position: Any, mass: Any, force: Any =
     if faults:
         raise ModelError(faults, name)
     symbols = Symbols(tuple(q), tuple(c.dot for c in q), (), tuple(inputs), tuple(parameters), numbers)
-    derivation = _PositionMap(q, r, M, F, symbols)
+    derivation = PositionMap(q, r, M, F, symbols)
     dependent = first_dependent(derivation.algebra.recorder, derivation.recall("M_tilde"))
     if dependent is not None:
         raise ModelError([f"the mass matrix is singular at every state: {q[dependent]} moves nothing that the coordinates after "
                           "it do not move already; leave one out, or let position depend on them separately"], name)
     return EmbeddedEquations(name, "embedding", True, symbols, derivation.algebra.recorder, derivation.algebra.leaves,
                              derivation.quantities(),
+                             provenance=OfCoordinates(derivation),
                              again=partial(embedding, coordinates, position, mass, force, name, defaults))
 
 
-class _PositionMap(Motion):
+class PositionMap(Motion):
     """Records the quantities; derivatives of r by the chain rule over the tape."""
 
     def __init__(self, q: list[Coordinate], r: list[sp.Expr], M: sp.Matrix, F: list[sp.Expr], symbols: Symbols) -> None:
@@ -77,6 +79,7 @@ class _PositionMap(Motion):
             self.r = recorder.name("r", algebra.constants(r))
             self.M = algebra.matrix(M)
             self.F = recorder.name("F", algebra.constants(F))
+        self.given_motion = any(e.has(time) for e in r)
 
     def quantities(self) -> dict[str, Any]:
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import sympy as sp
 
 from symdyn.formulation.equations import Equations
+
+if TYPE_CHECKING:
+    from symdyn.formulation.provenance import Explanation
 
 
 class MotionEquations(Equations):
@@ -45,6 +50,16 @@ class MotionEquations(Equations):
         """One equation a speed: (M_tilde u_dot + k_tilde)_i = F_tilde_i."""
         left = self.M_tilde * self.accelerations + self.k_tilde
         return tuple(sp.Eq(a, b, evaluate=False) for a, b in zip(left, self.F_tilde, strict=True))
+
+    def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
+        """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
+
+        The contributions of each body, translational and rotational, and for k_tilde the centrifugal, Coriolis and gyroscopic
+        ones. See symdyn.formulation.provenance.
+        """
+        from symdyn.formulation.provenance import explain
+
+        return explain(self, quantity, *index, simplify=simplify)
 
     def _repr_latex_(self) -> str:
         from symdyn.report.printing import equation_latex

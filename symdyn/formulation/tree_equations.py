@@ -12,6 +12,7 @@ from symdyn.errors import ModelError, SymdynError
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.equations import Symbols
 from symdyn.formulation.motion_equations import MotionEquations
+from symdyn.formulation.provenance import OfBodies
 from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.joints import Fixed, Joint
@@ -55,6 +56,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
     return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, quantities.quantities(),
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body", identification=quantities.identification,
+                  provenance=OfBodies(quantities),
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities),
                   **more)

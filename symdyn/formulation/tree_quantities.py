@@ -44,6 +44,11 @@ class TreeQuantities(Motion):
         """The joints in the rows of `reactions` and `joint_points`."""
         return self.model.joints
 
+    @property
+    def given_motion(self) -> bool:
+        """Whether joints or the ground follow given functions of time."""
+        return any(not is_zero(v) for v in self.tree.w_t)
+
     def demand_inertia(self) -> None:
         """Raise ModelError for speeds that move nothing at any state."""
         demand_mass_matrix(self.model, self.algebra.recorder, self.recall("M_tilde"))

@@ -25,7 +25,7 @@ def _of_derivative(symbol: sp.Symbol) -> dict[str, bool]:
     return {"real": True} if symbol.is_real else {}
 
 
-class _Moving(sp.Symbol):
+class Moving(sp.Symbol):
     """A symbol that is printed after parameters in a product: m l q_dot^2, not q_dot^2 l m."""
 
     __slots__ = ()
@@ -37,7 +37,7 @@ class _Moving(sp.Symbol):
         return 2, 0, f"Symbol{cls._rank}"
 
 
-class Coordinate(_Moving):
+class Coordinate(Moving):
     """A generalized coordinate; `.dot` and `.ddot` are its derivatives by time, symbols too."""
 
     __slots__ = ()
@@ -51,7 +51,7 @@ class Coordinate(_Moving):
         return Acceleration(f"{self.name}_ddot", **_of_derivative(self))
 
 
-class Rate(_Moving):
+class Rate(Moving):
     """The first derivative of a coordinate by time."""
 
     __slots__ = ()
@@ -65,7 +65,7 @@ class Rate(_Moving):
         return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_dot"))), r"\dot")
 
 
-class Acceleration(_Moving):
+class Acceleration(Moving):
     """The second derivative of a coordinate by time."""
 
     __slots__ = ()
@@ -82,7 +82,7 @@ class Speed(Coordinate):
     _rank = 1
 
 
-class Input(_Moving):
+class Input(Moving):
     """A value given from outside while the motion runs: a number, an array over time, or a function."""
 
     __slots__ = ()

@@ -1,0 +1,130 @@
+"""The comparison of a case, and of many: counts of verdicts and tables as text."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from symdyn.comparison.case import Slide
+from symdyn.comparison.verdict import ErratumResult, FormulaResult, Verdict
+
+COLUMNS = {Verdict.EQUAL: "equal", Verdict.CONVENTION: "convention", Verdict.WRONG: "wrong", Verdict.UNREADABLE: "unreadable",
+           Verdict.DIFFERENT: "different", Verdict.UNDECIDED: "not decided"}
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """A case beside what symdyn derives: `formulas` with their entries, `counts` of verdicts; prints as a table."""
+
+    name: str
+    title: str
+    slide: Slide | None
+    formulas: tuple[FormulaResult, ...]
+    seconds: float = 0.0
+
+    @property
+    def counts(self) -> Counter[Verdict]:
+        """Verdict -> number of entries."""
+        return sum((f.counts for f in self.formulas), Counter())
+
+    @property
+    def errata(self) -> list[tuple[FormulaResult, ErratumResult]]:
+        """The errors that are proven, with the formulas they are in."""
+        return [(f, e) for f in self.formulas for e in f.errata if e.evidence.holds]
+
+    @property
+    def decided(self) -> bool:
+        """Whether every entry has a verdict that stands: none different without proof, none undecided."""
+        return not self.counts[Verdict.DIFFERENT] and not self.counts[Verdict.UNDECIDED]
+
+    def __str__(self) -> str:
+        head = " ".join(part for part in (self.name, f"({self.title})" if self.title else "") if part)
+        width = max(len(f.name) for f in self.formulas)
+        lines = [head]
+        for f in self.formulas:
+            line = f"{f.slide.line:>6}  " if f.slide.line is not None else ""
+            lines.append(f"  {f.name:{width}}  {line}{_told(f.counts)}")
+            lines += [f"    {text}" for text in _remarks(f)]
+        lines.append(f"  {_total(self.counts)}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        from symdyn.comparison.html import comparison_html
+
+        return comparison_html(self)
+
+
+@dataclass(frozen=True, repr=False)
+class Comparisons:
+    """Many cases; prints as one table, a line for each case."""
+
+    cases: tuple[Comparison, ...]
+    seconds: float = 0.0
+
+    @property
+    def counts(self) -> Counter[Verdict]:
+        """Verdict -> number of entries."""
+        return sum((c.counts for c in self.cases), Counter())
+
+    @property
+    def decided(self) -> bool:
+        """Whether every entry has a verdict that stands."""
+        return all(c.decided for c in self.cases)
+
+    def __iter__(self) -> Iterator[Comparison]:
+        return iter(self.cases)
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+    def __str__(self) -> str:
+        width = max([len(c.name) for c in self.cases] + [4])
+        lines = [f"{'case':{width}} {'slide':>7} {'formulas':>9}" + "".join(f"{text:>12}" for text in COLUMNS.values())]
+        for c in self.cases:
+            section = c.slide.section if c.slide else ""
+            counts = "".join(f"{c.counts[v] or '.':>12}" for v in COLUMNS)
+            lines.append(f"{c.name:{width}} {section:>7} {len(c.formulas):>9}{counts}")
+        formulas = sum(len(c.formulas) for c in self.cases)
+        lines.append(f"{'all':{width}} {'':>7} {formulas:>9}" + "".join(f"{self.counts[v]:>12}" for v in COLUMNS))
+        errors = sum(len(c.errata) for c in self.cases)
+        lines.append(f"{len(self.cases)} cases, {sum(self.counts.values())} entries in {self.seconds:.0f} s; {errors} errata")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        from symdyn.comparison.html import table_html
+
+        return table_html(self)
+
+
+def _remarks(formula: FormulaResult) -> list[str]:
+    lines = [f"wrong: {e.why} Shown by: {e.evidence}" for e in formula.errata if e.evidence.holds]
+    said: dict[str, None] = {}
+    for entry in formula.entries:
+        if entry.verdict is Verdict.WRONG:
+            lines.append(f"  {_place(entry.index)}printed {entry.printed}, right {entry.right}")
+        elif entry.verdict is Verdict.DIFFERENT:
+            where = ", ".join(f"{name} = {value:.3g}" for name, value in (entry.point or {}).items())
+            there = "" if entry.values is None else f"; printed {entry.values[0]:.6g}, derived {entry.values[1]:.6g} at {where}"
+            lines.append(f"  {_place(entry.index)}{entry.verdict.value}{there}{'; ' + entry.note if entry.note else ''}")
+        elif entry.note:
+            said[entry.note] = None
+    return lines + [f"  {note}" for note in said]
+
+
+def _place(index: tuple[int, ...]) -> str:
+    return f"[{', '.join(map(str, index))}] " if index else ""
+
+
+def _total(counts: Counter[Verdict]) -> str:
+    return f"{sum(counts.values())} entries: {_told(counts)}"
+
+
+def _told(counts: Counter[Verdict]) -> str:
+    return ", ".join(f"{counts[v]} {v.value}" for v in Verdict if counts[v])

@@ -1,0 +1,97 @@
+"""Reference frames: a tree of axes and origins that move relative to each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from symdyn.frames.body import Body
+from symdyn.frames.point import Point
+from symdyn.frames.tree import Axes, angular_motion, demand_frames, rotation_between
+from symdyn.frames.vector import Vector
+
+
+class Frame(Axes):
+    """A reference frame with origin and axes; the first of a tree is taken for inertial.
+
+    name       text
+    parent     the frame it is described in; None for the first
+    rotation   (3, 3) R, takes components of this frame to the parent's; of coordinates, t and parameters
+    origin     (3,) this origin from the parent's, the parent's components, m
+    Coordinates are those of sd.coordinates; SymPy's dynamicsymbols are taken over as such. `path` is the frames from the
+    first of the tree to this one.
+    Raises ModelError telling all faults, or NotARotation with numbers if the rotation alone is at fault; a symbolic rotation
+    is checked at random values of its symbols (four Euler parameters: with norm 1).
+    Source: lecture, chapters 1.2, 1.6 and 1.7.
+    """
+
+    def __init__(self, name: str, parent: Frame | None = None, rotation: Any = None, origin: Any = (0, 0, 0)) -> None:
+        super().__init__(name, parent, rotation, origin)
+
+    def frame(self, name: str, rotation: Any = None, origin: Any = (0, 0, 0)) -> Frame:
+        """A frame described in this one; arguments and errors as for `Frame`."""
+        return Frame(name, self, rotation, origin)
+
+    def point(self, name: str, at: Any = (0, 0, 0)) -> Point:
+        """A point given from this frame's origin by components in this frame (3,), m; they may move. Raises ModelError."""
+        return Point(name, self, at)
+
+    def vector(self, components: Any, name: str = "v") -> Vector:
+        """A free vector, such as a force, given by components in this frame (3,). Raises ModelError."""
+        return Vector(name, self, components)
+
+    def body(self, mass: Any, inertia: Any, com: Any = (0, 0, 0)) -> Body:
+        """A rigid body fixed to this frame: mass kg, inertia (3, 3) about the centre of mass, these axes, kg m^2, com (3,) m.
+
+        Raises ArgumentError, telling all faults.
+        """
+        return Body(self, mass, inertia, com)
+
+    @property
+    def root(self) -> Frame:
+        """The first frame of the tree."""
+        return self.path[0]  # type: ignore[no-any-return]
+
+    def rotation(self, to: Frame) -> sp.Matrix:
+        """R, (3, 3), that takes components of this frame to those of another: r_to = R r_self. Raises ArgumentError."""
+        return sp.Matrix(rotation_between(self, to))
+
+    def angular_velocity(self, seen_from: Frame | None = None, components: Frame | None = None) -> sp.Matrix:
+        """omega of this frame seen from another, (3, 1), rad/s: R_dot R^T = [omega x].
+
+        seen_from    default: the first frame of the tree
+        components   the frame along whose axes the components are taken; default: seen_from
+        Raises ArgumentError for frames of different trees, ModelError for rates that have no symbol.
+        """
+        seen_from, components = self._defaults(seen_from, components)
+        return sp.Matrix(angular_motion(seen_from, self, components, 1)[0])
+
+    def angular_acceleration(self, seen_from: Frame | None = None, components: Frame | None = None) -> sp.Matrix:
+        """alpha of this frame, (3, 1), rad/s^2: the rate of its omega seen from `seen_from`, or from this frame, the same.
+
+        Arguments and errors as for `angular_velocity`.
+        """
+        seen_from, components = self._defaults(seen_from, components)
+        return sp.Matrix(angular_motion(seen_from, self, components, 2)[1])
+
+    def position(self, of: Any = None, components: Frame | None = None) -> sp.Matrix:
+        """This frame's origin from another's, (3, 1), m; as `Point.position`."""
+        return self.point(self.name).position(of, components)
+
+    def velocity(self, seen_from: Frame | None = None, components: Frame | None = None) -> sp.Matrix:
+        """Velocity of this frame's origin seen from another frame, (3, 1), m/s; as `Point.velocity`."""
+        return self.point(self.name).velocity(seen_from, components)
+
+    def acceleration(self, seen_from: Frame | None = None, components: Frame | None = None) -> sp.Matrix:
+        """Acceleration of this frame's origin seen from another frame, (3, 1), m/s^2; as `Point.acceleration`."""
+        return self.point(self.name).acceleration(seen_from, components)
+
+    def _defaults(self, seen_from: Frame | None, components: Frame | None) -> tuple[Frame, Frame]:
+        seen_from = self.root if seen_from is None else seen_from
+        components = seen_from if components is None else components
+        demand_frames(of=self, seen_from=seen_from, components=components)
+        return seen_from, components
+
+    def __repr__(self) -> str:
+        return f"Frame({self.name!r})" if self.parent is None else f"Frame({self.name!r}, in {self.parent.name!r})"

@@ -1,0 +1,146 @@
+"""Velocities, accelerations and inertial forces in their named parts, made to be read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import sympy as sp
+
+from symdyn.frames.numbers import numbers
+from symdyn.report.simplify import simplified
+
+# Seconds that tidying up for print may take, for all parts together.
+PATIENCE = 2.0
+# Parts with more operations than this are not written out: nobody reads them, and tidying them takes too long.
+TOO_LONG = 300
+
+
+@dataclass(frozen=True, repr=False)
+class _Parts:
+    """Parts that add up to `total`; each (3, 1).
+
+    point, through, seen_from, components   names of the point and of the frames
+    """
+
+    point: str
+    through: str
+    seen_from: str
+    components: str
+    _labels: ClassVar[dict[str, str]] = {}
+    _heading: ClassVar[str] = ""
+    _symbol: ClassVar[str] = ""
+
+    def _named(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name in self._labels}
+
+    @property
+    def total(self) -> Any:
+        """The sum of the parts."""
+        first, *others = self._named().values()
+        for other in others:
+            first = first + other
+        return first
+
+    def subs(self, *args: Any, **options: Any) -> Any:
+        """The same with symbols replaced, as SymPy's subs."""
+        return replace(self, **{name: part.subs(*args, **options) for name, part in self._named().items()})
+
+    def at(self, values: Any = None, t: Any = None) -> Any:
+        """The same in numbers: arrays (3,), or (n_t, 3) at an array of times; values, t and errors as for `numbers`."""
+        return replace(self, **{name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()})
+
+    def _readable(self) -> dict[str, Any]:
+        parts = {**self._named(), "total": self.total}
+        if isinstance(parts["total"], np.ndarray):
+            return parts
+        return {name: part if _operations(part) > TOO_LONG else simplified(part, PATIENCE / len(parts))
+                for name, part in parts.items()}
+
+    def __repr__(self) -> str:
+        names = {"P": self.point, "b": self.through, "n": self.seen_from, "c": self.components}
+        lines = [f"  {name:12}{_text(part)}" for name, part in self._readable().items()]
+        return "\n".join([self._heading.format(**names), *lines])
+
+    def _repr_latex_(self) -> str:
+        parts = self._readable()
+        total = parts.pop("total")
+        terms = " + ".join(rf"\underbrace{{{_latex(part)}}}_{{\text{{{self._labels[name]}}}}}" for name, part in parts.items())
+        return rf"$\displaystyle {self._symbol.format(c=self.components, P=self.point)} = {terms} = {_latex(total)}$"
+
+
+@dataclass(frozen=True, repr=False)
+class VelocityParts(_Parts):
+    """v = origin + relative + transport, (3, 1) each, m/s.
+
+    origin      velocity of the moving frame's origin
+    relative    velocity seen from the moving frame
+    transport   omega x r
+    """
+
+    origin: Any
+    relative: Any
+    transport: Any
+    _labels = {"origin": "origin", "relative": "relative", "transport": "transport"}
+    _heading = "velocity of {P} seen from {n}, by way of {b}, components in {c}"
+    _symbol = r"{{}}^{{{c}}}\mathbf{{v}}_{{{P}}}"
+
+
+@dataclass(frozen=True, repr=False)
+class AccelerationParts(_Parts):
+    """a = origin + relative + euler + centripetal + coriolis, (3, 1) each, m/s^2.
+
+    origin        acceleration of the moving frame's origin
+    relative      acceleration seen from the moving frame
+    euler         alpha x r
+    centripetal   omega x (omega x r)
+    coriolis      2 omega x v_rel
+    """
+
+    origin: Any
+    relative: Any
+    euler: Any
+    centripetal: Any
+    coriolis: Any
+    _labels = {"origin": "origin", "relative": "relative", "euler": "Euler", "centripetal": "centripetal",
+               "coriolis": "Coriolis"}
+    _heading = "acceleration of {P} seen from {n}, by way of {b}, components in {c}"
+    _symbol = r"{{}}^{{{c}}}\mathbf{{a}}_{{{P}}}"
+
+
+@dataclass(frozen=True, repr=False)
+class InertialForces(_Parts):
+    """What is added to the forces in a moving frame: m a_rel = F + total; (3, 1) each, N.
+
+    origin        -m a_O
+    euler         -m alpha x r
+    centrifugal   -m omega x (omega x r)
+    coriolis      -2 m omega x v_rel
+    """
+
+    origin: Any
+    euler: Any
+    centrifugal: Any
+    coriolis: Any
+    _labels = {"origin": "origin", "euler": "Euler", "centrifugal": "centrifugal", "coriolis": "Coriolis"}
+    _heading = "inertial forces on {P} felt in {b}, inertial is {n}, components in {c}"
+    _symbol = r"{{}}^{{{c}}}\mathbf{{F}}_{{{P},\text{{inertial}}}}"
+
+
+def _operations(part: Any) -> int:
+    return 0 if isinstance(part, np.ndarray) else int(sp.count_ops(part))
+
+
+def _text(part: Any) -> str:
+    if isinstance(part, np.ndarray):
+        return np.array2string(part, precision=6, suppress_small=True, prefix=" " * 14)
+    operations = _operations(part)
+    return str(list(part)) if operations <= TOO_LONG else f"(3 components, {operations} operations)"
+
+
+def _latex(part: Any) -> str:
+    operations = _operations(part)
+    if operations > TOO_LONG:
+        return rf"(3\times 1,\ {operations}\ \text{{operations}})"
+    return str(sp.latex(sp.Matrix(np.round(part, 6)) if isinstance(part, np.ndarray) else part))

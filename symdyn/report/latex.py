@@ -1,0 +1,204 @@
+"""Quantities typeset as the lecture writes them: short sines and cosines, lines that fit a page, named intermediates."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.errors import ArgumentError
+from symdyn.report.notation import entry_latex, name_latex
+from symdyn.report.shorthand import Shorthand
+from symdyn.tape.node import Node
+from symdyn.tape.sympy_bridge import expand
+from symdyn.tape.tape import Output
+
+if TYPE_CHECKING:
+    from symdyn.formulation.equations import Equations
+
+# Letters in a line of an A4 page at 11 pt, roughly.
+WIDTH = 80
+NARROWEST = 20
+# Named steps with fewer operations than this are written out.
+WORTH_A_NAME = 3
+
+
+@dataclass(frozen=True, repr=False)
+class Typeset:
+    """Lines of LaTeX, "left &= right", and what short names stand for; text and notebooks show all of it."""
+
+    lines: tuple[str, ...]
+    legend: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def latex(self) -> str:
+        """One display: the lines, then the legend."""
+        lines = list(self.lines)
+        if self.legend:
+            told = [rf"{short} = {full}" for short, full in self.legend]
+            rows = [r",\enspace ".join(told[k:k + 4]) for k in range(0, len(told), 4)]
+            lines += [r"&\text{with } " * (k == 0) + "&" * (k > 0) + row for k, row in enumerate(rows)]
+        if len(lines) == 1:
+            return lines[0].replace("&", "", 1)
+        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+    def __str__(self) -> str:
+        return self.latex
+
+    def __repr__(self) -> str:
+        return self.latex
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {self.latex}$"
+
+
+def latex(value: Any, name: str = "", shorthand: bool = False, width: int = WIDTH) -> Typeset:
+    """An expression or matrix in LaTeX.
+
+    name        code name of the quantity, for the left side: "M_tilde"; see symdyn.report.notation
+    shorthand   s_1 for sin q_1, c_12 for cos(q_1 + q_2), with a legend
+    width       letters in a line; longer matrices get named entries below them, longer sums several lines
+
+    Raises ArgumentError for what is no expression or matrix, and for a width that nothing fits in.
+    """
+    return _typeset([(name, value)], shorthand, width)
+
+
+def equations_latex(equations: Equations, name: str, shorthand: bool = False, intermediates: bool = False, width: int = WIDTH,
+                    simplify: bool = True) -> Typeset:
+    """A quantity of equations in LaTeX; see Equations.latex."""
+    if not intermediates:
+        return latex(equations.explicit(name, simplify), name, shorthand, width)
+    steps = named_steps(equations, name)
+    return _typeset([*steps[:-1], (name, steps[-1][1])], shorthand, width, raw=len(steps) - 1)
+
+
+def named_steps(equations: Equations, name: str) -> list[tuple[str, Any]]:
+    """LaTeX name and value of every step that the derivation has named, in terms of those before; last the quantity itself."""
+    output, symbols = equations.tape(name).outputs[name], equations.printed_leaves()
+    named: dict[Node, sp.Symbol] = {}
+    rows: list[tuple[str, Any]] = []
+    for node, text in _intermediates(equations, name):
+        rows.append((text, expand(Output.of("step", node), symbols, named)))
+        named[node] = sp.Symbol(text)
+    rows.append((name_latex(name), expand(output, symbols, named)))
+    return rows
+
+
+def _intermediates(equations: Equations, name: str) -> list[tuple[Node, str]]:
+    """Steps of the quantity that the derivation has named, and their names in LaTeX, in the order they are computed."""
+    tape = equations.tape(name)
+    own = set(tape.outputs[name].entries)
+    found: list[tuple[Node, str]] = []
+    operations: dict[Node, int] = {}
+    kept: set[Node] = set()
+    taken: set[str] = set()
+    for node in tape.steps:
+        operations[node] = 1 + sum(0 if a in kept else operations.get(a, 0) for a in node.args if isinstance(a, Node))
+        label = tape.recorder.names.get(node)
+        if label is None or node in own or operations[node] < WORTH_A_NAME:
+            continue
+        text = name_latex(label)
+        if text not in taken:
+            taken.add(text)
+            kept.add(node)
+            found.append((node, text))
+    return found
+
+
+def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: int = 0) -> Typeset:
+    """raw: so many of the rows have a left side that is LaTeX already."""
+    if width < NARROWEST:
+        raise ArgumentError(f"lines of {width} letters asked for; pass a width from {NARROWEST} on")
+    for _, value in rows:
+        if not isinstance(value, (sp.MatrixBase, sp.Expr)):
+            raise ArgumentError(f"latex takes a SymPy expression or matrix, found {value!r} of type {type(value).__name__}")
+    short = Shorthand([v for _, v in rows]) if shorthand else None
+    lines: list[str] = []
+    for k, (name, value) in enumerate(rows):
+        shown = short.short(value) if short else value
+        left = name if k < raw or not name else name_latex(name)
+        lines += _matrix(left, name, shown, width) if isinstance(shown, sp.MatrixBase) else _sum(left, shown, width)
+    used = set().union(*[v.free_symbols for v in short.symbols.values()]) if short else set()
+    return Typeset(tuple(lines), short.legend if short and used else ())
+
+
+def _matrix(left: str, name: str, value: Any, width: int) -> list[str]:
+    """A matrix; where it is too wide its longest entries get names and stand below."""
+    entries = [[str(sp.latex(e)) for e in value.row(i)] for i in range(value.rows)]
+    below: list[tuple[int, int, str]] = []
+    while _columns(entries) > width - letters(left) - 3:
+        i, j = max(((i, j) for i in range(value.rows) for j in range(value.cols)), key=lambda p: letters(entries[p[0]][p[1]]))
+        short = entry_latex(name or "a", (i, j) if value.cols > 1 else (i,))
+        if letters(entries[i][j]) <= letters(short):
+            break
+        below.append((i, j, short))
+        long = entries[i][j]
+        entries = [[short if text == long else text for text in row] for row in entries]
+    rows = r"\\".join(" & ".join(row) for row in entries)
+    matrix = rf"\left[\begin{{matrix}}{rows}\end{{matrix}}\right]"
+    lines = [f"{left} &= {matrix}" if left else f"&{matrix}"]
+    for i, j, short in sorted(below):
+        lines += _sum(short, value[i, j], width)
+    return lines
+
+
+def _columns(entries: Sequence[Sequence[str]]) -> float:
+    return sum(max(letters(text) for text in column) + 2 for column in zip(*entries))
+
+
+def _sum(left: str, value: sp.Expr, width: int) -> list[str]:
+    """left &= value, on as many lines as it takes."""
+    lines = _wrapped(value, width - letters(left) - 3)
+    return [f"{left} &= {lines[0]}" if left else f"&{lines[0]}", *[rf"&\quad {line}" for line in lines[1:]]]
+
+
+def _wrapped(value: sp.Expr, room: float) -> list[str]:
+    """Lines of a sum, or of a product with a long sum in it; anything else is one line."""
+    whole = str(sp.latex(value))
+    if letters(whole) <= room or room < NARROWEST:
+        return [whole]
+    if value.is_Add:
+        return _terms(value, room)
+    sums = [a for a in value.args if a.is_Add] if value.is_Mul else []
+    if not sums:
+        return [whole]
+    long = max(sums, key=lambda a: letters(sp.latex(a)))
+    before = sp.latex(sp.Mul(*[a for a in value.args if a != long]))
+    before = "-" if before == "-1" else f"{before} "
+    lines = _wrapped(long, room - letters(before) - 2)
+    lines[0] = rf"{before}\bigl[{lines[0]}"
+    lines[-1] = rf"{lines[-1]}\bigr]"
+    return [lines[0], *[rf"\quad {line}" for line in lines[1:]]]
+
+
+def _terms(value: sp.Expr, room: float) -> list[str]:
+    """The terms of a sum, as many on a line as there is room for."""
+    lines: list[str] = []
+    for term in value.as_ordered_terms():
+        first, *rest = _wrapped(term, room)
+        signed = first if first.startswith("-") or not lines else f"+ {first}"
+        if lines and not rest and letters(lines[-1]) + letters(signed) <= room:
+            lines[-1] = f"{lines[-1]} {signed}"
+        else:
+            lines += [signed, *rest]
+    return lines
+
+
+def letters(text: str) -> float:
+    """About how wide LaTeX becomes, in letters: a command is one, a fraction as wide as its wider half."""
+    while True:
+        fraction = re.search(r"\\frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}", text)
+        if fraction is None:
+            break
+        wide = max(fraction[1], fraction[2], key=letters)
+        text = text[:fraction.start()] + wide + text[fraction.end():]
+    text = re.sub(r"\\(?:left|right|mathbf|boldsymbol|tilde|dot|ddot|bar|mathring|bigl|bigr|displaystyle|[,;! ])", "", text)
+    text = re.sub(r"\\(sin|cos|tan)", r"\1", text)
+    text = re.sub(r"\\[a-zA-Z]+", "x", text)
+    small = sum(len(re.sub(r"[{}^_]", "", part)) for part in re.findall(r"[_^](?:\{[^{}]*\}|\w)", text))
+    spaced = len(re.findall(r"[-+=]", text))
+    return len(re.sub(r"[{}^_\s]", "", text)) + 1.2 * spaced - 0.3 * small

@@ -1,0 +1,119 @@
+"""Chapter 6: the errors that were found, what the slides give once they are mended, and numbers by other formulations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.comparison import Case, Verdict
+from symdyn.lecture import (
+    chapter_6_augmented,
+    chapter_6_constraints,
+    chapter_6_embedding,
+    chapter_6_joints,
+    chapter_6_platform,
+    chapter_6_recursion,
+    chapter_6_transformation,
+)
+from symdyn.lecture.letters import dot, moving
+
+MODULES = (chapter_6_platform, chapter_6_transformation, chapter_6_embedding, chapter_6_augmented, chapter_6_constraints,
+           chapter_6_joints, chapter_6_recursion)
+CASES = {case.name: case for module in MODULES for case in module.CASES}
+ERRORS = {
+    "turbine-newton-euler": {11749}, "platform-transformation": {11811, 11817, 11821, 11831},
+    "platform-transformation-augmented": {12095, 12101, 12105, 12113}, "platform-virtual-work": {11771},
+    "platform-embedding": {12163}, "platform-augmented": {12185}, "constraint-rates": {12217}, "fixed-joint-constraint": {12237}, "prismatic-joint-S": {12532},
+    "six-dof-joint-S": {12634, 12648},
+}
+
+
+def formula(case: str, name: str):
+    return next(f for f in CASES[case].taken() if f.name == name)
+
+
+def verdicts(changed) -> list[Verdict]:
+    return [entry.verdict for entry in sd.compare(Case("changed", formulas=[changed])).formulas[0].entries]
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_errors_that_were_found(name: str) -> None:
+    assert {f.slide.line for f, _ in sd.compare(CASES[name]).errata} == ERRORS[name]
+
+
+@pytest.mark.parametrize("name", ["r_G", "velocity of G", "velocity of G, exchanged", "J"])
+def test_mended_arm_of_the_platform(name: str) -> None:
+    """With the arm r_G/O in place of r_O/G."""
+    wrong = formula("platform-transformation", name)
+    arm = {letter: -value for letter, value in wrong.renamed.items()}
+    assert set(verdicts(replace(wrong, renamed=arm, errata=()))) == {Verdict.EQUAL}
+
+
+@pytest.mark.parametrize("name", ["r_O", "velocity of O", "velocity of O, exchanged", "velocities in matrix form"])
+def test_mended_names_of_G_and_O(name: str) -> None:
+    """With G and O interchanged again: r_G = r_O + R r_G/O."""
+    wrong = formula("platform-transformation-augmented", name)
+    p = chapter_6_transformation.Platform()
+    frame = sd.Frame("n").frame("b", rotation=p.R, origin=list(moving("r_GE")))
+    point = frame.point("G", list(chapter_6_transformation.c))
+    right = {"r_O": point.position(), "velocities in matrix form": sp.Matrix.vstack(point.velocity(), frame.angular_velocity())}
+    assert set(verdicts(replace(wrong, derived=right.get(name, point.velocity()), errata=()))) == {Verdict.EQUAL}
+
+
+def test_mended_k_bar() -> None:
+    wrong = formula("platform-embedding", "k_bar of chapter 6.3")
+    right = formula("platform-embedding", "k_bar").printed
+    assert set(verdicts(replace(wrong, printed=right, errata=()))) == {Verdict.EQUAL}
+
+
+def test_k_bar_keeps_the_energy() -> None:
+    """Only with J_dot do the accelerations without forces keep the kinetic energy."""
+    p = chapter_6_transformation.Platform(sp.Matrix([0, 0, sp.Symbol("c")]))
+    names = ("M_tilde", "k_tilde")
+    M, k = (p.derived(name) for name in names)
+    wrong = formula("platform-embedding", "k_bar of chapter 6.3").printed
+    q, qd = chapter_6_transformation.q, dot(chapter_6_transformation.q)
+    rng = np.random.default_rng(6)
+    symbols = sorted((M.free_symbols | k.free_symbols | wrong.free_symbols) - set(q) - set(qd), key=str)
+    values = rng.uniform(0.5, 1.5, len(symbols) + 12)
+    evaluate = sp.lambdify([*symbols, *q, *qd], [M, k, wrong, sd.rate(M)])
+    numbers = [np.array(e, dtype=float) for e in evaluate(*values)]
+    rates = values[-6:]
+    assert rates @ numbers[3] @ rates / 2 == pytest.approx(rates @ numbers[1].ravel(), rel=1e-11)
+    assert abs(rates @ numbers[3] @ rates / 2 - rates @ numbers[2].ravel()) > 1e-2
+
+
+def test_mended_turbine() -> None:
+    wrong = formula("turbine-newton-euler", "all bodies")
+    bodies = [chapter_6_platform.Body(name) for name in chapter_6_platform.BODIES]
+    left = sp.Matrix.vstack(*[b.M * b.s_ddot + b.Q * b.s_dot for b in bodies])
+    assert set(verdicts(replace(wrong, printed=(left, wrong.printed[1]), errata=()))) == {Verdict.EQUAL}
+
+
+@pytest.mark.parametrize(("case", "name"), [
+    ("platform-newton-euler", "omega tilde"), ("revolute-joint-S", "X"), ("three-link-forward-dynamics", "p_2^A"),
+    ("platform-augmented", "matrix")])
+def test_other_signs_are_found(case: str, name: str) -> None:
+    """A formula in which one entry has the other sign is different there, and only there."""
+    right = formula(case, name)
+    wrong = sp.Matrix(right.printed)
+    place = next(n for n, e in enumerate(wrong) if e != 0)
+    wrong[place] = -wrong[place]
+    found = verdicts(replace(right, printed=wrong))
+    assert [n for n, verdict in enumerate(found) if verdict is not Verdict.EQUAL] == [place]
+    assert found[place] is Verdict.DIFFERENT
+
+
+@pytest.mark.parametrize("joint", [sd.Fixed, sd.Spherical])
+def test_three_equations_are_a_ball_joint(joint: type) -> None:
+    """What the slide prints for the fixed joint holds a ball joint as well; the fixed joint has three rows more."""
+    pair = chapter_6_constraints.Pair("P", "T", lambda P, T: joint("foot", P, T, parent_point=[1, 2, 3]))
+    (rP, rT), RP = pair.r, pair.R[0]
+    printed = (rP + RP * sp.Matrix([1, 2, 3]), rT)
+    assert set(verdicts(replace(formula("fixed-joint-constraint", "fixed joint"), printed=printed,
+                                derived=(pair.C[:3, :], sp.zeros(3, 1))))) == {Verdict.EQUAL}
+    assert pair.C.rows == (6 if joint is sd.Fixed else 3)
