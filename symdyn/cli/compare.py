@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,8 @@ def compare(arguments: argparse.Namespace) -> int:
         own = [case for name in files for case in cases_from_file(Path(name))]
         found = compare([*own, *(name for name in arguments.cases if name not in files)])
     else:
-        found = compare_lecture(arguments.cases or None, arguments.jobs or 1)
+        processes = os.cpu_count() or 1
+        found = compare_lecture(arguments.cases or None, arguments.jobs or (processes if arguments.all else 1))
     if len(found) == 1 and not arguments.all:
         print(found.cases[0])
     else:

@@ -119,7 +119,8 @@ def _add_diagnose(parser: argparse.ArgumentParser) -> None:
 def _add_compare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("cases", metavar="NAME", nargs="*", help="a case of the lecture, or a Python file that defines CASES")
     parser.add_argument("--all", action="store_true", help="the whole lecture: prints one table, writes reports and errata")
-    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases (default: 1)")
+    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases (default: 1, with --all "
+                        "one a processor)")
     parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the reports (default with --all: "
                         "generated/compare)")
 

@@ -71,9 +71,9 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     errata = [_Errata(e, taken, derived, decisions, faults) for e in formula.errata]
     unreadable = formula.unreadable if isinstance(formula.unreadable, Mapping) else {}
     entries = []
+    shown = taken.printed.rebuilt().entries, derived.rebuilt().entries
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
-        printed = taken.printed.entries[k] if decision.how != SHAPE else None
-        right = derived.entries[k] if decision.how != SHAPE else None
+        printed, right = (shown[0][k], shown[1][k]) if decision.how != SHAPE else (None, None)
         entry = EntryResult(place, Verdict.EQUAL, decision.how, "", printed, right, decision.point, decision.values)
         entries.append(_verdict(entry, decision, convention, errata, unreadable.get(place, "")))
     return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(taken.shown), _shown(derived),
@@ -169,6 +169,7 @@ def _decide(taken: _Taken, derived: Value) -> list[Decision]:
 def _shown(value: Value | None) -> Any:
     if value is None:
         return None
+    value = value.rebuilt()
     if value.sides is not None:
         return value.sides[0].as_sympy(), value.sides[1].as_sympy()
     return value.as_sympy()

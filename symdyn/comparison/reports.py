@@ -10,7 +10,7 @@ import jinja2
 
 from symdyn.backend.source import template_folders
 from symdyn.comparison.result import COLUMNS, Comparison, Comparisons
-from symdyn.comparison.typeset import corrections, formula_latex, marked, mathml, place
+from symdyn.comparison.typeset import SHOWN, corrections, formula_latex, marked, mathml, place
 from symdyn.comparison.verdict import FormulaResult, Verdict
 from symdyn.errors import ArgumentError
 
@@ -81,6 +81,7 @@ def _errata(case: Comparison, typeset: Callable[[str], Any]) -> list[dict[str, A
         rows.append({"case": case.name, "formula": formula.name, "slide": formula.slide, "why": erratum.why,
                      "also": ", ".join(map(str, formula.also)), "kind": evidence.kind, "sentence": evidence.sentence,
                      "printed_residual": f"{evidence.printed:.2g}", "right_residual": _rounding(evidence.right),
+                     "more": max(len(erratum.entries) - SHOWN, 0) if not isinstance(formula.printed, tuple) else 0,
                      "corrections": [{"place": where, "printed": typeset(a), "right": typeset(b)}
                                      for where, a, b in corrections(formula, erratum.entries)]})
     return rows

@@ -75,6 +75,12 @@ class Comparisons:
         """Whether every entry has a verdict that stands."""
         return all(c.decided for c in self.cases)
 
+    def rows(self) -> list[tuple[str, ...]]:
+        """The table: a head, then case, section, formulas and number of entries of each verdict."""
+        head = ("case", "section", "formulas", *COLUMNS.values())
+        return [head, *((c.name, c.slide.section if c.slide else "", str(len(c.formulas)), *(str(c.counts[v]) for v in COLUMNS))
+                        for c in self.cases)]
+
     def __iter__(self) -> Iterator[Comparison]:
         return iter(self.cases)
 
@@ -82,14 +88,12 @@ class Comparisons:
         return len(self.cases)
 
     def __str__(self) -> str:
-        width = max([len(c.name) for c in self.cases] + [4])
-        lines = [f"{'case':{width}} {'slide':>7} {'formulas':>9}" + "".join(f"{text:>12}" for text in COLUMNS.values())]
-        for c in self.cases:
-            section = c.slide.section if c.slide else ""
-            counts = "".join(f"{c.counts[v] or '.':>12}" for v in COLUMNS)
-            lines.append(f"{c.name:{width}} {section:>7} {len(c.formulas):>9}{counts}")
+        head, *rows = self.rows()
         formulas = sum(len(c.formulas) for c in self.cases)
-        lines.append(f"{'all':{width}} {'':>7} {formulas:>9}" + "".join(f"{self.counts[v]:>12}" for v in COLUMNS))
+        rows = [tuple("." if text == "0" else text for text in row) for row in rows]
+        rows.append(("all", "", str(formulas), *(str(self.counts[v]) for v in COLUMNS)))
+        width = max(len(row[0]) for row in rows)
+        lines = [f"{row[0]:{width}}{row[1]:>8}{row[2]:>9}" + "".join(f"{text:>12}" for text in row[3:]) for row in (head, *rows)]
         errors = sum(len(c.errata) for c in self.cases)
         lines.append(f"{len(self.cases)} cases, {sum(self.counts.values())} entries in {self.seconds:.0f} s; {errors} errata")
         return "\n".join(lines)

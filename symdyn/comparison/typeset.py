@@ -11,7 +11,9 @@ from symdyn.comparison.verdict import EntryResult, FormulaResult, Verdict
 from symdyn.errors import MissingExtra
 
 # Expressions with more operations than this, written out, are not typeset: nobody reads them.
-READABLE = 250
+READABLE = 120
+# Entries of one formula that a list of errata shows; more of the same kind are counted.
+SHOWN = 4
 Places = Collection[tuple[int, ...]]
 
 
@@ -47,11 +49,12 @@ def marked(formula: FormulaResult) -> set[tuple[int, ...]]:
 
 
 def corrections(formula: FormulaResult, places: Places) -> list[tuple[str, str, str]]:
-    """Place, print and right form in LaTeX of the entries at the places; an equation, or a formula of another shape, whole."""
+    """Place, print and right form in LaTeX of the first entries at the places; an equation, or a formula of another shape,
+    whole."""
     entries: list[EntryResult] = [e for e in formula.entries if e.index in places]
     if isinstance(formula.printed, tuple) or not all(e.index for e in entries):
         return [("", formula_latex(formula.printed), formula_latex(formula.derived))]
-    return [(place(e.index), formula_latex(e.printed), formula_latex(e.right)) for e in entries]
+    return [(place(e.index), formula_latex(e.printed), formula_latex(e.right)) for e in entries[:SHOWN]]
 
 
 def place(index: tuple[int, ...]) -> str:

@@ -22,6 +22,12 @@ class Value:
     entries: tuple[sp.Expr, ...]
     sides: tuple[Value, Value] | None = None
 
+    def rebuilt(self) -> Value:
+        """With every expression made anew from its parts, as it comes back from another process: SymPy then multiplies
+        numbers into sums that were factored."""
+        sides = None if self.sides is None else (self.sides[0].rebuilt(), self.sides[1].rebuilt())
+        return Value(self.shape, tuple(map(_rebuilt, self.entries)), sides)
+
     def as_sympy(self) -> Any:
         """The expression or matrix."""
         return sp.Matrix(*self.shape, list(self.entries)) if self.shape else self.entries[0]
@@ -39,6 +45,10 @@ class Value:
             return [()]
         rows, columns = self.shape
         return [(i, j) if columns > 1 else (i,) for i in range(rows) for j in range(columns)]
+
+
+def _rebuilt(e: Any) -> Any:
+    return e.func(*map(_rebuilt, e.args)) if e.args else e
 
 
 def take(value: Any, what: str, faults: list[str]) -> Value | None:

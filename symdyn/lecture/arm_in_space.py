@@ -87,6 +87,7 @@ class ArmInSpace(Letters):
         self.system.add_joint(sd.Cylindrical("lift", self.system.ground, column, [q_a, s_a]))
         self.system.add_joint(sd.Revolute("joint1", column, link1, q1, parent_point=list(r_O1), parent_rotation=SEAT_1))
         self.system.add_joint(sd.Revolute("joint2", link1, link2, q2, parent_point=list(self.r_O2)))
+        self.known: dict[str, sp.ImmutableMatrix] = {}
 
     @cached_property
     def equations(self) -> Any:
@@ -94,7 +95,9 @@ class ArmInSpace(Letters):
 
     def of_link2(self, name: str) -> sp.Matrix:
         """A quantity of link 2 from the recursion, as recorded: components in b2, about O_2."""
-        return self.equations.explicit(f"{name}_3", simplify=False)
+        if name not in self.known:
+            self.known[name] = sp.ImmutableMatrix(self.equations.explicit(f"{name}_3", simplify=False))
+        return sp.Matrix(self.known[name])
 
 
 def cross(*factors: sp.Matrix) -> sp.Matrix:

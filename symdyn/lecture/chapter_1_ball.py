@@ -41,9 +41,9 @@ def _slot() -> list[Formula]:
     of_E = Erratum("E stands on the ground and describes the ball in the n-frame; these are components in the b-frame.", composed)
     return [
         Formula("v_A", v_B + v_rel + w.cross(r_AB), A.velocity(seen_from=n), line=1942, also=(1961,)),
-        Formula("position of A, described by B", in_n, A.position(of=B, components=b), line=OF_B[0], also=OF_B[1:],
+        Formula("position of A described by B, in words", in_n, A.position(of=B, components=b), line=OF_B[0], also=OF_B[1:],
                 errata=[of_B]),
-        Formula("position of A, described by E", in_b, A.position(of=B, components=n), line=OF_E[0], also=OF_E[1:],
+        Formula("position of A described by E, in words", in_b, A.position(of=B, components=n), line=OF_E[0], also=OF_E[1:],
                 errata=[of_E]),
     ]
 

@@ -67,14 +67,15 @@ def _earth() -> list[Formula]:
     inertial = A.inertial_forces(m, frame=b, components=n)
     relative = A.acceleration_parts(through=b, seen_from=n).relative
     turning = w.cross(w.cross(r))
+    position = sp.Matrix([X, Y, Z]) + r
     return [
+        Formula("Newton's law in the n-frame", (F, m * sd.rate(sd.rate(position))), (F, m * a_A), line=1070, also=(1091, 1113)),
         Formula("velocity of A", v_B + v_rel + w.cross(r), A.velocity(seen_from=n), line=1081, also=(1103,), latex="v_A"),
         Formula("acceleration of A", a_B + a_rel + 2 * w.cross(v_rel) + alpha.cross(r) + turning, a_A, line=1083, also=(1105,),
                 latex="a_A"),
         Formula("acceleration of A from B", a_rel + 2 * w.cross(v_rel) + alpha.cross(r) + turning,
                 a_A - b.acceleration(seen_from=n), line=1083, also=(1105,), latex="a_{A/B}"),
-        Formula("Newton's law", (F, m * (a_B + a_rel + 2 * w.cross(v_rel) + alpha.cross(r) + turning)), (F, m * a_A), line=1095,
-                also=(1070, 1091, 1113)),
+        Formula("Newton's law", (F, m * (a_B + a_rel + 2 * w.cross(v_rel) + alpha.cross(r) + turning)), (F, m * a_A), line=1095),
         Formula("Newton's law in the b-frame", (F - m * (a_B + 2 * w.cross(v_rel) + alpha.cross(r) + turning), m * a_rel),
                 (F + inertial.total, m * relative), line=1097),
         Formula("force of the origin", -m * a_B, inertial.origin, line=1119, latex="-m a_B"),

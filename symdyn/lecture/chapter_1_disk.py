@@ -6,6 +6,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Formula, Slide, conventions
+from symdyn.comparison.conventions import Convention
 from symdyn.lecture.chapter_1_circular import length, limit
 
 r, v, omega, m, step = sp.symbols("r v omega m_P Delta_t", positive=True)
@@ -73,14 +74,17 @@ def _coriolis() -> list[Formula]:
     about_B = v_t(sp.S.Zero) - B.velocity(seen_from=n, components=b)
     centre = conventions.other_point(about_B,
                                      "The slide calls the centre of the disk B here, as 1.9 does, and O in the lines below.")
+    size = Convention("size of a vector",
+                      "v_n without bars stands for its size; these slides set omega and v_n bold or not alike.",
+                      lambda change: length(change) * v_n / length(v_n))
     parts = A.acceleration_parts(through=b, seen_from=n)
     acceleration = A.acceleration(seen_from=n)
     inertial = A.inertial_forces(m, frame=b, components=n)
     return [
         Formula("a_t1", w.cross(v_n.subs(sd.t, 0)), a_t1, line=1837, also=(1839,)),
         Formula("change of v_n by Delta theta", length(v_n), length(a_t1) / omega, line=1849, latex=r"|\Delta v| / \Delta\theta"),
-        Formula("change of v_n, in parentheses", None, length(a_t1) / omega, line=1849,
-                unreadable="A vector stands where a size is meant; the notes have set v_n in bold face."),
+        Formula("change of v_n, in parentheses", v_n, a_t1 / omega, line=1849, conventions=[size],
+                latex=r"|\Delta v| / \Delta\theta"),
         Formula("size of a_t1", length(v_n) * omega, length(a_t1), line=1851, latex="|a_{t1}|"),
         Formula("v_t after the step", w.cross(r_AO + step * in_slot), v_t(step), line=1859, latex=r"v_t^{t + \Delta t}"),
         Formula("v_t", w.cross(r_AO - sp.Matrix([x_B, y_B, 0])), v_t(sp.S.Zero), line=1863, conventions=[centre], latex="v_t^t"),

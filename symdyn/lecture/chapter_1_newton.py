@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import sympy as sp
 
 import symdyn as sd
@@ -10,6 +13,21 @@ from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
 i, j, k = (sp.eye(3).col(axis) for axis in range(3))
 m, g, a, N = sp.symbols("m_P g a N", positive=True)
 WEIGHT = -m * g * k
+
+
+@cache
+def falling_body() -> Any:
+    """Equations of motion of a body with the coordinates x, y, z on which gravity alone acts."""
+    q = list(sd.coordinates("x y z"))
+    system = sd.System("falling", gravity=[0, 0, -g])
+    body = system.add_body("body", mass=m)
+    system.add_joint(sd.Custom("free", system.ground, body, q, position=q))
+    return system.embedding()
+
+
+def gravity() -> sp.Matrix:
+    """The weight of the body, (3, 1), N."""
+    return falling_body().explicit("F_tilde", simplify=False)
 
 
 def _newtons_law() -> list[Formula]:
@@ -59,10 +77,15 @@ def _bus() -> list[Formula]:
     y_ddot = sp.solve(free[1], y.ddot)[0]
     seen = m * sliding.acceleration(seen_from=b).xreplace({y.ddot: y_ddot})
     at_rest = m * parked.acceleration(seen_from=n)
+    weight = gravity()
+    r = sd.coordinates("r_x r_y r_z")
+    any_box = n.point("P", list(r))
+    rdd_PE = sp.Matrix([c.ddot for c in r])
     return [
-        Formula("Newton's law, bus at rest", (0 * k, WEIGHT + N_of_floor), (at_rest, WEIGHT + N_of_floor), line=234,
-                also=(226, 228)),
-        Formula("N, bus at rest", -WEIGHT, at_rest - WEIGHT, line=236),
+        Formula("Newton's law, box", (m * rdd_PE, WEIGHT + N_of_floor),
+                (m * any_box.acceleration(seen_from=n), weight + N_of_floor), line=228, also=(226,)),
+        Formula("Newton's law, bus at rest", (0 * k, WEIGHT + N_of_floor), (at_rest, weight + N_of_floor), line=234),
+        Formula("N, bus at rest", -WEIGHT, at_rest - weight, line=236),
         Formula("acceleration, bus at rest", 0 * k, parked.acceleration(seen_from=n), line=232, latex=r"\ddot{r}_{P/E}"),
         Formula("F on the fixed box", m * a * j, force, line=255, renamed=of_bus),
         Formula("size of F on the fixed box", m * a, force[1], line=259, renamed=of_bus),
@@ -85,21 +108,28 @@ def _strap() -> list[Formula]:
     of_bus = {"a": s.ddot}
     rdd_PE = rdd_OE = a * j
     T = m * rdd_PE + m * g * k
-    tension = m * P.acceleration(seen_from=n) - WEIGHT
+    T_of_strap = sp.Matrix(sp.symbols("T_x T_y T_z"))
+    weight = gravity()
+    tension = m * P.acceleration(seen_from=n) - weight
     inertial = P.inertial_forces(m, frame=b).total
     relative = m * P.acceleration(seen_from=b)
+    r = sd.coordinates("x y z")
+    swinging = b.point("P", list(r))
+    rdd_PO = sp.Matrix([c.ddot for c in r])
     carries = proofs.limit("In a bus that does not accelerate, the strap carries the weight.", at={s.ddot: 0},
                            value=[0, 0, m * g])
     cancel = Erratum("Tension and inertial force leave m g k, which carries the weight; the three forces cancel together.",
                      carries)
     return [
-        Formula("Newton's law", (m * rdd_PE, T - m * g * k), (m * P.acceleration(seen_from=n), tension + WEIGHT),
+        Formula("Newton's law", (m * rdd_PE, T_of_strap - m * g * k), (m * P.acceleration(seen_from=n), T_of_strap + weight),
                 line=366, also=(360, 365), renamed=of_bus),
         Formula("T", T, tension, line=367, renamed=of_bus),
-        Formula("forces, seen in the bus", T - m * g * k - m * rdd_OE, tension + WEIGHT + inertial, line=390, renamed=of_bus),
-        Formula("forces, T put in", m * rdd_PE - m * rdd_PE, relative, line=392),
+        Formula("Newton's law, seen in the bus", (m * rdd_PO, T_of_strap - m * g * k - m * rdd_OE),
+                (m * swinging.acceleration(seen_from=b), T_of_strap + weight + swinging.inertial_forces(m, frame=b).total),
+                line=390, renamed=of_bus),
+        Formula("forces, T put in", m * rdd_PE - m * rdd_PE, tension + weight + inertial, line=392),
         Formula("handle, seen in the bus", 0 * j, relative, line=394),
-        Formula("tension and inertial force", sp.zeros(3, 1), tension + inertial, line=398, errata=[cancel],
+        Formula("tension and inertial force, in words", sp.zeros(3, 1), tension + inertial, line=398, errata=[cancel],
                 latex=r"T - m_P \ddot{r}_{O/E}"),
     ]
 
@@ -112,31 +142,35 @@ def _elevator() -> list[Formula]:
     P = b.point("P", [0, 0, 1])
     inertial = P.inertial_forces(m, frame=b).total
     rdd_PE = P.acceleration(seen_from=n)
-    scale = m * rdd_PE - WEIGHT
-    fall = sd.embedding([z], [0, 0, z], [m, m, m], force=list(WEIGHT))
-    g_down = {z.ddot: (fall.M_tilde.LUsolve(fall.F_tilde))[0]}
+    weight = gravity()
+    scale = (m * rdd_PE - weight)[2]
+    fall = falling_body()
+    g_down = {z.ddot: fall.explicit("M_tilde", simplify=False).LUsolve(weight)[2]}
     upwards = proofs.numeric_derivative("The elevator rises: its position is z k.", of=sp.Matrix([0, 0, z]), order=2)
     rises = Erratum("The elevator accelerates upwards, along k; j is the direction of the bus.", upwards)
     rest = {z.ddot: 0}
     rising = {"a": z.ddot}
     slide_N = m * (g + a)
     return [
-        Formula("Newton's law, falling", (m * rdd_PE, -m * g * k), (m * rdd_PE, WEIGHT), line=419, also=(417,)),
+        Formula("Newton's law, falling", (m * z.ddot * k, -m * g * k), (m * rdd_PE, weight), line=419, also=(417,)),
         Formula("acceleration, falling", -g * k, rdd_PE.xreplace(g_down), line=421, latex=r"\ddot{r}_{P/E}"),
         Formula("acceleration of O, falling", -g * k, rdd_OE.xreplace(g_down), line=442, latex=r"\ddot{r}_{O/E}"),
-        Formula("forces, falling", -m * g * k + m * g * k, WEIGHT + inertial.xreplace(g_down), line=444),
+        Formula("forces, falling", -m * g * k + m * g * k, weight + inertial.xreplace(g_down), line=444),
         Formula("weight felt, falling", 0 * k, m * P.acceleration(seen_from=b), line=446),
-        Formula("Newton's law, at rest", (0 * k, -m * g * k + N * k), (m * rdd_PE.xreplace(rest), WEIGHT + N * k), line=470,
-                also=(466,)),
-        Formula("scale, at rest", m * g, scale.xreplace(rest)[2], line=472),
-        Formula("Newton's law, rising", (m * a * k, -m * g * k + N * k), (m * rdd_PE, WEIGHT + N * k), line=492, renamed=rising),
-        Formula("scale, rising", m * (g + a), scale[2], line=494, also=(522, 549), renamed=rising, latex="N"),
-        Formula("resultant, rising", m * a * k, scale + WEIGHT, line=498, renamed=rising),
+        Formula("Newton's law on the scale", (m * z.ddot * k, -m * g * k + N * k), (m * rdd_PE, weight + N * k), line=466,
+                also=(492,)),
+        Formula("Newton's law, at rest", (0 * k, -m * g * k + N * k), (m * rdd_PE.xreplace(rest), weight + N * k), line=470),
+        Formula("scale, at rest", m * g, scale.xreplace(rest), line=472, also=(474,)),
+        Formula("Newton's law, rising", (m * a * k, -m * g * k + N * k), (m * rdd_PE, weight + N * k), line=492, renamed=rising),
+        Formula("scale, rising", m * (g + a), scale, line=494, also=(496, 522, 549), renamed=rising, latex="N"),
+        Formula("resultant, rising", m * a * k, scale * k + weight, line=498, renamed=rising),
         Formula("acceleration of O, rising", a * j, rdd_OE, line=521, also=(548,), renamed=rising, errata=[rises],
                 latex=r"\ddot{r}_{O/E}"),
-        Formula("forces, rising", -m * g * k + N * k - m * a * k, WEIGHT + N * k + inertial, line=521, also=(548,),
+        Formula("forces, rising", -m * g * k + N * k - m * a * k, weight + N * k + inertial, line=521, also=(548,),
                 renamed=rising),
-        Formula("forces with N, rising", 0 * k, WEIGHT + scale + inertial, line=522, also=(549,), where={N: slide_N}),
+        Formula("forces with N, rising", (-m * g * k + slide_N * k - m * a * k), weight + scale * k + inertial, line=522,
+                also=(549,), renamed=rising),
+        Formula("person, seen in the elevator", 0 * k, m * P.acceleration(seen_from=b), line=522, also=(549,)),
         Formula("additional force, rising", -m * a * k, inertial, line=554, renamed=rising),
     ]
 

@@ -83,16 +83,15 @@ def _unit_vectors() -> list[Formula]:
     f = turning()
     omega = f.theta.dot
     i_b, j_b, k_b = (f.R.col(c) for c in range(3))
-    Rd = sd.rate(f.b.rotation(f.n))
+    derived = f.b.rotation(f.n)
+    Rd = sd.rate(derived)
     cos, sin = sp.cos(f.theta), sp.sin(f.theta)
     plane = sp.Matrix([[cos, -sin], [sin, cos]])
     step = sp.Symbol("Delta_theta", positive=True)
-    columns = limit(f.R.subs(f.theta, f.theta + step) - f.R, step)
+    columns = limit(derived.subs(f.theta, f.theta + step) - derived, step)
     return [
-        Formula("R", plane, f.b.rotation(f.n)[:2, :2], line=1400, also=(1432, 1462, 1521), latex="{}^n R_b"),
-        Formula("omega", omega * k_b, f.b.angular_velocity(f.n), line=1468, also=(1501,), latex=r"\omega"),
-        Formula("omega, repeated", None, f.b.angular_velocity(f.n), line=1503,
-                unreadable="The vector on the left has lost its bold face, so that a scalar stands beside vectors."),
+        Formula("R", plane, derived[:2, :2], line=1400, also=(1432, 1462, 1521), latex="{}^n R_b"),
+        Formula("omega", omega * k_b, f.b.angular_velocity(f.n), line=1468, also=(1501, 1503), latex=r"\omega"),
         Formula("change of i_b by d theta", j_b, columns.col(0), line=1480, latex="d i_b / d\\theta"),
         Formula("change of j_b by d theta", -i_b, columns.col(1), line=1488, latex="d j_b / d\\theta"),
         Formula("size of the change of i_b by d theta", 1, columns.col(0).norm(), line=1476),

@@ -15,7 +15,7 @@ from symdyn.frames.rigid_body import (
     moment_equation,
     point_inertia,
 )
-from symdyn.lecture.chapter_2_moment import F1, F2, TITLE, Body, inertia_of, m1, m2, m_system, omega, r1, r2
+from symdyn.lecture.chapter_2_moment import F1, F2, TITLE, Body, inertia_of, m1, m2, m_system, omega, r1, r2, turning_frame
 from symdyn.lecture.letters import constant, ddot, dot, moving, moving_matrix, stands_for, symmetric
 
 half = sp.Rational(1, 2)
@@ -25,11 +25,11 @@ b_omega = constant("b_omega")
 
 
 class Turned:
-    """A frame at any attitude, and what the letters of the slides stand for."""
+    """A turning frame, and what the letters of the slides stand for."""
 
     def __init__(self) -> None:
         self.n = sd.Frame("n")
-        self.b = self.n.frame("b", rotation=sd.rotation.from_euler("XYZ", sd.coordinates("phi theta psi")))
+        self.b = turning_frame(self.n)
         self.R = self.b.rotation(self.n)
         self.omega = self.b.angular_velocity(seen_from=self.n, components=self.n)
         self.alpha = self.b.angular_acceleration(seen_from=self.n, components=self.n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -27,12 +28,18 @@ def inertia_of(m: sp.Expr, r: sp.Matrix) -> sp.Matrix:
                       [-m * x * z, -m * y * z, m * (x**2 + y**2)]])
 
 
+def turning_frame(n: sd.Frame, origin: Sequence[Any] = (0, 0, 0)) -> sd.Frame:
+    """A frame that turns about z and about its own x: its angular velocity can have any direction."""
+    psi, phi = sd.coordinates("psi phi")
+    return n.frame("b", rotation=sd.rotation.about("Z", psi) * sd.rotation.about("X", phi), origin=list(origin))
+
+
 class Body:
-    """A body with two particles, at any attitude (x, y, z Euler angles), and what symdyn derives of it."""
+    """A turning body with two particles, and what symdyn derives of it."""
 
     def __init__(self) -> None:
         self.n = sd.Frame("n")
-        self.b = self.n.frame("b", rotation=sd.rotation.from_euler("XYZ", sd.coordinates("phi theta psi")), origin=list(rO))
+        self.b = turning_frame(self.n, rO)
         self.points = [self.b.point(name, constant(f"b_r_{name}")) for name in "12"]
 
     @cached_property

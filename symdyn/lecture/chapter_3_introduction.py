@@ -11,6 +11,7 @@ from sympy import Matrix, cos, diag, sin, tan
 import symdyn as sd
 from symdyn.comparison.case import Case, Formula, Slide
 from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
 SYSTEM = "Multibody System Dynamics"
@@ -70,8 +71,10 @@ def _straight_track_reaction() -> list[Formula]:
     M, weight = Matrix([[m, 0], [0, m]]), Matrix([0, -m * g])
     free = sd.embedding([x, y], [x, y], [m, m], [Fx, Fy], name="free_body")
     falling = sd.embedding([x, y], [x, y], [m, m], [0, -m * g], name="falling_body")
-    track = sd.embedding([q1], [x0 + q1 * cos(theta), y0 - q1 * sin(theta)], [m, m], [0, -m * g], name="vehicle_on_track")
+    track = sd.embedding([q1], list(place_on_track(q1, -theta, (x0, y0))), [m, m], [0, -m * g], name="vehicle_on_track")
     F_c = track.F_c
+    # The force on the vehicle as its motion has it.
+    inertia = m * track.J * Matrix(track.explicit("accelerations"))
 
     def sides(eq: EmbeddedEquations) -> tuple[Matrix, Matrix]:
         return Matrix([e.lhs for e in eq.equations]), Matrix([e.rhs for e in eq.equations])
@@ -81,9 +84,9 @@ def _straight_track_reaction() -> list[Formula]:
     augmented = sd.augmented([x, y], [m, m], [0, -m * g], [y - y0 + (x - x0) * tan(theta)], name="vehicle_on_track")
     moving = (M * r_ddot + augmented.C_r.T * augmented.lam, weight)
     return [
-        Formula("Newton", (m * r_ddot, Matrix([Fx, Fy])), sides(free), line=3286, also=(3306, 3318)),
+        Formula("Newton", (m * r_ddot, Matrix([Fx, Fy])), sides(free), line=3286, also=(3209, 3306, 3318)),
         Formula("free fall", (m * r_ddot, weight), sides(falling), line=3290),
-        Formula("sum of F", weight + F_c, weight + printed_force, line=3310, also=(3340,), latex=r"\sum\mathbf{F}"),
+        Formula("sum of F", weight + F_c, inertia, line=3310, also=(3340,), latex=r"\sum\mathbf{F}"),
         Formula("row 1", sp.Eq(m * x.ddot, Fx), free.equations[0], line=3322),
         Formula("row 2", sp.Eq(m * y.ddot, Fy), free.equations[1], line=3324),
         Formula("matrix form", (Matrix([[m, 0], [0, m]]) * r_ddot, Matrix([Fx, Fy])), sides(free), line=3330),

@@ -8,6 +8,7 @@ from sympy import Matrix, cos, sin
 import symdyn as sd
 from symdyn.comparison import proofs
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.lecture.chapter_3_pendulum_relative import circle, place_of_pendulum
 
 PENDULUM = "Example of the pendulum - Augmented Formulation"
 MULTIPLIER = "Lagrange Multiplier Method"
@@ -20,9 +21,9 @@ def _multiplier() -> list[Formula]:
     m, length, Fx, Fy = sd.parameters("m l_1 F_x F_y")
     lam = sp.Symbol("lambda")
     dx, dy, dq = sp.symbols("delta_x delta_y delta_q")
-    C = x**2 + y**2 - length**2
+    C = circle(x, y, length)
     eq = sd.augmented([x, y], [m, m], [Fx, Fy], [C], name="pendulum")
-    embedded = sd.embedding([q1], [length * sin(q1), -length * cos(q1)], [m, m], [Fx, Fy], name="pendulum")
+    embedded = sd.embedding([q1], list(place_of_pendulum(q1, length)), [m, m], [Fx, Fy], name="pendulum")
     rows = eq.matrix * Matrix([x.ddot, y.ddot, lam]) - eq.rhs
     place, J = embedded.explicit("r"), embedded.J
     r_ddot = J * q1.ddot + embedded.Jd_qd
@@ -127,10 +128,10 @@ def _pendulum() -> list[Formula]:
     x, y = sd.coordinates("x_P y_P")
     (q1,) = sd.coordinates("q1:2")
     m, g, length = sd.parameters("m g l_1")
-    C = x**2 + y**2 - length**2
+    C = circle(x, y, length)
     eq = sd.augmented([x, y], [m, m], [0, -m * g], [C], name="pendulum")
     r, r_dot, r_ddot = Matrix([x, y]), Matrix([x.dot, y.dot]), Matrix([x.ddot, y.ddot])
-    embedded = sd.embedding([q1], [length * sin(q1), -length * cos(q1)], [m, m], [0, -m * g], name="pendulum")
+    embedded = sd.embedding([q1], list(place_of_pendulum(q1, length)), [m, m], [0, -m * g], name="pendulum")
     place = embedded.explicit("r")
     velocity = sd.rate(place)
     on_circle = dict(zip([x, y, x.dot, y.dot], [*place, *velocity]))

@@ -14,12 +14,26 @@ from symdyn.comparison.case import Case, Erratum, Formula, Slide
 PENDULUM = "Example of the pendulum"
 
 
+def place_of_pendulum(q1: sp.Expr, length: sp.Expr) -> Matrix:
+    """Components in n (2, 1) of the end of a wire that hangs down and is turned by q1 about z."""
+    n = sd.Frame("n")
+    wire = n.frame("wire", rotation=sd.rotation.about("Z", q1))
+    return wire.point("P", [0, -length, 0]).position(of=n, components=n)[:2, :]
+
+
+def circle(x: sp.Expr, y: sp.Expr, length: sp.Expr) -> sp.Expr:
+    """C of the pendulum: squared distance of its mass from the hinge, less that of the wire's end."""
+    n = sd.Frame("n")
+    r, end = n.point("P", [x, y, 0]).position(), place_of_pendulum(sp.S.Zero, length)
+    return r.dot(r) - end.dot(end)
+
+
 @cache
 def _map() -> tuple:
     """q1, m, g, l_1 and the equations of the position map."""
     (q1,) = sd.coordinates("q1:2")
     m, g, length = sd.parameters("m g l_1")
-    eq = sd.embedding([q1], [length * sin(q1), -length * cos(q1)], [m, m], [0, -m * g], name="pendulum")
+    eq = sd.embedding([q1], list(place_of_pendulum(q1, length)), [m, m], [0, -m * g], name="pendulum")
     return q1, m, g, length, eq
 
 
@@ -31,7 +45,7 @@ def _reaction() -> list[Formula]:
     F_c = eq.F_c
     place = eq.explicit("r")
     velocity = sd.rate(place)
-    augmented = sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 - length**2], name="pendulum")
+    augmented = sd.augmented([x, y], [m, m], [0, -m * g], [circle(x, y, length)], name="pendulum")
     on_circle = dict(zip([x, y, x.dot, y.dot], [*place, *velocity]))
     newton = (M * r_ddot, weight + F_c)
     with_multiplier = (M * r_ddot + (augmented.C_r.T * augmented.lam).xreplace(on_circle), weight)

@@ -10,6 +10,7 @@ import symdyn as sd
 from symdyn.comparison import proofs
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
 
@@ -19,7 +20,8 @@ def _map() -> tuple:
     """The coordinates, m and g, the position map from the hinge, and its equations."""
     q1, q2 = sd.coordinates("q1:3")
     m, g, x0, y0 = sd.parameters("m g x_O0 y_O0")
-    eq = sd.embedding([q1, q2], [x0 + q1 * cos(q2), y0 - q1 * sin(q2)], [m, m], [0, -m * g], name="vehicle_on_massless_track")
+    place = place_on_track(q1, -q2, (x0, y0))
+    eq = sd.embedding([q1, q2], list(place), [m, m], [0, -m * g], name="vehicle_on_massless_track")
     return q1, q2, m, g, x0, y0, eq
 
 

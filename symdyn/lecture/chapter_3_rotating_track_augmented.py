@@ -10,11 +10,12 @@ from __future__ import annotations
 from functools import cache
 
 import sympy as sp
-from sympy import Matrix, cos, diag, sec, sin, tan
+from sympy import Matrix, cos, diag, sec, tan
 
 import symdyn as sd
 from symdyn.comparison import conventions, proofs
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
 # C_3 differentiated by x_v: the slides' sign, which everything after it inherits.
@@ -34,7 +35,7 @@ class _System:
         self.eq = sd.augmented(self.r, self.M, self.F, self.C, name="vehicle_and_track")
         self.rates, self.accelerations = Matrix([c.dot for c in self.r]), Matrix([c.ddot for c in self.r])
         self.q = q1, q2 = sd.coordinates("q1:3")
-        self.map = Matrix([x_c - q1 * cos(q2), y_c - q1 * sin(q2), x_c, y_c, q2])
+        self.map = Matrix([*place_on_track(-q1, q2, self.hinge), *place_on_track(0, q2, self.hinge), q2])
         self.embedded = sd.embedding(self.q, self.map, self.M, self.F, name="vehicle_and_track")
 
     def along(self, formula: Matrix) -> Matrix:
@@ -67,11 +68,15 @@ def _system() -> list[Formula]:
     s = _both()
     (m_v, m_t, I_t), eq, theta = s.masses, s.eq, s.r[4]
     lam, lam_dot = Matrix(eq.multipliers), Matrix(sp.symbols("lambda_dot_1:4"))
-    blocks = sp.Matrix(sp.BlockMatrix([[s.M, eq.C_r.T], [eq.C_r, sp.zeros(3, 3)]]))
-    right = Matrix([*s.F, *eq.F_d])
+    # The blocks by what the slides say they are.
+    C_r = Matrix(s.C).jacobian(Matrix(s.r))
+    blocks = sp.Matrix(sp.BlockMatrix([[s.M, C_r.T], [C_r, sp.zeros(3, 3)]]))
+    right = Matrix([*s.F, *(-(C_r * s.rates).jacobian(Matrix(s.r)) * s.rates)])
     derived = (eq.matrix * Matrix([*s.accelerations, *lam]), eq.rhs)
     force = eq.constraint_forces
     rows = (derived[0][:5, :], derived[1][:5, :])
+    # The loads that go with any accelerations and multipliers.
+    loads = dict(zip(s.F, rows[0]))
     solved = dict(zip([*s.accelerations, *lam], eq.matrix.LUsolve(eq.rhs)))
     solution = proofs.Proof("another formulation",
                             "The solution of the linear system for accelerations and multipliers must fulfil it.",
@@ -82,7 +87,8 @@ def _system() -> list[Formula]:
                 also=(4776, 4806, 4840, 4871, 4904, 4925, 4948, 4965, 4997)),
         Formula("augmented equations with a rate of lambda", (blocks * Matrix([*s.accelerations, *lam_dot]), right), derived,
                 line=4783, errata=[Erratum("The unknown is the multiplier itself; its rate does not appear.", solution)]),
-        Formula("constraint force", -eq.C_r.T * lam, force, line=4772, also=(5004,)),
+        Formula("constraint force", -C_r.T * lam, s.M * s.accelerations - s.F, line=4772, also=(5004,),
+                where=loads),
         Formula("Newton, vehicle", (Matrix([[m_v, 0], [0, m_v]]) * s.accelerations[:2, :], s.F[:2, :] + force[:2, :]),
                 (rows[0][:2, :], rows[1][:2, :]), line=4791),
         Formula("Newton, track", (Matrix([[m_t, 0], [0, m_t]]) * s.accelerations[2:4, :], s.F[2:4, :] + force[2:4, :]),
@@ -103,6 +109,7 @@ def _constraints() -> list[Formula]:
     n = sd.Frame("n")
     track = n.frame("track", rotation=sd.rotation.about("Z", theta), origin=[x_c, y_c, 0])
     distance = n.point("O_v", [xv, yv, 0]).position(track, track)[1]
+    gap = n.point("O_t", [xt, yt, 0]).position(track, n)
     shift = s.map[2:4, :] - s.map[:2, :]
     xr, yr = sp.symbols("x_tv y_tv")
     to_map = {xr: shift[0], yr: shift[1], theta: s.q[1]} | dict(zip(s.r[:4], s.map))
@@ -111,7 +118,7 @@ def _constraints() -> list[Formula]:
     factor = conventions.scaled(-1 / cos(theta), "the equation is divided by -cos(theta)")
     inherited = "The sign of tan(theta) is inherited from the derivative of C_3 by x_v, which is +tan(theta)."
     return [
-        Formula("hinge", [x_c, y_c], s.map[2:4, :], line=4848),
+        Formula("hinge", [x_c, y_c], s.map[2:4, :], line=4848, also=(4850, 4852, 4885, 4889)),
         Formula("slope", tan(theta), shift[1] / shift[0], line=4854, renamed=to_map),
         Formula("r of the hinge from the vehicle", Matrix([xt, yt]) - Matrix([xv, yv]), shift, line=4856, also=(4858,),
                 renamed=to_map),
@@ -119,8 +126,8 @@ def _constraints() -> list[Formula]:
         Formula("y of the hinge from the vehicle", y_c - yv, shift[1], line=4862, renamed=to_map),
         Formula("slope by coordinates", (y_c - yv) / (x_c - xv) - tan(theta), 0, line=4864, also=(4893,), renamed=to_map),
         Formula("C_3 = 0 on the track", y_c - yv - (x_c - xv) * tan(theta), s.along(eq.C)[2], line=4895, renamed=to_map),
-        Formula("C_1", xt - x_c, eq.C[0], line=4887, also=(4912, 4933), latex="C_1"),
-        Formula("C_2", yt - y_c, eq.C[1], line=4891, also=(4914, 4935), latex="C_2"),
+        Formula("C_1", xt - x_c, gap[0], line=4887, also=(4912, 4933), latex="C_1"),
+        Formula("C_2", yt - y_c, gap[1], line=4891, also=(4914, 4935), latex="C_2"),
         Formula("C_3", y_c - yv - (x_c - xv) * tan(theta), distance, line=4897, also=(4916, 4937), latex="C_3",
                 conventions=[factor]),
         Formula("C_r by derivatives", [[c.diff(q) for q in s.r] for c in printed_C], eq.C_r, line=4939, latex=r"\mathbf{C}_r"),

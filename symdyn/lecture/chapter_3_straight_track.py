@@ -5,6 +5,8 @@ x_OO0 is the horizontal component of the displacement r_{O/O_0} along the track.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import sympy as sp
 from sympy import Matrix, cos, sin, tan
 
@@ -15,11 +17,18 @@ from symdyn.spatial.vectors import inner
 TRACK = "Vehicle constrained to move along the straight track"
 
 
+def place_on_track(along: sp.Expr, angle: sp.Expr, hinge: Sequence[sp.Expr]) -> Matrix:
+    """Components in n (2, 1) of a point on the x axis of a track that is turned by an angle about z; along: its x there."""
+    n = sd.Frame("n")
+    track = n.frame("track", rotation=sd.rotation.about("Z", angle), origin=[*hinge, 0])
+    return track.point("O", [along, 0, 0]).position(of=n, components=n)[:2, :]
+
+
 def _straight_track_embedding() -> list[Formula]:
     (q1,) = sd.coordinates("q1:2")
     x, y = sd.coordinates("x_O y_O")
     m, g, theta, x0, y0, xr = sd.parameters("m g theta x_O0 y_O0 x_OO0")
-    eq = sd.embedding([q1], [x0 + q1 * cos(theta), y0 - q1 * sin(theta)], [m, m], [0, -m * g], name="vehicle_on_track")
+    eq = sd.embedding([q1], list(place_on_track(q1, -theta, (x0, y0))), [m, m], [0, -m * g], name="vehicle_on_track")
     bodies = sd.systems.vehicle_on_track().embedding()
     r, r0 = eq.explicit("r"), Matrix([x0, y0])
     # q1 is the distance down the track, x_{O/O_0} its horizontal part.

@@ -13,6 +13,7 @@ from sympy import Matrix, cos, sin, tan
 import symdyn as sd
 from symdyn.comparison import conventions, proofs
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along straight track"
 
@@ -65,7 +66,7 @@ def _augmented() -> list[Formula]:
     x, y, m, g, theta, x0, y0, xr, yr, eq = _equations()
     tangent, multiplier = tan(theta), sp.Symbol("lambda")
     (q1,) = sd.coordinates("q1:2")
-    embedded = sd.embedding([q1], [x0 + q1 * cos(theta), y0 - q1 * sin(theta)], [m, m], [0, -m * g], name="vehicle_on_track")
+    embedded = sd.embedding([q1], list(place_on_track(q1, -theta, (x0, y0))), [m, m], [0, -m * g], name="vehicle_on_track")
     M, F = Matrix([[m, 0], [0, m]]), Matrix([0, -m * g])
     r_ddot, shift, gradient = Matrix([x.ddot, y.ddot]), Matrix([xr, yr]), Matrix([[tangent, 1]])
     # Along the track with the embedded motion, where the displacement is q1 J and r_ddot = J q1_ddot.

@@ -13,6 +13,7 @@ from sympy import Matrix, cos, diag, sin
 import symdyn as sd
 from symdyn.comparison import proofs
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
 
@@ -25,7 +26,7 @@ def _map() -> tuple:
     loads = Matrix(sd.parameters("F_Ox F_Oy F_O0x F_O0y M_O0"))
     x0, y0 = sd.parameters("x_O0 y_O0")
     m_v, m_t, I_t = masses
-    r = [x0 - q1 * cos(q2), y0 - q1 * sin(q2), x0, y0, q2]
+    r = [*place_on_track(-q1, q2, (x0, y0)), *place_on_track(0, q2, (x0, y0)), q2]
     eq = sd.embedding([q1, q2], r, [m_v, m_v, m_t, m_t, I_t], loads, name="vehicle_and_track")
     return q1, q2, masses, loads, x0, y0, eq
 
@@ -38,6 +39,8 @@ def _kinematics() -> list[Formula]:
     J = Matrix([[-c, q1 * s], [-s, -q1 * c], [0, 0], [0, 0], [0, 1]])
     J_dot = Matrix([[s * q2d, q1d * s + q1 * c * q2d], [-c * q2d, -q1d * c + q1 * s * q2d], [0, 0], [0, 0], [0, 0]])
     q_dot, q_ddot = Matrix([q1d, q2d]), Matrix([q1.ddot, q2.ddot])
+    n = sd.Frame("n")
+    turning = n.frame("track", rotation=sd.rotation.about("Z", q2)).angular_velocity(n, components=n)[2]
     # A particle turns with the track, but has no inertia: its orientation, row 2, is left out.
     bodies = sd.systems.vehicle_on_rotating_track().embedding()
     rows = [0, 1, 3, 4, 5]
@@ -51,7 +54,7 @@ def _kinematics() -> list[Formula]:
         Formula("y_dot", -q1d * s - q1 * c * q2d, r_dot[1], line=4109, also=(4125,)),
         Formula("x_dot of the track", 0, r_dot[2], line=4111, also=(4127,)),
         Formula("y_dot of the track", 0, r_dot[3], line=4113, also=(4129,)),
-        Formula("theta_dot", q2d, r_dot[4], line=4115, also=(4131,)),
+        Formula("theta_dot", q2d, turning, line=4115, also=(4131,)),
         Formula("r_dot", J * q_dot, r_dot, line=4135, also=(4138, 4145, 4151, 4175), latex=r"\dot{\mathbf{r}}"),
         Formula("J", J, eq.J, line=4155, also=(4135, 4145, 4195), latex=r"\mathbf{J}"),
         Formula("J of bodies and joints", J, bodies.J.extract(rows, [0, 1]), line=4155, latex=r"\mathbf{J}"),
@@ -75,7 +78,7 @@ def _newton() -> list[Formula]:
     M = diag(m_v, m_v, m_t, m_t, I_t)
     return [
         Formula("Newton, vehicle", (m_v * r_ddot[:2, :], F[:2, :] + reaction[:2, :]), (sides[0][:2, :], sides[1][:2, :]),
-                line=4026),
+                line=4026, also=(4165,)),
         Formula("Newton, track", (m_t * r_ddot[2:4, :], F[2:4, :] + reaction[2:4, :]), (sides[0][2:4, :], sides[1][2:4, :]),
                 line=4030),
         Formula("moment, track", (Matrix([I_t * r_ddot[4]]), Matrix([F[4] + reaction[4]])), (sides[0][4:, :], sides[1][4:, :]),

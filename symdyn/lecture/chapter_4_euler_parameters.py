@@ -86,7 +86,7 @@ def _inverse() -> list[Formula]:
     steps_0 = [(sum(diagonal) - 3 + 1) / 4, (added - 2) / 4, (added - 2 * whole) / 4, 4 * squares[0] / 4, squares[0]]
     formulas = [
         Formula("theta_0^2 by the trace", (trace + 1) / 4, theta_0**2, line=6927, where=NORM, latex=r"\theta_0^2"),
-        Formula("trace", turned[0, 0] + turned[1, 1] + turned[2, 2], trace, line=6929, latex=r"\mathrm{tr}\,R"),
+        Formula("trace", R[0, 0] + R[1, 1] + R[2, 2], trace, line=6929, where=NORM, latex=r"\mathrm{tr}\,R"),
         Formula("steps of theta_0^2", steps_0, [theta_0**2] * 5, line=6939, where=NORM, latex=r"\theta_0^2"),
     ]
     for k, line in ((1, 6945), (2, 6951), (3, 6957)):

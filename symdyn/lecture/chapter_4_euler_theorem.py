@@ -32,21 +32,27 @@ R = sp.Matrix([
 def _product_of_rotations() -> list[Formula]:
     R_1, R_12, R_23 = three_link.R_1, three_link.R_12, three_link.R_23
     angles = (three_link.psi, three_link.theta, three_link.phi)
-    # What the superscripts mean: the rotations from b_2, b_3 and b (which is b_3) to n.
-    R_2, R_3 = R_1 * R_12, R_1 * R_12 * R_23
     right = sd.rotation.from_euler("ZYX", angles)
-    about_x = proofs.limit("Where psi and theta are zero the rotation must be that by phi about x.",
-                           at={three_link.psi: 0, three_link.theta: 0}, value=R_23)
-    about_y = proofs.limit("Where psi and phi are zero the rotation must be that by theta about y.",
-                           at={three_link.psi: 0, three_link.phi: 0}, value=R_12)
-    to_b1, to_b2 = "bR_b2 must be b1R_b2", "bR_b3 must be b2R_b3"
+    _, b1, b2, b3 = three_link.arm()
+    # The matrices of the product are right; some factors have the superscript of another rotation. Each is taken for what its
+    # superscript says: b is b_3.
+    turn_y, turn_x = b2.rotation(b1), b3.rotation(b2)
+    about_y = proofs.Proof("invariant axis", "The second factor turns by theta about y and leaves the unit vector along y.",
+                           lambda R: sp.Matrix(R).col(1) - sp.Matrix([0, 1, 0]))
+    whole = proofs.Proof("another formulation", "After R_b1 and b1R_b2 the third factor must make up R of the ZYX angles.",
+                         lambda R: R_1 * R_12 * sp.Matrix(R) - right)
+    second, third = r"{}^{b_1}R_{b_2}", r"{}^{b_2}R_{b_3}"
     return [
-        Formula("R of b3 with superscripts b", R_1 * (R_3.T * R_2) * (R_3.T * R_3), right, line=6597, latex=r"{}^nR_{b_3}",
-                errata=[Erratum(f"The factors do not chain: {to_b1} and {to_b2}.", about_x)]),
-        Formula("R of b with superscripts b and b2", R_1 * (R_3.T * R_2) * (R_2.T * R_3), right, line=6611, latex=r"{}^nR_b",
-                errata=[Erratum(f"The factors do not chain: {to_b1}.", about_x)]),
-        Formula("R of b with superscripts n", R_1 * R_2 * R_3, right, line=6631, latex=r"{}^nR_b",
-                errata=[Erratum("The factors do not chain: nR_b2 must be b1R_b2 and nR_b3 must be b2R_b3.", about_y)]),
+        Formula("second factor, with superscript b", R_23.T, turn_y, line=6597, also=(6611,), latex=second, errata=[Erratum(
+            "The index 1 is missing: b, which is b_3, does not follow b_1; the matrix beside it is that of b1R_b2.", about_y)]),
+        Formula("third factor, with superscript b", sp.eye(3), turn_x, line=6597, latex=third, errata=[Erratum(
+            "The index 2 is missing: from b_3 to b, which is b_3, nothing turns; the matrix beside it is that of b2R_b3.",
+            whole)]),
+        Formula("second factor, with superscript n", R_1 * R_12, turn_y, line=6631, latex=second, errata=[Erratum(
+            "The superscript is b_1, not n: R_b1 would be counted twice; the matrix beside it is that of b1R_b2.", about_y)]),
+        Formula("third factor, with superscript n", R_1 * R_12 * R_23, turn_x, line=6631, latex=third, errata=[Erratum(
+            "The superscript is b_2, not n: nR_b3 is the whole product already; the matrix beside it is that of b2R_b3.",
+            whole)]),
         Formula("R of b", R_1 * R_12 * R_23, right, line=6597, also=(6611, 6631, 6653), latex=r"{}^nR_b"),
     ]
 
@@ -62,7 +68,6 @@ def _vector_and_frame() -> list[Formula]:
     return [
         Formula("components of P' in n", b.rotation(n) * in_b, in_n, line=6621, also=(6635, 6842), latex="{}^nr_{P'/E}"),
         Formula("components of P' in n, those of P' in b", in_b, in_n, line=6639, errata=[rotated], latex="{}^nr_{P'/E}"),
-        Formula("components of P in n, those of P' in b", in_b, r, line=6639, latex="{}^nr_{P/E}"),
         Formula("rotated vector", R * r, in_n, line=6641, where=UNIT, latex="{}^nr_{P'/E}"),
     ]
 
@@ -86,6 +91,7 @@ def _vector_rotation() -> list[Formula]:
         Formula("r_P'/E by way of Q", along + right * (r - along), turned, line=6661, also=(6694, 6791), where=UNIT,
                 latex="{}^nr_{P'/E}"),
         Formula("radius of the circle of P", length, sp.sqrt(across.dot(across)), line=6683, also=(6681,), where=UNIT, latex="r"),
+        Formula("direction across a and r", axr / length, odd / (sin(phi) * sp.sqrt(across.dot(across))), line=6678, where=UNIT),
         Formula("part across a and r", axr / length * length * sin(phi), odd, line=6685, where=UNIT),
         Formula("part across a and r, product", axr * sin(phi), odd, line=6685, where=UNIT),
         Formula("r_P'/E", form, turned, line=6696, also=(6702, 6726, 6764, 6793), **unit),
@@ -137,7 +143,7 @@ def _products() -> list[Formula]:
 def _matrix() -> list[Formula]:
     about = sd.rotation.about
     right = about(list(a), phi, unit=True)
-    still = Erratum("This is S(a), the matrix of the cross product; R is 1 + sin phi S + (1 - cos phi) S^2.",
+    still = Erratum("The matrix beside R, the name of the bracket above, is S(a); R is 1 + sin phi S + (1 - cos phi) S^2.",
                     proofs.limit("By the angle 0 nothing turns.", at={phi: 0}, value=sp.eye(3)))
     axes = (dict(zip(a, row)) for row in sp.eye(3).tolist())
     along_x, along_y, along_z = axes

@@ -42,7 +42,8 @@ def _finite() -> list[Formula]:
     of_z = Erratum("This is the matrix of a rotation about x; those of R_z and R_x are exchanged.", _stays("z", 2))
     of_x = Erratum("This is the matrix of a rotation about z; those of R_z and R_x are exchanged.", _stays("x", 0))
     seen = sp.Matrix([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
-    first = Erratum("Rotations that take components in n to those in b follow from right to left: R_x R_y R_z.", proofs.Proof(
+    first = Erratum("Rotations that take components in n to those in b follow from right to left: R_x R_y R_z; the order "
+                    "printed is that of rotations from b to n.", proofs.Proof(
         "invariant axis", "The first rotation leaves the unit vector along z_{0} as it is; only those about y and x change it.",
         lambda R: sp.Matrix(R) * sp.Matrix([0, 0, 1]) - seen))
     # The product with R_z and R_x mended, as the slides themselves use them at line 6361.
@@ -52,7 +53,7 @@ def _finite() -> list[Formula]:
         Formula("R_z", R_z(psi), about("Z", psi).T, line=6317, errata=[of_z], latex="R_z"),
         Formula("R_y", R_y(theta), about("Y", theta), line=6321, conventions=[TO_B], latex="R_y"),
         Formula("R_x", R_x(phi), about("X", phi).T, line=6325, errata=[of_x], latex="R_x"),
-        Formula("R", right_z * R_y(theta) * right_x, to_b, line=6329, also=(6345,), errata=[first], latex="R"),
+        Formula("R", right_z * R_y(theta) * right_x, to_b, line=6329, errata=[first], latex="R"),
         Formula("R_z of a small angle", R_z(psi_), about("Z", psi_).T, line=6347, errata=[of_z]),
         Formula("R_y of a small angle", R_y(theta_), about("Y", theta_), line=6347, conventions=[TO_B]),
         Formula("R_x of a small angle", R_x(phi_), about("X", phi_).T, line=6347, errata=[of_x]),
@@ -74,10 +75,14 @@ def _infinitesimal() -> list[Formula]:
     turns = small_turn([0, 0, psi_]).T * small_turn([0, theta_, 0]).T * small_turn([phi_, 0, 0]).T
     rates = sp.Matrix([x.dot for x in small])
     there = dict.fromkeys(small, sp.S.Zero)
+    # Of small angles the order does not matter; R_z and R_x mended, as the slides themselves use them at line 6361.
+    of_small = R_x(psi_) * R_y(theta_) * R_z(phi_)
+    linear = sp.eye(3) + sum((of_small.diff(x).xreplace(there) * x for x in small), sp.zeros(3))
     return [
         Formula("R_z to first order", first_z, small_turn([0, 0, psi_]).T, line=6355, errata=[of_z], latex="R_z"),
         Formula("R_y to first order", first_y, small_turn([0, theta_, 0]), line=6357, conventions=[TO_B], latex="R_y"),
         Formula("R_x to first order", first_x, small_turn([phi_, 0, 0]).T, line=6359, errata=[of_x], latex="R_x"),
+        Formula("R of small angles", linear, small_turn(list(small)), line=6345, conventions=[TO_B], latex="R"),
         Formula("R, product R_z R_y R_x", product, turns, line=6361, errata=[prime], latex="R"),
         Formula("R to first order", first_order, small_turn(list(small)), line=6361, conventions=[TO_B], errata=[prime],
                 latex="R"),

@@ -130,7 +130,7 @@ def _angular_velocity() -> list[Formula]:
          theta_3d * theta_3 + theta_2d * theta_2 + theta_1d * theta_1 + theta_0d * theta_0]])
     vector: dict[str, Any] = {"where": NORM, "latex": r"{}^n\omega_{b/n}"}
     return [
-        Formula("skew-symmetric matrix", skew, sd.rotation.skew(list(omega)), line=7160, also=(7073, 7174, 7184, 7200),
+        Formula("skew-symmetric matrix", skew, sd.rotation.skew(list(omega)), line=7160, also=(7073, 7075, 7174, 7184, 7200),
                 latex=r"\tilde\omega"),
         Formula("2 E_dot E^T, factors", 2 * Ed * E_T, omega_tilde, line=7178, where=NORM, latex=r"2 \dot E E^T"),
         Formula("2 E_dot E^T, entries", 2 * entries, omega_tilde, line=7180, also=(7184, 7200), where=NORM,

@@ -46,8 +46,9 @@ class PlanarArm:
         """Moment and force "f" through the joint or "f_G" resultant at the centre of mass, n-components, without weight."""
         R = (self.b1, self.b2)[link - 1].rotation(self.n)
         wrench = self.equations.explicit(f"{name}_{link}", simplify=False).subs(sp.Symbol("g"), 0)
-        moment = sp.Matrix([wrench[0], wrench[1], simplified(wrench[2], 1.0)])
-        return R * moment, R * wrench[3:, :]
+        # The moment of link 2 is short when simplified, and is printed where the slide is wrong.
+        moment = wrench[2] if link == 1 else simplified(wrench[2], 1.0)
+        return R * sp.Matrix([*wrench[:2], moment]), R * wrench[3:, :]
 
     @cached_property
     def kinetic_energy(self) -> sp.Expr:

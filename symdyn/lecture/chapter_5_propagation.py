@@ -1,7 +1,8 @@
 """5.7, the equations from inverse dynamics and their simplification, before any arm is chosen.
 
-Evaluated on link 2 of the three-link arm, which a next link loads; the simplification in exact numbers. The slides print x and
-x* for the velocity product of a force in turns; 5.6 derives x*, and only that is right.
+Evaluated on link 2 of the three-link arm, which a next link loads; the simplification in exact numbers. The notes print x and
+x* for the velocity product of a force in turns; 5.6 derives x*, and only that is right. Where a star is missing they are called
+wrong as they stand, although the star may have been on the slide: in one place it stands over the next letter.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import sympy as sp
 
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import Proof, other
+from symdyn.frames.rates import rate
 from symdyn.lecture.propagation_arms import Arm, cross, cross_star, row
 from symdyn.lecture.propagation_newton import Newton
+from symdyn.model.joints import Revolute, Universal
+from symdyn.model.symbols import coordinates, parameters
+from symdyn.model.system import System
 
 TITLE = "Forward Dynamics - Propagation Methods"
-WHY_STAR = "The velocity product of a force is v x* I v, as 5.6 derives it; the slide prints the x of motions."
+WHY_STAR = "The velocity product of a force is v x* I v, as lines 8859 and 9568 have it; here the star is missing."
 NEWTON = "Moment and force by Newton and Euler in 3-vectors, from differentiating positions"
 
 
@@ -38,6 +43,7 @@ def _inverse_dynamics() -> list[Formula]:
         # S_dot is the derivative of the components, which is what the ring means.
         row("acceleration of b2 with S_dot", 9598, X * a_1 + S * q_ddot + newton.rate(S) * q_dot + cross(v_2) * S * q_dot, a_2,
             (9630,), latex=r"{}^{b_2}\hat{a}_{b_2}"),
+        _where_S_moves(),
         row("acceleration of bG2", 9106, X_G * a_2, a_G,
             (9128, 9152, 9174, 9196, 9218, 9290, 9312, 9336, 9360, 9386, 9416, 9438, 9460, 9482, 9506, 9530),
             latex=r"{}^{b_{G2}}\hat{a}_{b_{G2}}"),
@@ -53,6 +59,20 @@ def _inverse_dynamics() -> list[Formula]:
     ]
 
 
+def _where_S_moves() -> Formula:
+    """The acceleration on a universal joint: of the joints above S is constant, and any term with its rate would do."""
+    q1, q2, q3 = coordinates("q1:4")
+    system = System("on_a_universal_joint")
+    link1, link2 = (system.add_body(name, mass=1, inertia=[1, 1, 1]) for name in ("link1", "link2"))
+    system.add_joint(Revolute("shoulder", system.ground, link1, q1))
+    system.add_joint(Universal("elbow", link1, link2, [q2, q3], parent_point=[*parameters("l1 h1"), 0]))
+    equations = system.recursive()
+    X, S, v, a_1, a = (sp.Matrix(equations.explicit(name, simplify=False)) for name in ("X_2", "S_2", "v_2", "a_1", "a_2"))
+    q_dot, q_ddot = sp.Matrix([q2.dot, q3.dot]), sp.Matrix([q2.ddot, q3.ddot])
+    printed = X * a_1 + S * q_ddot + rate(S) * q_dot + cross(v) * S * q_dot
+    return row("acceleration of b2 where S moves", 9598, printed, a, (9630,), latex=r"{}^{b_2}\hat{a}_{b_2}")
+
+
 def _simplification() -> list[Formula]:
     arm = Arm(3, exact=True)
     newton = Newton(arm)
@@ -63,9 +83,10 @@ def _simplification() -> list[Formula]:
     no_work = Proof("energy balance", "With I constant dT/dt = v^T f, so the force that the velocity alone needs does no work: "
                     "v^T p = 0", lambda p: v_2.T * p)
     star = [Erratum(WHY_STAR, by_joint)]
-    bracket = ("The bracket multiplies the velocity product, which is a force already, by the inertia; it belongs outside, and "
-               "takes x*.")
-    both = "The superscript B_2 is missing, and the bracket multiplies the velocity product, a force already, by the inertia."
+    bracket = ("The bracket multiplies the velocity product, which is a force already, by the inertia; line 9248 has it outside, "
+               "and with x*.")
+    both = ("The superscript B_2 and the star are missing, and the bracket multiplies the velocity product, a force already, by "
+            "the inertia.")
     superscript = ("The superscript B_2 is missing: this, with x*, is the resultant on body 2 alone; X* f_O3 of the next link is "
                    "not in it.")
     f = r"{}^{b_2}\hat{f}_{O_2}"

@@ -19,7 +19,7 @@ def _two_links() -> list[Formula]:
     free = arm.free(2)
     mass = arm.put(arm.system.embedding().explicit("M_tilde", simplify=False))
     product = Erratum(
-        "A product stands where a minus belongs: what link 2 gives way at its free joint is subtracted.",
+        "A product stands where line 11186 has a minus: what link 2 gives way at its free joint is subtracted.",
         Proof("another formulation", "1 / (S_1^T I_1^A S_1) is the first entry of the inverse of M_tilde by embedding",
               lambda I_A: S_1.T * I_A * S_1 * mass.inv()[0, 0] - sp.Matrix([1])))
     return [

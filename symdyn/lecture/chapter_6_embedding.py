@@ -50,24 +50,27 @@ def work_of_a_joint() -> sp.Expr:
 def embedding() -> list[Formula]:
     """With s_dot = J q_dot; the slide's k with J in place of J_dot is in chapter 6.3 only."""
     p = Platform(sp.Matrix([0, 0, sp.Symbol("c")]))
-    J, Jdot, qd, qdd = p.J, sd.rate(p.J), p.qd, ddot(q)
-    forces = sp.Matrix.vstack(F, tau)
-    M_tilde, k_tilde, F_tilde = (p.derived(name) for name in ("M_tilde", "k_tilde", "F_tilde"))
+    # The axes of the n-frame are chosen along the heading of that moment: psi = 0 once all is differentiated.
+    ahead = {q[3]: sp.S.Zero}
+    J, Jdot, M, Q = (matrix.xreplace(ahead) for matrix in (p.J, sd.rate(p.J), p.M, p.Q))
+    J_derived, Jd_qd, M_tilde, k_tilde, F_tilde = (
+        p.derived(name).xreplace(ahead) for name in ("J", "Jd_qd", "M_tilde", "k_tilde", "F_tilde"))
+    qd, qdd, forces = p.qd, ddot(q), sp.Matrix.vstack(F, tau)
     equations = M_tilde * qdd + k_tilde - F_tilde
     delta_q = sp.Matrix([sp.Symbol(f"delta_{c}") for c in q])
     work = delta_q.dot(equations)
-    MJ, QJ = p.M * J, p.Q * J
-    inertia = p.M * (J * qdd + Jdot * qd) + p.Q * (J * qd) - forces
-    k_bar = J.T * p.M * Jdot * qd + J.T * QJ * qd
+    MJ, QJ = M * J, Q * J
+    inertia = M * (J * qdd + Jdot * qd) + Q * (J * qd) - forces
+    k_bar = J.T * M * Jdot * qd + J.T * QJ * qd
     k_without_dot = J.T * MJ * qd + J.T * QJ * qd
     faster = proofs.Proof("dimensions", "Centrifugal forces are four times as large at twice the speed.",
                           lambda k: k.xreplace({s: 2 * s for s in k.free_symbols if s.name.endswith("_dot")}) - 4 * k)
     lost_dot = Erratum("The dot over the second J is lost: M J_dot q_dot is a force, M J q_dot a momentum.", faster)
-    upright = dict.fromkeys(q[3:], sp.S.Zero)
+    upright = dict.fromkeys(q[4:], sp.S.Zero)
     again = Slide("6.3", f"{TITLE} Arbitrary Point O for Rigid Body", 12163)
     M_qdd = J.T * MJ * qdd
     return [
-        Formula("s_ddot", J * qdd + Jdot * qd, p.derived("J") * qdd + p.derived("Jd_qd"), line=11853, also=(12137,),
+        Formula("s_ddot", J * qdd + Jdot * qd, J_derived * qdd + Jd_qd, line=11853, also=(12137,),
                 latex=r"\ddot{s}"),
         Formula("virtual work with J", (J * delta_q).dot(inertia), work, line=11857, also=(12141,)),
         Formula("virtual work with the transpose", (delta_q.T * J.T * inertia)[0], work, line=11859, also=(12143,)),

@@ -79,11 +79,12 @@ def in_n_frame() -> list[Formula]:
     n = sd.Frame("n")
     a, b = sd.coordinates("a b")
     b1 = n.frame("b1", rotation=sd.rotation.about("Z", a) * sd.rotation.about("X", b), origin=list(sd.coordinates("x y z")))
-    angles, place = sd.coordinates("alpha beta gamma"), sd.coordinates("X Y Z")
+    (alpha, beta), place = sd.coordinates("alpha beta"), sd.coordinates("X Y Z")
+    turned = sd.rotation.about("Z", alpha) * sd.rotation.about("Y", beta)
     arm = constant("r")
     revolute = b1.frame("b2", rotation=sd.rotation.about("Z", sd.coordinates("q2")), origin=list(arm))
-    ball = b1.frame("b2", rotation=sd.rotation.from_euler("ZYX", angles), origin=list(arm))
-    free = b1.frame("b2", rotation=sd.rotation.from_euler("ZYX", angles), origin=list(place))
+    ball = b1.frame("b2", rotation=turned, origin=list(arm))
+    free = b1.frame("b2", rotation=turned, origin=list(place))
     n_w1, n_v1, n_r = constant("n_omega_1"), constant("n_v_1"), constant("n_r")
     n_i, n_j, n_k = axes = [constant(f"n_{letter}") for letter in "ijk"]
     of_1 = stands_for(n_w1, b1.angular_velocity()) | stands_for(n_v1, b1.velocity())
@@ -202,7 +203,7 @@ def six_degrees_of_freedom() -> list[Formula]:
     by_frames = proofs.Proof("another formulation", "Velocity and angular velocity of the moving frame b2, carried along by b1.",
                              lambda found: (sp.Matrix(found).xreplace(known) - carried - relative).xreplace(parallel))
     # What is wrong is shown at parallel axes of b1 and b2, where it is short.
-    parallel = {e: sp.S.Zero for e in links.equations.symbols.coordinates[9:]}
+    parallel = dict.fromkeys(links.equations.symbols.coordinates[9:], sp.S.Zero)
     v2_parallel, moved = v2.xreplace(parallel), links.moved.xreplace(parallel)
     twice = Erratum("The joint's velocity is counted twice: the identity matrix is S itself, not a further term.", by_frames)
     sign = Erratum("The joint's velocity is added to that of link 1, as on the slides before.", by_frames)

@@ -86,7 +86,7 @@ def turbine() -> Chain:
     bodies = [system.add_body(name, mass=sp.Symbol(f"m_{letter}", positive=True), com=com,
                               inertia=sp.diag(*sp.symbols(f"I_{letter}_x I_{letter}_y I_{letter}_z", positive=True)))
               for name, letter, com in (("platform", "P", [0, 0, sp.Symbol("c_P")]), ("nacelle", "N", [0, 0, 0]),
-                                        ("rotor", "H", [sp.Symbol("c_H"), 0, 0]))]
+                                        ("rotor", "H", [0, 0, 0]))]
     h, b = sp.symbols("h b", positive=True)
     system.add_joint(sd.Free("sea", system.ground, bodies[0], [*place, *angles], velocity="body"))
     system.add_joint(sd.Revolute("yaw", bodies[0], bodies[1], yaw, axis=[0, 0, 1], parent_point=[0, 0, h]))

@@ -46,7 +46,7 @@ def mended() -> dict:
     m, g, a, r, omega, v = sp.symbols("m_P g a r_AB omega v", positive=True)
     angle = omega * sd.t
     return {
-        ("bus-strap", "tension and inertial force"): sp.Matrix([0, 0, m * g]),
+        ("bus-strap", "tension and inertial force, in words"): sp.Matrix([0, 0, m * g]),
         ("elevator-scale", "acceleration of O, rising"): sp.Matrix([0, 0, a]),
         ("earth-constant-spin", "centrifugal force, outwards"): sp.Symbol("m") * r * omega**2,
         ("rotating-frame-acceleration", "a, differentiated"):
@@ -55,8 +55,9 @@ def mended() -> dict:
         ("rotating-frame-acceleration", "a, rate of R put in"):
             crossed(w, R) * f.v_b + R * f.a_b + crossed(alpha, R) * f.r_b + w.cross(crossed(w, R) * f.r_b)
             + crossed(w, R) * f.v_b + f.a_O,
-        ("ball-in-slot", "position of A, described by B"): sp.Matrix([v * sd.t, 0, 0]),
-        ("ball-in-slot", "position of A, described by E"): sp.Matrix([v * sd.t * sp.cos(angle), v * sd.t * sp.sin(angle), 0]),
+        ("ball-in-slot", "position of A described by B, in words"): sp.Matrix([v * sd.t, 0, 0]),
+        ("ball-in-slot", "position of A described by E, in words"):
+            sp.Matrix([v * sd.t * sp.cos(angle), v * sd.t * sp.sin(angle), 0]),
     }
 
 

@@ -6,10 +6,12 @@ import importlib
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import solve_ivp
 
 import symdyn as sd
 from symdyn.comparison import Verdict
+from symdyn.lecture import chapter_3_virtual_displacement as slope
 
 LENGTH, G = 1.3, 9.81
 
@@ -60,3 +62,18 @@ def test_the_reaction_of_the_wire_is_right_at_rest_only() -> None:
     verdicts = {f.name: f.verdict for f in sd.compare("pendulum-reaction").formulas}
     assert verdicts["F_c at rest"] is Verdict.EQUAL
     assert verdicts["F_c"] is Verdict.WRONG
+
+
+def test_the_reaction_of_a_slope_in_motion_works_in_the_actual_displacement_only() -> None:
+    """What the slides ask and leave open: is dr . F_c zero? At t = 0 the slope turns at 0.7 rad/s."""
+    angle = sp.Rational(2, 5) + sp.Rational(7, 10) * sd.t
+    _, _, F_c, J, r_t = slope._particle(angle)
+    values = {"q1": 2.0, "q1_dot": 0.3, "t": 0.0, "m": 1.5, "g": 9.81}
+
+    def number(expression: sp.Expr) -> float:
+        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+
+    # In the frame of the slope the Coriolis force lightens the push; against it the place under the mass sinks at q1 times 0.7.
+    push = 1.5 * (9.81 * np.cos(0.4) - 2 * 0.3 * 0.7)
+    np.testing.assert_allclose(number((r_t.T * F_c)[0]), -2.0 * 0.7 * push, rtol=1e-12)
+    assert abs(number((J.T * F_c)[0])) < 1e-12

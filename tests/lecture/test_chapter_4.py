@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from symdyn.lecture import chapter_4_euler_parameters as parameters
 from symdyn.lecture import chapter_4_euler_theorem as theorem
+from symdyn.lecture import chapter_4_finite_rotations as finite
 from symdyn.lecture import chapter_4_parameter_rates as rates
 from symdyn.lecture import chapter_4_three_link as three_link
 from symdyn.lecture import chapter_4_xyz_angles as xyz
@@ -19,7 +20,7 @@ from symdyn.lecture import chapter_4_xyz_angles as xyz
 WRONG = {
     "two_link": [5902], "three_link": [6011, 6063], "xyz_angles": [], "gimbal_lock": [6549, 6551],
     "finite_rotations": [6317, 6325, 6329, 6347, 6347, 6355, 6359, 6361, 6361, 6394],
-    "euler_theorem": [6597, 6611, 6631, 6639, 6710, 6801], "euler_parameters": [6852, 6945, 6951, 6957],
+    "euler_theorem": [6597, 6597, 6631, 6631, 6639, 6710, 6801], "euler_parameters": [6852, 6945, 6951, 6957],
     "parameter_rates": [7021, 7049, 7134],
 }
 
@@ -64,6 +65,21 @@ def test_printed_rates_follow_small_turns_of_scipy(G: sp.Matrix, angles: tuple, 
         after, before = (Rotation.from_euler(sequence, (gamma + sign * step * gamma_dot)[::order]) for sign in (1, -1))
         omega = (after * before.inv()).as_rotvec() / (2 * step)
         np.testing.assert_allclose(in_numbers(G, list(angles), gamma) @ gamma_dot, omega, atol=1e-8)
+
+
+def test_the_order_matters_for_finite_angles_only() -> None:
+    """Against SciPy: the slides' product is the transpose of xyz, R_x R_y R_z that of ZYX; of small angles they agree."""
+    rng = np.random.default_rng(7)
+    for size, apart in ((1.0, True), (1e-5, False)):
+        phi, theta, psi = size * rng.uniform(0.5, 1, 3)
+        # R_z and R_x as the slides use them at line 6361, exchanged.
+        of_z, of_y, of_x = (np.array(turn(angle), dtype=float) for turn, angle in (
+            (finite.R_x, psi), (finite.R_y, theta), (finite.R_z, phi)))
+        printed, right = of_z @ of_y @ of_x, of_x @ of_y @ of_z
+        np.testing.assert_allclose(right.T, Rotation.from_euler("ZYX", [psi, theta, phi]).as_matrix(), atol=1e-14)
+        np.testing.assert_allclose(printed.T, Rotation.from_euler("XYZ", [phi, theta, psi]).as_matrix(), atol=1e-14)
+        difference = np.abs(printed - right).max()
+        assert difference > 0.1 if apart else difference < 2 * size**2
 
 
 def test_parameters_of_norm_1_are_projected_out() -> None:

@@ -32,7 +32,7 @@ def test_errors_stand_where_they_are_known(module: str) -> None:
 
 
 def test_the_plane_hides_errors() -> None:
-    """While the base does not turn, both links turn about parallel axes, and nothing tells this wrong print from the right one."""
+    """While the base stands still, both links turn about parallel axes, and the wrong print gives what the right one does."""
     wrong = next(f for f in sd.compare("spatial-angular-acceleration").formulas if f.verdict is Verdict.WRONG)
     assert wrong.slide.line == 8439
     differences = sp.Matrix([e.printed - e.right for e in wrong.entries])

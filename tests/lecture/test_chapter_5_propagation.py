@@ -66,6 +66,14 @@ def test_an_arm_has_no_other_letters() -> None:
         arm(3).X_4  # noqa: B018
 
 
+def test_one_joint_has_an_S_that_moves() -> None:
+    found = next(f for f in chapter_5_propagation.CASES[0].taken() if f.name == "acceleration of b2 where S moves")
+    q = {str(s): s for s in found.derived.free_symbols}
+    # The axis q2 turns about x of link 1, which q3 tilts in b2 at the rate q3_dot.
+    assert sp.diff(found.derived[0], q["q2_dot"], q["q3_dot"]) == -sp.sin(q["q3"])
+    assert sp.diff(found.derived[2], q["q2_dot"], q["q3_dot"]) == sp.cos(q["q3"])
+
+
 def test_lines_that_are_said_to_be_wrong() -> None:
     formulas = [f for case in CASES for f in case.taken()]
     wrong = {line for f in formulas if f.errata for line in (f.line, *f.also)}
