@@ -125,8 +125,8 @@ assert abs(n_momentum - n_momentum[0]).max() < 1e-8
 # %% [markdown]
 # ## 5. The slides, formula by formula
 #
-# All derivations of the chapter, typed from the slides, beside what follows from frames and bodies. Two slides are wrong: an index,
-# which changes the result, and the sense of an angular velocity, which does not.
+# All derivations of the chapter, typed from the slides, beside what follows from frames and bodies. Two slides are wrong: an
+# index, which changes the result, and the sense of an angular velocity, which does not.
 
 # %%
 chapter = sd.compare([case for case in cases() if case.slide.section.startswith("2.")])

@@ -23,6 +23,7 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
+from symdyn.comparison import compare_lecture
 from symdyn.lecture import cases
 
 # %% [markdown]
@@ -147,7 +148,7 @@ assert difference < 1e-6
 # where an independent proof shows it.
 
 # %%
-chapter = sd.compare([case for case in cases() if case.slide.section.startswith("6.")])
+chapter = compare_lecture([case.name for case in cases() if case.slide.section.startswith("6.")], jobs=2)
 display(chapter)
 
 # %%

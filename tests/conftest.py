@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import tempfile
@@ -18,6 +19,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes more than ten seconds")
+    gc.set_threshold(200_000, 20, 50)  # equations are many small objects that stay; looking for garbage took a sixth of the time
     if not hasattr(config, "workerinput"):  # the workers of pytest-xdist inherit the environment
         folder = tempfile.mkdtemp(prefix="symdyn-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))

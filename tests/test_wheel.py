@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -10,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.slow
@@ -63,11 +66,38 @@ def test_wheel_holds_templates_and_code_only(wheel: Path) -> None:
     assert all(name.startswith(("symdyn/", "symdyn-")) for name in names) and not any("__pycache__" in n for n in names)
 
 
+def required(path: Path) -> dict[str, importlib.metadata.Distribution]:
+    """What a wheel says that it needs, and what that needs, without extras; each must be here in a version that will do."""
+    with zipfile.ZipFile(path) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        wanted = importlib.metadata.PathDistribution(zipfile.Path(archive, name.removesuffix("METADATA"))).requires or []
+    found: dict[str, importlib.metadata.Distribution] = {}
+    while wanted:
+        requirement = Requirement(wanted.pop())
+        if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
+            there = importlib.metadata.distribution(requirement.name)
+            assert requirement.specifier.contains(there.version, prereleases=True), requirement
+            if requirement.name not in found:
+                found[requirement.name] = there
+                wanted += there.requires or []
+    return found
+
+
 def test_installed_elsewhere(wheel: Path, tmp_path: Path) -> None:
+    """In an environment that holds the wheel and what it says that it needs, and nothing else, not even pip."""
     base = Path(sys.base_prefix) / ("python.exe" if sys.platform == "win32" else f"bin/python{sys.version_info[0]}")
-    run(base, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
+    run(base, "-m", "venv", "--without-pip", tmp_path / "venv", cwd=tmp_path)
     python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel, cwd=tmp_path)
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--disable-pip-version-check", "--no-deps",
+        "--no-index", wheel, cwd=tmp_path)
+    packages = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=tmp_path).strip())
+    for distribution in required(wheel).values():
+        for name in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
+            kept = Path(str(distribution.locate_file(name)))
+            if kept.is_dir():
+                shutil.copytree(kept, packages / name, dirs_exist_ok=True)
+            else:
+                shutil.copy2(kept, packages / name)
     from symdyn.runtime.compiler import find_compiler
 
     backends = ["numpy", "c"] if find_compiler() is not None else ["numpy"]

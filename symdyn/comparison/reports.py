@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,10 @@ def report(comparisons: Comparisons, name: str) -> str:
                                      autoescape=ending == "html")
     environment.filters["tex"] = _tex
     color = "#b00020" if ending == "html" else "wrong"
-    typeset: Callable[[str], Any] = (lambda latex: _safe(mathml(latex))) if ending == "html" else str
-    cases = [_case(c, typeset, color) for c in comparisons]
-    errata = [e for c in comparisons for e in _errata(c, typeset)]
+    typeset: Callable[[str], Any] = cache(lambda latex: _safe(mathml(latex))) if ending == "html" else str
+    of_errata = name.startswith("errata")
+    cases = [] if of_errata else [_case(c, typeset, color) for c in comparisons]
+    errata = [e for c in comparisons for e in (_errata(c, typeset) if of_errata else c.errata)]
     return environment.get_template(f"report/{name}.jinja").render(
         cases=cases, errata=errata, columns=[(v.name.lower(), text) for v, text in COLUMNS.items()],
         counts={v.name.lower(): comparisons.counts[v] for v in Verdict}, total=sum(comparisons.counts.values()))

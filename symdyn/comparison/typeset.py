@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
+from itertools import islice
 from typing import Any
 
 import sympy as sp
@@ -33,9 +35,10 @@ def formula_latex(value: Any, marked: Places = (), color: str = "#b00020") -> st
 
 
 def _entry(value: sp.Expr) -> str:
-    operations = int(sp.count_ops(value))
-    if operations > READABLE:
-        return rf"\langle {operations}\ \text{{operations}} \rangle"
+    if next(islice(sp.preorder_traversal(value), READABLE, None), None) is not None:  # only long ones are worth counting
+        operations = int(sp.count_ops(value))
+        if operations > READABLE:
+            return rf"\langle {operations}\ \text{{operations}} \rangle"
     return str(sp.latex(value, mul_symbol=r"\,"))
 
 
@@ -70,4 +73,14 @@ def mathml(latex: str) -> str:
         from latex2mathml.converter import convert
     except ImportError:
         raise MissingExtra("pages with formulas need latex2mathml; install it with: pip install 'symdyn[report]'") from None
-    return str(convert(latex))
+    return _OPERATOR.sub("<mo>", _ENTITY.sub(_character, str(convert(latex))))
+
+
+# What a browser knows of brackets without being told, and characters by number: half of a page.
+_OPERATOR = re.compile(r'<mo stretchy="true" fence="true" form="(?:prefix|postfix)">')
+_ENTITY = re.compile(r"&#x([0-9A-F]+);")
+
+
+def _character(entity: re.Match[str]) -> str:
+    character = chr(int(entity[1], 16))
+    return entity[0] if character in "<>&" else character

@@ -18,7 +18,8 @@ def _components() -> list[Formula]:
     P = n.point("P", [x, y, z])
     shifted = n.frame("b", rotation=sd.rotation.about("Z", theta), origin=[x_O, y_O, 0])
     in_n, in_b = P.position(of=n), P.position(of=n, components=b)
-    common = conventions.other_point(P.position(of=b, components=b)[:2, 0], "The arrow is the same only if E and O are one point.")
+    from_O = P.position(of=b, components=b)[:2, 0]
+    common = conventions.other_point(from_O, "The arrow is the same only if E and O are one point.")
     r_x, r_y = sp.symbols("r_bx r_by")
     i_b, j_b = b.rotation(n).col(0), b.rotation(n).col(1)
     own = {"r_bx": in_b[0], "r_by": in_b[1]}

@@ -67,7 +67,7 @@ def _both() -> _System:
 def _system() -> list[Formula]:
     s = _both()
     (m_v, m_t, I_t), eq, theta = s.masses, s.eq, s.r[4]
-    lam, lam_dot = Matrix(eq.multipliers), Matrix(sp.symbols("lambda_dot_1:4"))
+    lam, lam_dot = Matrix(eq.multipliers), Matrix([c.dot for c in sd.coordinates("lambda1:4")])
     # The blocks by what the slides say they are.
     C_r = Matrix(s.C).jacobian(Matrix(s.r))
     blocks = sp.Matrix(sp.BlockMatrix([[s.M, C_r.T], [C_r, sp.zeros(3, 3)]]))

@@ -71,7 +71,8 @@ def _determination() -> list[Formula]:
     whole = Erratum("-sin(psi + phi) = 0 alone admits odd multiples of pi, with the grip upside down; R_22 = 1 leaves 2 n pi.",
                     upright)
     return [
-        Formula("R of the grip", grip, back, line=6543, renamed=dict(zip((R_13, R_23, R_33), given.col(2))), latex=r"{}^nR_{b_3}"),
+        Formula("R of the grip", grip, back, line=6543, latex=r"{}^nR_{b_3}",
+                renamed=dict(zip((R_13, R_23, R_33), given.col(2)))),
         Formula("i of b3", i, back.col(0), line=6527, also=(6542,), latex=r"{}^ni_{b_3}"),
         Formula("j of b3", j, back.col(1), line=6531, also=(6543,), latex=r"{}^nj_{b_3}"),
         Formula("theta of the grip", -n / 2 * sp.pi, found.angles[1] + 2 * sp.pi * n, line=6549, errata=[quarter],

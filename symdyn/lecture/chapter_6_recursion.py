@@ -64,14 +64,14 @@ class Chain:
 
 
 def arm() -> Chain:
-    """Three links that turn about z."""
-    q, lengths = sd.coordinates("q1 q2 q3"), sp.symbols("l_1 l_2", positive=True)
+    """Three links that turn about z, 1 m long, with their centres of mass in the middle."""
+    q = sd.coordinates("q1 q2 q3")
     system = sd.System("arm", gravity=[0, -g, 0])
     before: Any = system.ground
-    for link, at in zip(LINKS, ([0, 0, 0], [lengths[0], 0, 0], [lengths[1], 0, 0]), strict=True):
-        body = system.add_body(f"link{link}", mass=sp.Symbol(f"m_{link}", positive=True), com=[sp.Symbol(f"c_{link}"), 0, 0],
+    for link in LINKS:
+        body = system.add_body(f"link{link}", mass=sp.Symbol(f"m_{link}", positive=True), com=[sp.Rational(1, 2), 0, 0],
                                inertia=sp.diag(0, *[sp.Symbol(f"I_{link}", positive=True)] * 2))
-        joint = sd.Revolute(f"joint{link}", before, body, q[link - 1], axis=[0, 0, 1], parent_point=at)
+        joint = sd.Revolute(f"joint{link}", before, body, q[link - 1], axis=[0, 0, 1], parent_point=[0 if link == 1 else 1, 0, 0])
         system.add_joint(joint)
         system.add_joint_force(joint, tau[link - 1])
         before = body

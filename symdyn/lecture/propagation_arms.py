@@ -7,17 +7,19 @@ minute where numbers take a second.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
 from symdyn.comparison.case import Erratum, Formula
+from symdyn.lecture.propagation_letters import both_sides, evaluated, typeset
 from symdyn.model.joints import Revolute
 from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
-from symdyn.spatial.sixvectors import force_cross, motion_cross, motion_transform
+from symdyn.spatial.sixvectors import motion_transform
 from symdyn.spatial.vectors import identity, vector
 from symdyn.systems.arms import three_link_arm, two_link_arm
 
@@ -60,6 +62,24 @@ class Arm:
         value = self.put(sp.Matrix(self.equations.explicit(name, simplify=False)))
         self.__dict__[name] = value
         return value
+
+    def letter(self, name: str) -> Any:
+        """Value of a letter of the slides; see propagation_letters."""
+        if name.endswith("^T"):
+            return self.letter(name[:-2]).T
+        if found := re.fullmatch(r"(\d)X(\d)(\*?)", name):
+            return getattr(self, f"X_star_{found[2]}" if found[3] else f"X_{found[1]}")
+        if found := re.fullmatch(r"q(\d)('{1,2})", name):
+            return (self.q_dot if len(found[2]) == 1 else self.q_ddot)[int(found[1]) - 1]
+        if found := re.fullmatch(r"tau_(\d)", name):
+            return self.tau[int(found[1]) - 1]
+        if found := re.fullmatch(r"f(\d)B", name):
+            return self.f_B(int(found[1]))
+        if found := re.fullmatch(r"([acfpIS])(\d)(A?)", name):
+            return getattr(self, "_".join(part for part in (found[1], found[3], found[2]) if part))
+        if name in _OF_LINK_2:
+            return _OF_LINK_2[name](self)
+        return getattr(self, name)
 
     def put(self, value: sp.Matrix) -> sp.Matrix:
         """With the numbers, multiplied out."""
@@ -118,26 +138,20 @@ class Arm:
         return (self.X_G(link).T * getattr(self, f"f_G_{link}")).applyfunc(sp.expand)
 
 
-def cross(v: sp.Matrix) -> sp.Matrix:
-    """(6, 6) v x, of motions."""
-    return sp.Matrix(motion_cross(vector(*v)))
+_OF_LINK_2: dict[str, Callable[[Arm], sp.Matrix]] = {
+    "X": lambda arm: arm.X_2, "X_3*": lambda arm: arm.X_star_3, "S": lambda arm: arm.S_2, "S_ring": lambda arm: arm.S_ring_2,
+    "X_G": lambda arm: arm.X_G(2), "X_G*": lambda arm: arm.X_G(2).T, "X_back": lambda arm: arm.X_from_G(2),
+    "I_G": lambda arm: arm.I_G(2), "v_G": lambda arm: arm.v_G_2, "a_G": lambda arm: arm.a_G_2, "f_G": lambda arm: arm.f_G_2,
+    "f_B": lambda arm: arm.f_B(2),
+}
 
 
-def cross_star(v: sp.Matrix) -> sp.Matrix:
-    """(6, 6) v x*, of forces."""
-    return sp.Matrix(force_cross(vector(*v)))
-
-
-def inverse(matrix: sp.Matrix) -> sp.Matrix:
-    """Of a matrix (1, 1)."""
-    return sp.Matrix([1 / matrix[0]])
-
-
-def row(name: str, line: int, printed: Any, derived: Any, also: Sequence[int] = (), errata: Sequence[Erratum] = (),
-        where: Mapping[Any, Any] | None = None, latex: str | None = None) -> Formula:
-    """A formula whose entries, or sides, are multiplied out."""
+def row(letter: Callable[[str], Any], name: str, line: int, text: str, derived: Any, also: Sequence[int] = (),
+        errata: Sequence[Erratum] = (), where: Mapping[Any, Any] | None = None) -> Formula:
+    """A formula as the slide writes it in letters, with its entries multiplied out; of an equation `derived` has both sides."""
+    printed = both_sides(text, letter) if isinstance(derived, tuple) else evaluated(text, letter)
     return Formula(name, expanded(printed), expanded(derived), line=line, also=tuple(also), errata=tuple(errata),
-                   where=where or {}, latex=latex)
+                   where=where or {}, latex=typeset(text))
 
 
 def expanded(value: Any) -> Any:

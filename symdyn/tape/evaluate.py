@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
@@ -24,9 +25,7 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
     if missing:
         raise KeyError(f"no value for {', '.join(missing)}")
-    context = mpmath.mp.clone()
-    context.dps = digits
-    functions = functions_of(context)
+    context, functions = _arithmetic(digits)
     done: dict[Node, Any] = {}
 
     def number(value: Any) -> Any:
@@ -63,9 +62,7 @@ def constant(value: Any) -> float:
     """
     if not isinstance(value, Node):
         return float(value)
-    context = mpmath.mp.clone()
-    context.dps = 40
-    functions = functions_of(context)
+    context, functions = _arithmetic(40)
     done: dict[Node, Any] = {}
     for node in reachable([value]):
         done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else context.mpf(Fraction(a).numerator)
@@ -74,6 +71,14 @@ def constant(value: Any) -> float:
         raise UnsupportedExpression(f"a constant of the equations is the complex number {context.nstr(done[value], 6)}; "
                                     "look for the root, logarithm or arc function of a number outside its range")
     return float(done[value])
+
+
+@functools.cache
+def _arithmetic(digits: int) -> tuple[Any, dict[str, Callable]]:
+    """A context of mpmath with so many decimal digits, and its functions; it is made once, which takes milliseconds."""
+    context = mpmath.mp.clone()
+    context.dps = digits
+    return context, functions_of(context)
 
 
 def functions_of(context: Any) -> dict[str, Callable]:

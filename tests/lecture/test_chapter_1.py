@@ -90,6 +90,20 @@ def test_coriolis_without_its_factor_is_noticed() -> None:
     assert Verdict.DIFFERENT in verdicts(replace(f, printed=f.printed / 2))
 
 
+@pytest.mark.parametrize(("case", "name"), [
+    ("bus-box", "Newton's law, box"), ("bus-strap", "Newton's law"), ("bus-strap", "Newton's law, seen in the bus"),
+    ("elevator-scale", "Newton's law, falling"), ("elevator-scale", "Newton's law on the scale"),
+    ("earth-frame", "Newton's law in the n-frame")])
+def test_other_sign_of_a_force_is_noticed(case: str, name: str) -> None:
+    f = formula(case, name)
+    left, right = f.printed
+    assert Verdict.DIFFERENT in verdicts(replace(f, printed=(left, -right)))
+
+
+def test_weight_is_that_of_a_system_with_gravity() -> None:
+    assert chapter_1_newton.gravity() == chapter_1_newton.WEIGHT
+
+
 def test_strap_hangs_along_its_tension() -> None:
     """The angle of the strap: from the tension of the case, and from the equilibrium of a pendulum in the bus."""
     a, g, m, l = sp.symbols("a g m_P l", positive=True)

@@ -9,7 +9,8 @@ import sympy as sp
 
 from symdyn.lecture import chapter_5_propagation, chapter_5_propagation_first, chapter_5_propagation_leaf
 from symdyn.lecture import chapter_5_propagation_summary as summary
-from symdyn.lecture.propagation_arms import Arm, cross, cross_star, inverse
+from symdyn.lecture.propagation_arms import Arm
+from symdyn.lecture.propagation_letters import both_sides, evaluated, typeset
 from symdyn.lecture.propagation_newton import Newton
 
 CASES = [case for module in (chapter_5_propagation, chapter_5_propagation_leaf, chapter_5_propagation_first, summary)
@@ -55,10 +56,32 @@ def test_free_joints_fulfil_their_torques(links: int) -> None:
 
 
 def test_products_of_motions_and_of_forces() -> None:
-    v, f = sp.Matrix(sp.symbols("v1:7")), sp.Matrix(sp.symbols("f1:7"))
-    assert same(cross_star(v), -cross(v).T)
-    assert same(cross(v) * v, sp.zeros(6, 1)) and not same(cross_star(f) * v, sp.zeros(6, 1))
-    assert inverse(sp.Matrix([sp.Integer(4)])) == sp.Matrix([sp.Rational(1, 4)])
+    letters = {"v": sp.Matrix(sp.symbols("v1:7")), "f": sp.Matrix(sp.symbols("f1:7")), "E": sp.eye(6)}
+    motion, force = (evaluated(f"v {product} E", letters.__getitem__) for product in ("x", "x*"))
+    assert same(force, -motion.T)
+    assert same(evaluated("v x v", letters.__getitem__), sp.zeros(6, 1))
+    assert not same(evaluated("v x* v", letters.__getitem__), sp.zeros(6, 1))
+    assert same(evaluated("f x* f", letters.__getitem__), force.xreplace(dict(zip(letters["v"], letters["f"]))) * letters["f"])
+
+
+def test_letters_are_evaluated_as_they_are_typeset() -> None:
+    A, B, C = (sp.Matrix(2, 2, sp.symbols(f"{name}1:5")) for name in "abc")
+    values = {"A": A, "B": B, "C": C, "d": sp.Matrix([[sp.Symbol("d")]])}.__getitem__
+    assert same(evaluated("A - B (A + C) B + C", values), A - B * (A + C) * B + C)
+    assert same(evaluated("A - B - C", values), A - B - C)
+    assert same(evaluated("X = A [B + C]", values), A * (B + C))
+    assert same(evaluated("(d d)^-1 (d)", values), sp.Matrix([1 / sp.Symbol("d")]))
+    assert [same(*pair) for pair in zip(both_sides("A B = C A", values), (A * B, C * A))] == [True, True]
+    assert typeset("f1B = I1 a1 + 1X2* p2A - (S1^T I1 S1)^-1 tau_1 q1''") == (
+        r"f_1^B = I_1 a_1 + {}^1X_2^* p_2^A - ( S_1^T I_1 S_1 )^{-1} \tau_1 \ddot{q}_1")
+    assert typeset("v_2 x* I_2 [v_2]") == r"{}^{b_2}\hat{v}_{b_2} \times^* {}^{b_2}\hat{I}_{b_2} [ {}^{b_2}\hat{v}_{b_2} ]"
+    with pytest.raises(ValueError, match=r"no letter 'Y1' in chapters 5\.7 and 5\.8; write it as"):
+        typeset("Y1 = a1")
+    with pytest.raises(ValueError, match=r"goes on with '\) B' after its end; brackets come in pairs"):
+        evaluated("A ) B", values)
+    for unfinished in ("(A", "A +", ""):
+        with pytest.raises(ValueError, match="a formula ends where a letter or a closing bracket must follow"):
+            evaluated(unfinished, values)
 
 
 def test_an_arm_has_no_other_letters() -> None:
