@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shlex
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -24,6 +25,16 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.mkdtemp(prefix="symdyn-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ["SYMDYN_CACHE_DIR"] = folder
+        compile_quickly()
+
+
+def compile_quickly() -> None:
+    """Have C compiled with -O1, in a third of the time: without fused operations the results keep every bit of -O3's."""
+    from symdyn.runtime.compiler import find_compiler
+
+    compiler = None if "SYMDYN_CC" in os.environ or os.name != "posix" else find_compiler()
+    if compiler is not None and compiler.kind in ("gcc", "clang"):
+        os.environ["SYMDYN_CC"] = shlex.join([*compiler.command, "-O1"])
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ for backend in sys.argv[2:]:
 
 
 def run(*command: object, cwd: Path, seconds: float = 300) -> str:
-    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "SYMDYN_CC")}
     environment["SYMDYN_CACHE_DIR"] = str(cwd / "cache")
     done = subprocess.run([str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True, timeout=seconds)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -10,7 +10,7 @@ import sympy as sp
 
 from symdyn.comparison.case import Case, Erratum, Formula
 from symdyn.comparison.equality import Decision, decide
-from symdyn.comparison.values import Value, by_name, canonical, renaming, take
+from symdyn.comparison.values import Value, by_name, canonical, rebuilt, renaming, take
 from symdyn.comparison.verdict import EntryResult, ErratumResult, FormulaResult, Verdict
 from symdyn.errors import CaseError
 
@@ -77,7 +77,8 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
         entry = EntryResult(place, Verdict.EQUAL, decision.how, "", printed, right, decision.point, decision.values)
         entries.append(_verdict(entry, decision, convention, errata, unreadable.get(place, "")))
     return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(taken.shown), _shown(derived),
-                         tuple(entries), tuple(e.result for e in errata), convention.name if convention else "")
+                         tuple(entries), tuple(e.result for e in errata), convention.name if convention else "",
+                         tuple((name, rebuilt(e)) for name, e in taken.where.items()))
 
 
 SHAPE = "shapes differ"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,7 +12,7 @@ import jinja2
 
 from symdyn.backend.source import template_folders
 from symdyn.comparison.result import COLUMNS, Comparison, Comparisons
-from symdyn.comparison.typeset import SHOWN, corrections, formula_latex, marked, mathml, place
+from symdyn.comparison.typeset import SHOWN, corrections, formula_latex, marked, mathml, place, where_latex
 from symdyn.comparison.verdict import FormulaResult, Verdict
 from symdyn.errors import ArgumentError
 
@@ -72,7 +73,7 @@ def _formula(formula: FormulaResult, typeset: Callable[[str], Any], color: str) 
                               for v in Verdict if (n := formula.counts[v])),
             "printed": typeset(formula_latex(formula.printed, wrong, color)) if formula.printed is not None else "",
             "derived": typeset(formula_latex(formula.derived)) if formula.derived is not None else "",
-            "notes": notes, "ways": ", ".join(ways),
+            "where": typeset(where_latex(formula)) if formula.where else "", "notes": notes, "ways": ", ".join(ways),
             "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
 
 
@@ -95,7 +96,8 @@ def _rounding(residual: float) -> str:
 
 
 def _tex(text: str) -> str:
-    """Plain text for LaTeX."""
+    """Plain text for LaTeX; titles in Korean are told to be so, since few installations have its letters."""
+    text = re.sub(r"[\u1100-\ud7ff]+(?:[ (&]+[\u1100-\ud7ff]+)*", "(Korean)", str(text))
     special = {"\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
                "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", "ω": r"$\omega$", "λ": r"$\lambda$"}
-    return "".join(special.get(c, f"\\{c}" if c in "&%$#_" else c) for c in str(text))
+    return "".join(special.get(c, f"\\{c}" if c in "&%$#_" else c) for c in text)

@@ -46,6 +46,11 @@ def _colored(text: str, marked: bool, color: str) -> str:
     return rf"\textcolor{{{color}}}{{{text}}}" if marked else text
 
 
+def where_latex(formula: FormulaResult) -> str:
+    """What was put into both sides before they were compared."""
+    return r",\enspace ".join(f"{sp.latex(sp.Symbol(name))} = {_entry(e)}" for name, e in formula.where)
+
+
 def marked(formula: FormulaResult) -> set[tuple[int, ...]]:
     """Places of the entries that are wrong, different or not decided."""
     return {e.index for e in formula.entries if e.verdict in (Verdict.WRONG, Verdict.DIFFERENT, Verdict.UNDECIDED)}

@@ -26,7 +26,7 @@ class Value:
         """With every expression made anew from its parts, as it comes back from another process: SymPy then multiplies
         numbers into sums that were factored."""
         sides = None if self.sides is None else (self.sides[0].rebuilt(), self.sides[1].rebuilt())
-        return Value(self.shape, tuple(map(_rebuilt, self.entries)), sides)
+        return Value(self.shape, tuple(map(rebuilt, self.entries)), sides)
 
     def as_sympy(self) -> Any:
         """The expression or matrix."""
@@ -47,8 +47,9 @@ class Value:
         return [(i, j) if columns > 1 else (i,) for i in range(rows) for j in range(columns)]
 
 
-def _rebuilt(e: Any) -> Any:
-    return e.func(*map(_rebuilt, e.args)) if e.args else e
+def rebuilt(e: Any) -> Any:
+    """An expression made anew from its parts."""
+    return e.func(*map(rebuilt, e.args)) if e.args else e
 
 
 def take(value: Any, what: str, faults: list[str]) -> Value | None:

@@ -52,7 +52,10 @@ class ErratumResult:
 
 @dataclass(frozen=True)
 class FormulaResult:
-    """Of one formula: printed and derived in the slide's convention, as SymPy (of equations a pair of sides), and its entries."""
+    """Of one formula: printed and derived in the slide's convention, as SymPy (of equations a pair of sides), and its entries.
+
+    where   (name of a symbol, expression) put into both before they were compared
+    """
 
     name: str
     slide: Slide
@@ -63,6 +66,7 @@ class FormulaResult:
     entries: tuple[EntryResult, ...]
     errata: tuple[ErratumResult, ...] = ()
     convention: str = ""
+    where: tuple[tuple[str, Any], ...] = ()
 
     @property
     def counts(self) -> Counter[Verdict]:

@@ -111,7 +111,7 @@ def singular(quantities: Constrained) -> bool:
 
 def _pivots(quantities: Constrained, found: Ranks | None) -> Pivots | None:
     """Dependent speeds and their order, where the sample state allows it."""
-    if found is None:
+    if found is None or not found.independent:
         return None
     kept = list(found.independent)
     C_r = quantities.C_r()[kept]

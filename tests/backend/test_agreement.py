@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from symdyn import systems
 from symdyn.pipeline import FUNCTIONS, emit, has_function
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.compiler import find_compiler, flags
 from symdyn.runtime.unit import CUnit, PythonUnit
 from symdyn.tape.evaluate import evaluate
 
@@ -91,3 +92,24 @@ def test_modules_agree(compiled: Callable[..., Any]) -> None:
     np.testing.assert_allclose(c.rhs(0.7, x, {"m1": 2.0}, inputs), numpy.rhs(0.7, x, {"m1": 2.0}, [0.3, -0.2]), rtol=1e-13)
     for name, value in c.outputs(0.7, x, None, inputs).items():
         np.testing.assert_allclose(value, numpy.outputs(0.7, x, None, inputs)[name], rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["kitchen_sink", "bricard"])
+def test_every_bit_is_that_of_the_tests(name: str, derived: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tests let C be compiled with -O1; with what users get, results and whole motions are the same to the last bit."""
+    compiler = find_compiler()
+    if compiler is None or compiler.kind not in ("gcc", "clang"):
+        pytest.skip("no gcc or clang here")
+    equations = derived(name) if name == "kitchen_sink" else systems.get(name).augmented()
+    ours = equations.compile(backend="c")
+    monkeypatch.delenv("SYMDYN_CC", raising=False)
+    users = find_compiler()
+    assert users is not None and "-O3" in flags(users)
+    theirs = equations.compile(backend="c")
+    one, other = (module.simulate((0, 1), rtol=1e-9, method="dop853") for module in (ours, theirs))
+    assert one.success and one.n_steps == other.n_steps > 10
+    assert np.array_equal(one.x, other.x)
+    n_inputs = len(ours.metadata["inputs"])
+    x, inputs = one.x[1] + np.linspace(-1e-3, 1e-3, one.x.shape[1]), np.linspace(0.2, 0.4, n_inputs)
+    for x_k in (one.x[-1], x):
+        assert np.array_equal(ours.rhs(0.7, x_k, None, inputs), theirs.rhs(0.7, x_k, None, inputs))

@@ -516,6 +516,14 @@ def test_no_state_without_numbers_that_do_not_matter() -> None:
         sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 + 1])
 
 
+def test_a_constraint_that_holds_only_where_its_derivatives_vanish_is_derived_with_a_warning():
+    q, a, w, b = sd.coordinates("q"), *sd.parameters("a w b")
+    moving = a * sp.sin(w * sd.t) * q**2 + b * sd.t**2 * sp.cos(q)
+    with pytest.warns(ModelWarning, match="all derivatives of constraint_1 vanish"):
+        eq = sd.augmented([q], [1], [0], [moving], initial={q: 1})
+    assert eq.C_r == sp.Matrix([[sp.diff(moving, q)]])
+
+
 def test_a_row_whose_derivatives_vanish_wherever_it_is_fulfilled() -> None:
     with pytest.warns(ModelWarning, match="all derivatives of square vanish at every consistent state found"):
         sd.augmented([x, y, z], [m, m, m], None, [(x - 1)**2, y - x], names=["square", "line"])

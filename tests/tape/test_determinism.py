@@ -38,9 +38,9 @@ def texts() -> list[str]:
     root = Path(__file__).parents[2]
     common = {**os.environ, "PYTHONPATH": str(root), "PYTHONIOENCODING": "utf-8"}
     runs = [subprocess.Popen([sys.executable, "-c", SCRIPT], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                             encoding="utf-8", env={**common, "PYTHONHASHSEED": str(seed)}) for seed in (0, 1, 2)]
+                             encoding="utf-8", env={**common, "PYTHONHASHSEED": str(seed)}) for seed in (0, 1)]
     results = [run.communicate(timeout=300) for run in runs]
-    assert [run.returncode for run in runs] == [0, 0, 0], results[0][1]
+    assert [run.returncode for run in runs] == [0, 0], results[0][1]
     return [out for out, _ in results]
 
 
