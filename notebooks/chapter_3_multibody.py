@@ -152,6 +152,34 @@ display(Math(rf"\mathbf C_r \mathbf J = {latex(products[0])} \qquad \text{{with 
 assert products[0].is_zero_matrix
 
 # %% [markdown]
+# ### Where the entries come from
+#
+# `explain` takes an entry of $\tilde{\mathbf M}$ or $\tilde{\mathbf k}$ apart: which coordinate of $\mathbf r$, hence which body,
+# contributes what. The coordinates 1 and 2 belong to the vehicle, 5 is the inclination of the track. The centrifugal terms of the
+# vehicle cancel in the second equation, since they point along the track; the Coriolis terms add up to
+# $2 m_v q_1 \dot q_1 \dot q_2$.
+
+# %%
+velocity_terms = both.explain("k_tilde", 1)  # rows and columns count from 0
+display(velocity_terms)
+assert sp.simplify(velocity_terms.of(kind="centrifugal")) == 0
+assert sp.simplify(velocity_terms.of(kind="Coriolis") - 2 * m_v * q1 * q1.dot * q2.dot) == 0
+
+# %%
+inertia = both.explain("M_tilde", 1, 1)
+display(inertia)
+assert sp.simplify(inertia.total - m_v * q1**2 - I_t) == 0
+print(inertia)
+
+# %% [markdown]
+# With bodies that are modelled as such, the contributions carry their names. Larger matrices are easier to read with the short
+# sines and cosines of robotics, here those of an arm of two links:
+
+# %%
+arm = sd.systems.two_link_arm().embedding()
+display(arm.explain("k_tilde", 0), arm.latex("M_tilde", shorthand=True))
+
+# %% [markdown]
 # Both formulations give the same motion.
 
 # %%

@@ -131,6 +131,8 @@ print(found)
 #
 #     symdyn compare my_slides.py --output report
 #
+# In Python the same files come from `sd.compare([...]).write("report")`, of one case from `sd.compare(case).write("report")`.
+#
 # The cases of the lecture are in `symdyn.lecture`; any of them may serve as a model.
 
 # %%

@@ -29,7 +29,7 @@ _HOME = {
                       "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
-_PACKAGES = {name: f"symdyn.{name}" for name in ("frames", "rotation", "systems")} | {
+_PACKAGES = {name: f"symdyn.{name}" for name in ("frames", "lecture", "rotation", "systems")} | {
     name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]

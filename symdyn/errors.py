@@ -76,13 +76,18 @@ class NotNormalized(RotationError):
 
 
 class CaseError(SymdynError, ValueError):
-    """A case of printed and derived formulas has faults; `faults` lists all of them."""
+    """A case of printed and derived formulas has faults; `faults` lists all of them, `name` is the case's."""
 
     def __init__(self, faults: Sequence[str], name: str = "") -> None:
         self.faults = tuple(faults)
-        head = f"the case {name!r} has {len(self.faults)} faults:\n" if len(self.faults) > 1 else ""
-        mark = "  - " if head else ""
+        self.name = name
+        several = len(self.faults) > 1
+        head = f"the case {name!r} has {len(self.faults)} faults:\n" if several else f"the case {name!r}: " if name else ""
+        mark = "  - " if several else ""
         super().__init__(head + "\n".join(mark + fault for fault in self.faults))
+
+    def __reduce__(self) -> tuple[type[CaseError], tuple[tuple[str, ...], str]]:
+        return CaseError, (self.faults, self.name)  # so that it comes whole from another process
 
 
 class UnknownCase(SymdynError, KeyError):

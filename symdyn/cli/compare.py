@@ -4,43 +4,86 @@ from __future__ import annotations
 
 import argparse
 import os
+import time as clock
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symdyn.cli.messages import FAILED, Stop
+from symdyn.cli.messages import FAILED, WRONG, Stop, complain
+from symdyn.errors import SymdynError
 
 if TYPE_CHECKING:
-    from symdyn.comparison import Comparisons
+    from symdyn.comparison import Case, Comparison, Comparisons
 
 OUTPUT = Path("generated/compare")
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare cases and print the verdicts; where several are compared, or a folder is named, write the reports."""
+    """Compare cases and print the verdicts; of all, or where a folder is named, write the reports."""
     if arguments.all and arguments.cases:
         raise Stop("name cases, or pass --all, not both")
     if arguments.jobs is not None and arguments.jobs < 1:
         raise Stop(f"--jobs takes a number of processes from 1 on, found {arguments.jobs}")
     if not arguments.all and not arguments.cases:
         return _list()
-    from symdyn.comparison import compare, compare_lecture
+    from symdyn.comparison import compare_lecture
 
     files = [name for name in arguments.cases if name.endswith(".py")]
+    if files and (arguments.jobs or 1) > 1:
+        raise Stop(f"--jobs shares cases of the lecture, and {files[0]} is a file of your own, whose cases are compared in one "
+                   "process; leave --jobs out")
+    cases = _chosen(arguments.cases)
+    folder = arguments.output or (OUTPUT if arguments.all else None)
+    if folder is not None:
+        _prepare(folder)
+    errors: list[SymdynError] = []
     if files:
-        from symdyn.cli.userfile import cases_from_file
-
-        own = [case for name in files for case in cases_from_file(Path(name))]
-        found = compare([*own, *(name for name in arguments.cases if name not in files)])
+        found = _one_by_one(cases, errors)
     else:
         processes = os.cpu_count() or 1
         found = compare_lecture(arguments.cases or None, arguments.jobs or (processes if arguments.all else 1))
-    if len(found) == 1 and not arguments.all:
-        print(found.cases[0])
-    else:
-        print(found if arguments.all else "\n\n".join(map(str, found)))
-    if arguments.all or arguments.output:
-        _write(found, arguments.output or OUTPUT)
-    return 0 if found.decided else FAILED
+    if arguments.all:
+        print(found)
+    elif len(found):
+        print("\n\n".join(map(str, found)))
+    if folder is not None and len(found):
+        _write(found, folder)
+    for error in errors:
+        complain(str(error), WRONG)
+    return WRONG if errors else 0 if found.decided else FAILED
+
+
+def _chosen(names: Sequence[str]) -> list[Case]:
+    """The cases of files, names and sections; what there is not is told before anything is compared."""
+    from symdyn.cli.userfile import cases_from_file
+    from symdyn.comparison.run import find
+
+    return [case for name in names for case in (cases_from_file(Path(name)) if name.endswith(".py") else find([name]))]
+
+
+def _one_by_one(cases: Sequence[Case], errors: list[SymdynError]) -> Comparisons:
+    """The comparisons that succeed; the errors of the others are added to `errors`."""
+    from symdyn.comparison import Comparisons, compare
+
+    start = clock.monotonic()
+    done: list[Comparison] = []
+    for case in cases:
+        try:
+            done.append(compare(case))
+        except SymdynError as error:
+            errors.append(error)
+    return Comparisons(tuple(done), clock.monotonic() - start)
+
+
+def _prepare(folder: Path) -> None:
+    """What the reports need, looked at before the time for comparing is spent."""
+    from symdyn.comparison.typeset import mathml
+
+    mathml("x")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Stop(f"the folder {folder} for the reports cannot be made: {error.strerror}") from None
 
 
 def _write(found: Comparisons, folder: Path) -> None:

@@ -117,10 +117,13 @@ def _add_diagnose(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("cases", metavar="NAME", nargs="*", help="a case of the lecture, or a Python file that defines CASES")
+    parser.epilog = ("Exit codes: 0 all is decided; 1 an entry is different or not decided, or something is missing that the "
+                     "reports need; 2 it was asked wrongly, or a case has faults.")
+    parser.add_argument("cases", metavar="NAME", nargs="*", help="a case of the lecture, a section such as 3.5 or a chapter such "
+                        "as 3 for all of its cases, or a Python file that defines CASES")
     parser.add_argument("--all", action="store_true", help="the whole lecture: prints one table, writes reports and errata")
-    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases (default: 1, with --all "
-                        "one a processor)")
+    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases of the lecture (default: 1, "
+                        "with --all one a processor)")
     parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the reports (default with --all: "
                         "generated/compare)")
 

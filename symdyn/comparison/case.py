@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Integral
 from typing import Any
 
+from symdyn.comparison.check import INDEX, as_tuple, guarded, is_count, is_index, mapping, members, text, told
 from symdyn.comparison.conventions import Convention
 from symdyn.comparison.proofs import Proof
+from symdyn.comparison.values import take
 from symdyn.errors import CaseError
 
 
@@ -23,6 +26,11 @@ class Slide:
         parts = [self.section, self.title, f"line {self.line}" if self.line is not None else ""]
         return ", ".join(p for p in parts if p)
 
+    def faults(self, what: str) -> list[str]:
+        """What cannot be the place of a formula."""
+        return [*text(self.section, f"the section of {what}", empty=True), *text(self.title, f"the title of {what}", empty=True),
+                *_line(self.line, f"the line of {what}")]
+
 
 @dataclass(frozen=True)
 class Erratum:
@@ -30,12 +38,29 @@ class Erratum:
 
     why       one sentence
     proof     something independent of the formula that the right one fulfils and the printed one does not; see symdyn.proofs
-    entries   their indices, (i, j) or (i,) of a vector; None: all that differ
+    entries   their indices, [(i, j), ...] or [(i,), ...] of a vector; None: all that differ
     """
 
     why: str
     proof: Proof
     entries: Sequence[tuple[int, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        entries = as_tuple(self.entries)
+        _set(self, entries=tuple(map(as_tuple, entries)) if isinstance(entries, tuple) else entries)
+
+    def faults(self, what: str) -> list[str]:
+        """What is missing; what: which erratum it is."""
+        faults = text(self.why, f"`why` of {what}")
+        if not isinstance(self.proof, Proof):
+            faults.append(f"`proof` of {what} is {told(self.proof)}; pass one of symdyn.proofs")
+        if self.entries is None:
+            return faults
+        if not isinstance(self.entries, tuple) or not all(map(is_index, self.entries)):
+            faults.append(f"`entries` of {what} is {told(self.entries)}; pass a list of index {INDEX}{_meant(self.entries)}")
+        elif not self.entries:
+            faults.append(f"`entries` of {what} is empty; name entries, or leave it out for all that differ")
+        return faults
 
 
 @dataclass(frozen=True)
@@ -45,13 +70,13 @@ class Formula:
     name          short and unique in its case
     printed       expression, nested list, matrix, equation (sp.Eq, or a pair of matrices); None if it cannot be read
     derived       the same for symdyn's; or a function without arguments that returns it
-    slide, line   where it is printed; default: the case's; `line` changes the line alone
-    also          lines where the same is printed again
+    slide, line   where it is printed, text being a section; default: the case's; `line` changes the line alone
+    also          lines where the same is printed again, or one
     latex         how its name is typeset
     renamed       {the slide's symbol: symdyn's symbol or expression}; symbols of one name are the same anyway
     where         {symbol: expression} put into both, where they are equal only on certain states
-    conventions   what the slide may write otherwise; see symdyn.conventions
-    errata        what is wrong
+    conventions   what the slide may write otherwise, one or several; see symdyn.conventions
+    errata        what is wrong, one or several
     unreadable    why it, or {index: why an entry}, cannot be read
     decimals      printed numbers are rounded to so many decimals
     """
@@ -70,21 +95,58 @@ class Formula:
     unreadable: str | Mapping[tuple[int, ...], str] = ""
     decimals: int | None = None
 
+    def __post_init__(self) -> None:
+        _set(self, slide=_as_slide(self.slide), also=as_tuple(self.also, Integral), errata=as_tuple(self.errata, Erratum),
+             conventions=as_tuple(self.conventions, Convention))
+
+    def faults(self, what: str) -> list[str]:
+        """Everything of a wrong type; what: how the messages call the formula."""
+        faults = _slide(self.slide, f"the slide of {what}") + _line(self.line, f"the line of {what}")
+        if not isinstance(self.also, tuple) or not all(map(is_count, self.also)):
+            faults.append(f"`also` of {what} is {told(self.also)}; pass numbers of lines, [3, 7]")
+        if self.latex is not None:
+            faults += text(self.latex, f"`latex` of {what}")
+        for name in ("renamed", "where"):
+            faults += mapping(getattr(self, name), f"`{name}` of {what}", "{symbol: symbol or expression}")
+        faults += members(self.conventions, f"`conventions` of {what}", Convention, "symdyn.conventions.opposite_sign(sentence)")
+        faults += members(self.errata, f"`errata` of {what}", Erratum, "symdyn.Erratum(why, proof)")
+        faults += [f"{what}: {fault}" for convention in _those(self.conventions, Convention) for fault in convention.faults()]
+        faults += [fault for erratum in _those(self.errata, Erratum) for fault in erratum.faults(f"an erratum of {what}")]
+        if self.decimals is not None and not is_count(self.decimals):
+            faults.append(f"`decimals` of {what} is {told(self.decimals)}; pass a whole number from 0 on")
+        return faults + self._unreadable(what)
+
+    def _unreadable(self, what: str) -> list[str]:
+        given = self.unreadable
+        if isinstance(given, str):
+            both = bool(given) and self.printed is not None
+            return [f"{what} is unreadable as a whole ({given!r:.60}), and something is printed; pass {{index: reason}} for "
+                    "single entries, or printed=None"] if both else []
+        if not isinstance(given, Mapping):
+            return [f"`unreadable` of {what} is {told(given)}; pass a sentence, or {{index: sentence}}"]
+        faults = [f"`unreadable` of {what} has the index {told(key)}; pass {INDEX}" for key in given if not is_index(key)]
+        printed = take(self.printed, what, []) if given and not faults and self.printed is not None else None
+        if printed is not None:
+            places = printed.indices()
+            faults += [f"`unreadable` of {what} names entry {key}; the print has {_span(places)}"
+                       for key in given if key not in places]
+        return faults + [fault for key, why in given.items() for fault in text(why, f"`unreadable` of {what} at {key}")]
+
 
 @dataclass(frozen=True)
 class Case:
     """Formulas that belong together, usually of one derivation.
 
     name       short, for `symdyn.compare(name)` and the command line
-    formulas   the formulas, or a function without arguments that returns them (nothing is derived before it is compared)
+    slide      where they are printed; text is a section
+    formulas   the formulas, one formula, or a function without arguments that returns them (nothing is derived before it is
+               compared)
     printed    the short form: {name: what the slide prints}, compared with `derived`
     derived    equations of symdyn, whose attributes have those names, or a dict
 
     A pendulum of your own slides, derived and compared in a few lines:
 
         Case("my-pendulum", printed={"M_tilde": [[m*l**2]], "F_tilde": [-m*g*l*sin(q)]}, derived=system.embedding())
-
-    Raises CaseError with every fault: names that `derived` lacks, no formulas, names used twice.
     """
 
     name: str
@@ -94,29 +156,121 @@ class Case:
     printed: Mapping[str, Any] = field(default_factory=dict)
     derived: Any = None
 
+    def __post_init__(self) -> None:
+        _set(self, slide=_as_slide(self.slide), formulas=as_tuple(self.formulas, Formula))
+
     def taken(self) -> list[Formula]:
-        """All formulas, with their slides."""
-        faults: list[str] = []
-        formulas = list(self.formulas() if callable(self.formulas) else self.formulas)
-        for name, printed in self.printed.items():
-            found = self.derived.get(name) if isinstance(self.derived, Mapping) else getattr(self.derived, name, None)
-            if found is None:
-                there = sorted(map(str, self.derived)) if isinstance(self.derived, Mapping) else []
-                faults.append(f"{name} is printed, but `derived` has no {name}; "
-                              + (f"it has {', '.join(there)}" if there else "pass equations or a dict that has it"))
-                continue
-            formulas.append(Formula(name, printed, found))
+        """All formulas, with their slides.
+
+        Raises CaseError with every fault: what has a wrong type, names that `derived` lacks, no formulas, names used twice.
+        What the functions of a formula raise later is a CaseError too.
+        """
+        faults = text(self.name, "the name of a case") + text(self.title, "`title`", empty=True) + _slide(self.slide, "`slide`")
+        formulas = self._listed(faults) + self._short(faults)
         if not formulas and not faults:
             faults.append("it has no formulas; pass formulas=[...], or printed={...} and derived=...")
-        names = [f.name for f in formulas]
+        names = [f.name for f in formulas if isinstance(f.name, str)]
         faults += [f"{names.count(n)} formulas are named {n!r}; give each a name of its own"
                    for n in dict.fromkeys(names) if names.count(n) > 1]
         if faults:
             raise CaseError(faults, self.name)
         return [self._placed(f) for f in formulas]
 
+    def _listed(self, faults: list[str]) -> list[Formula]:
+        formulas, what = self.formulas, "formulas"
+        if callable(formulas):
+            function, what = formulas, "formulas()"
+            try:
+                formulas = guarded(lambda: as_tuple(function(), Formula), what)()
+            except CaseError as error:
+                faults += error.faults
+                return []
+        faults += members(formulas, what, Formula, "symdyn.Formula(name, printed, derived)")
+        found = _those(formulas, Formula)
+        for formula in found:
+            unnamed = text(formula.name, "the name of a formula")
+            faults += unnamed + formula.faults("that formula" if unnamed else formula.name)
+        return found
+
+    def _short(self, faults: list[str]) -> list[Formula]:
+        """The formulas of the short form."""
+        wrong = mapping(self.printed, "`printed`", '{"M_tilde": [[m*l**2]]}')
+        faults += wrong
+        if wrong or not self.printed:
+            return []
+        if self.derived is None:
+            faults.append("something is printed, but nothing derived; pass derived=..., equations or a dict")
+            return []
+        formulas = []
+        for name, printed in self.printed.items():
+            unnamed = text(name, "a name in `printed`")
+            found = self._derived(name, faults) if not unnamed else None
+            faults += unnamed
+            if found is not None:
+                formulas.append(Formula(name, printed, found))
+        return formulas
+
+    def _derived(self, name: str, faults: list[str]) -> Any:
+        if isinstance(self.derived, Mapping):
+            if self.derived.get(name) is None:
+                there = ", ".join(map(str, self.derived))
+                faults.append(f"{name} is printed, but `derived` has no {name}; it has {there or 'nothing'}")
+            return self.derived.get(name)
+        try:
+            found = guarded(lambda: getattr(self.derived, name, None), f"{name} of `derived`")()
+        except CaseError as error:
+            faults += error.faults
+            return None
+        if found is None:
+            faults.append(f"{name} is printed, but `derived` has no {name}; pass equations or a dict that has it")
+        elif callable(found):
+            faults.append(f"{name} of `derived` is a method; call it and pass what it returns: derived={{{name!r}: ...}}")
+            return None
+        return found
+
     def _placed(self, formula: Formula) -> Formula:
+        """With its slide, and with functions whose errors tell the formula."""
         slide = formula.slide or self.slide or Slide("")
         if formula.line is not None:
             slide = replace(slide, line=formula.line)
-        return replace(formula, slide=slide)
+        derived = formula.derived
+        if callable(derived):
+            derived = guarded(derived, f"what is derived for {formula.name}")
+        conventions = tuple(replace(c, to_slide=guarded(c.to_slide, f"the convention {c.name!r}"))
+                            for c in formula.conventions)
+        return replace(formula, slide=slide, derived=derived, conventions=conventions)
+
+
+def _set(frozen: Any, **values: Any) -> None:
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
+def _those(value: Any, kind: type) -> list[Any]:
+    return [one for one in value if isinstance(one, kind)] if isinstance(value, tuple) else []
+
+
+def _span(places: Sequence[tuple[int, ...]]) -> str:
+    return f"the entries {places[0]} to {places[-1]}" if places != [()] else "one entry, ()"
+
+
+def _as_slide(value: Any) -> Any:
+    return Slide(value) if isinstance(value, str) else value
+
+
+def _slide(value: Any, what: str) -> list[str]:
+    if value is None or isinstance(value, Slide):
+        return value.faults(what) if value is not None else []
+    return [f"{what} is {told(value)}; pass symdyn.Slide(section, title, line), or the section as text"]
+
+
+def _line(value: Any, what: str) -> list[str]:
+    return [] if value is None or is_count(value) else [f"{what} is {told(value)}; pass a whole number from 0 on"]
+
+
+def _meant(entries: Any) -> str:
+    """What was probably meant by entries that are no index tuples."""
+    numbers = as_tuple(entries, Integral)
+    if not isinstance(numbers, tuple) or not numbers or not all(map(is_count, numbers)):
+        return ""
+    return f"; you may mean {[(int(n),) for n in numbers]}" + (f" or [{tuple(map(int, numbers))}]" if len(numbers) == 2 else "")

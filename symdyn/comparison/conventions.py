@@ -8,6 +8,12 @@ from typing import Any
 
 import sympy as sp
 
+from symdyn.comparison.check import as_tuple, is_count, text, told
+from symdyn.comparison.equality import decide
+from symdyn.comparison.values import canonical
+from symdyn.errors import CaseError, ModelError
+from symdyn.model.symbols import as_expression
+
 
 @dataclass(frozen=True)
 class Convention:
@@ -15,11 +21,26 @@ class Convention:
 
     name       short: "opposite sign"
     sentence   what the slide does otherwise
+    to_slide   takes an expression or a matrix (of an equation: left minus right), returns the same
+
+    A case refuses a convention without name, sentence or function; what to_slide raises becomes a CaseError.
     """
 
     name: str
     sentence: str
     to_slide: Callable[[Any], Any]
+
+    def faults(self) -> list[str]:
+        """What is missing."""
+        name = f"the convention {self.name!r}" if isinstance(self.name, str) and self.name.strip() else "a convention"
+        faults = text(self.name, f"the name of {name}")
+        if isinstance(self.sentence, str) and not self.sentence.strip():
+            faults.append(f"{name} has no sentence; say in `sentence` what the slide does otherwise")
+        else:
+            faults += text(self.sentence, f"the sentence of {name}")
+        if not callable(self.to_slide):
+            faults.append(f"`to_slide` of {name} is {told(self.to_slide)}; pass a function of what is derived")
+        return faults
 
 
 def opposite_sign(sentence: str) -> Convention:
@@ -29,15 +50,20 @@ def opposite_sign(sentence: str) -> Convention:
 
 def transposed(sentence: str) -> Convention:
     """The slide's rotation takes components the other way, or its vector is a row."""
-    return Convention("transposed", sentence, lambda derived: derived.T)
+    return Convention("transposed", sentence, lambda derived: _matrix(derived, "transposed").T)
 
 
 def reordered(rows: Sequence[int] | None = None, columns: Sequence[int] | None = None, sentence: str = "") -> Convention:
-    """The slide's row i is row rows[i] of symdyn's, its column j is columns[j]."""
+    """The slide's row i is row rows[i] of symdyn's, its column j is columns[j]; each holds every index once.
+
+    Raises CaseError without rows and columns, and when it is applied to a formula of another size.
+    """
+    if rows is None and columns is None:
+        raise CaseError(["an order of coordinates has neither rows nor columns; pass rows=[...] or columns=[...]"])
+
     def change(derived: Any) -> Any:
-        matrix = sp.Matrix(derived)
-        return matrix.extract(list(rows if rows is not None else range(matrix.rows)),
-                              list(columns if columns is not None else range(matrix.cols)))
+        matrix = _matrix(derived, "put in another order")
+        return matrix.extract(_order(rows, "rows", matrix), _order(columns, "columns", matrix))
 
     return Convention("order of coordinates", sentence, change)
 
@@ -48,5 +74,31 @@ def other_point(value: Any, sentence: str) -> Convention:
 
 
 def scaled(factor: Any, sentence: str) -> Convention:
-    """The slide's equation is multiplied by a factor that is not zero."""
-    return Convention("common factor", sentence, lambda derived: derived * factor)
+    """The slide's equation is multiplied by a factor that is not zero: a number or a SymPy expression.
+
+    Raises CaseError for text, for what has no finite value, and for a factor that is zero everywhere.
+    """
+    try:
+        taken = as_expression(factor, "the common factor")
+    except ModelError as error:
+        raise CaseError(error.faults) from None
+    if decide([taken.xreplace(canonical([taken]))], [sp.S.Zero])[0].equal:
+        raise CaseError([f"the common factor {factor} is zero, and would make all formulas equal; pass one that is not"])
+    return Convention("common factor", sentence, lambda derived: derived * taken)
+
+
+def _matrix(derived: Any, done: str) -> Any:
+    if not isinstance(derived, sp.MatrixBase):
+        raise CaseError([f"what is derived is a scalar, {derived!s:.80}; only a vector or a matrix can be {done}"])
+    return derived
+
+
+def _order(given: Any, what: str, matrix: Any) -> list[int]:
+    size = matrix.rows if what == "rows" else matrix.cols
+    if given is None:
+        return list(range(size))
+    order = as_tuple(given)
+    if not isinstance(order, tuple) or not all(map(is_count, order)) or sorted(order) != list(range(size)):
+        raise CaseError([f"{what} is {given!r:.80}, what is derived is {matrix.rows} x {matrix.cols}; pass each index from 0 to "
+                         f"{size - 1} once"])
+    return [int(k) for k in order]

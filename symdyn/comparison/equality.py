@@ -13,18 +13,18 @@ from typing import Any
 
 import sympy as sp
 
-from symdyn.comparison.points import DIGITS, Expressions, points
+from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, points
 from symdyn.errors import UnsupportedExpression
-from symdyn.report.simplify import simplified
+from symdyn.report.simplify import shown_zero
 
-POINTS = 5
+POINTS = 12
 FEWEST = 3
-# Relative to the values that are compared: with DIGITS digits, what rounding leaves and what no rounding explains.
-SAME, OTHER = 1e-30, 1e-15
+# Differences that are rounding for sure, relative to the values; others are looked at again with twice the digits.
+ROUNDING = 1e-45
 # Where a decimal fraction such as 9.81 stands in a formula, it was given with the digits of a float.
 SAME_DECIMAL, OTHER_DECIMAL = 1e-13, 1e-9
-# Simplification: time of one entry, and the length from which it is not tried.
-SECONDS, LONGEST = 0.5, 200
+# Operations from which simplification is not tried.
+LONGEST = 60
 
 
 @dataclass(frozen=True)
@@ -67,54 +67,86 @@ def _vanishes(difference: sp.Expr) -> bool:
     """Whether a short difference simplifies to zero."""
     if sp.count_ops(difference) > LONGEST or difference.has(sp.Float):
         return False
-    return bool(simplified(difference, SECONDS) == 0)
+    return shown_zero(difference)
 
 
 def _by_numbers(pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> list[Decision]:
     try:
-        expressions = Expressions([e for pair in pairs for e in pair])
+        return _Comparison(pairs, decimals).decisions()
     except UnsupportedExpression as error:
-        return [Decision(None, str(error)) for _ in pairs]
-    symbols = {s for pair in pairs for e in pair for s in e.free_symbols}
-    agreeing, doubtful = [0] * len(pairs), [0] * len(pairs)
-    decided: dict[int, Decision] = {}
-    for point in points(symbols):
-        values = expressions.at(point)
-        for k, (a, b) in enumerate(pairs):
-            x, y = values[2 * k], values[2 * k + 1]
-            if k in decided or x is None or y is None:
-                continue
-            same, other = _bounds(a, b, decimals, abs(x) + abs(y))
-            if abs(x - y) > other:
-                shown = {s.name: float(point[s.name]) for s in sorted(a.free_symbols | b.free_symbols, key=str)}
-                decided[k] = Decision(False, "different at a point", shown, (float(x), float(y)))
-            elif abs(x - y) <= same:
-                agreeing[k] += 1
-            else:
-                doubtful[k] += 1
-            if agreeing[k] == POINTS or (agreeing[k] and not symbols):
-                decided[k] = _agreed(agreeing[k], decimals)
-        if len(decided) == len(pairs):
-            break
-    for k in range(len(pairs)):
-        if k not in decided:
-            enough = agreeing[k] >= FEWEST and not doubtful[k]
-            decided[k] = _agreed(agreeing[k], decimals) if enough else Decision(None, (
-                f"values agree at {agreeing[k]} points, at {doubtful[k]} they are too near to tell; elsewhere there are no real "
-                "values"))
-    return [decided[k] for k in range(len(pairs))]
+        if len(pairs) == 1:
+            return [Decision(None, str(error))]
+        return [_by_numbers([pair], decimals)[0] for pair in pairs]
 
 
-def _agreed(count: int, decimals: int | None) -> Decision:
-    if decimals is not None:
-        return Decision(True, f"equal when rounded to {decimals} decimals")
-    return Decision(True, f"equal at {count} random points, {DIGITS} digits" if count > 1 else f"equal to {DIGITS} digits")
+class _Comparison:
+    """Pairs of expressions at random points, until each is decided."""
+
+    def __init__(self, pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> None:
+        self.pairs, self.decimals = pairs, decimals
+        self.given = [a.has(sp.Float) or b.has(sp.Float) for a, b in pairs]
+        sizes = [_size(a) + _size(b) if given else sp.S.Zero for (a, b), given in zip(pairs, self.given)]
+        self.expressions = Expressions([e for pair, size in zip(pairs, sizes) for e in (*pair, size)])
+        self.symbols = {s for pair in pairs for e in pair for s in e.free_symbols}
+
+    def decisions(self) -> list[Decision]:
+        agreeing, doubtful = [0] * len(self.pairs), [0] * len(self.pairs)
+        decided: dict[int, Decision] = {}
+        for point in points(self.symbols):
+            values = self.expressions.at(point)
+            precise: list[Any] | None = None
+            for k, (a, b) in enumerate(self.pairs):
+                x, y = values[3 * k:3 * k + 2]
+                if k in decided or x is None or y is None:
+                    continue
+                if precise is None and self._unclear(k, values):
+                    precise = self.expressions.at(point, 2 * DIGITS)
+                same = self._same(k, values, precise)
+                if same is False:
+                    shown = {s.name: float(point[s.name]) for s in sorted(a.free_symbols | b.free_symbols, key=str)}
+                    decided[k] = Decision(False, "different at a point", shown, (float(x), float(y)))
+                elif same is None:
+                    doubtful[k] += 1
+                else:
+                    agreeing[k] += 1
+                    if agreeing[k] == POINTS or not self.symbols:
+                        decided[k] = self._agreed(k, agreeing[k])
+            if len(decided) == len(self.pairs) or not self.symbols:
+                break
+        for k in range(len(self.pairs)):
+            if k not in decided:
+                enough = agreeing[k] >= FEWEST and not doubtful[k]
+                decided[k] = self._agreed(k, agreeing[k]) if enough else Decision(None, (
+                    f"values agree at {agreeing[k]} points, at {doubtful[k]} they are too near to tell; elsewhere there are no "
+                    "real values"))
+        return [decided[k] for k in range(len(self.pairs))]
+
+    def _unclear(self, k: int, values: list[Any]) -> bool:
+        x, y = values[3 * k:3 * k + 2]
+        return self.decimals is None and not self.given[k] and bool(abs(x - y) > ROUNDING * max(abs(x), abs(y)))
+
+    def _same(self, k: int, values: list[Any], precise: list[Any] | None) -> bool | None:
+        """Whether the values of a pair are the same; None: too near to tell."""
+        x, y, size = values[3 * k:3 * k + 3]
+        difference = abs(x - y)
+        if self.decimals is not None:
+            return bool(difference <= 0.5000001 * 10.0**-self.decimals)
+        if self.given[k]:
+            size = size or abs(x) + abs(y)
+            return True if difference <= SAME_DECIMAL * size else False if difference > OTHER_DECIMAL * size else None
+        if not self._unclear(k, values):
+            return True
+        assert precise is not None
+        again = precise[3 * k:3 * k + 2]
+        return again[0] is not None and again[1] is not None and bool(abs(again[0] - again[1]) <= REMAINDER * difference)
+
+    def _agreed(self, k: int, count: int) -> Decision:
+        if self.decimals is not None:
+            return Decision(True, f"equal when rounded to {self.decimals} decimals")
+        digits = 13 if self.given[k] else DIGITS
+        return Decision(True, f"equal at {count} random points, {digits} digits" if count > 1 else f"equal to {digits} digits")
 
 
-def _bounds(a: sp.Expr, b: sp.Expr, decimals: int | None, size: Any) -> tuple[Any, Any]:
-    if decimals is not None:
-        half = 0.5000001 * 10.0**-decimals
-        return half, half
-    if a.has(sp.Float) or b.has(sp.Float):
-        return SAME_DECIMAL * (1 + size), OTHER_DECIMAL * (1 + size)
-    return SAME * (1 + size), OTHER * (1 + size)
+def _size(e: sp.Expr) -> sp.Expr:
+    """The sum of the sizes of the terms."""
+    return sp.Add(*[sp.Abs(term) for term in sp.Add.make_args(e)])

@@ -32,26 +32,35 @@ def judge(case: Case) -> tuple[FormulaResult, ...]:
     taken = [t for t in (_take(f, faults) for f in case.taken()) if t is not None]
     if faults:
         raise CaseError(faults, case.name)
-    results = tuple(_judged(t, faults) for t in taken)
+    results = tuple(r for r in (_results(t, faults) for t in taken) if r is not None)
     if faults:
         raise CaseError(faults, case.name)
     return results
+
+
+def _results(taken: _Taken, faults: list[str]) -> FormulaResult | None:
+    try:
+        return _judged(taken, faults)
+    except CaseError as error:
+        faults += [f"{taken.formula.name}: {fault}" for fault in error.faults]
+        return None
 
 
 def _take(formula: Formula, faults: list[str]) -> _Taken | None:
     known = len(faults)
     if formula.printed is None and not (isinstance(formula.unreadable, str) and formula.unreadable):
         faults.append(f"{formula.name} has nothing printed; pass `printed`, or say in `unreadable` why it cannot be read")
-    value = formula.derived() if callable(formula.derived) else formula.derived
+    try:
+        value = formula.derived() if callable(formula.derived) else formula.derived
+    except CaseError as error:
+        faults += error.faults
+        return None
     derived = take(value, f"what is derived for {formula.name}", faults) if value is not None else None
     if derived is None and formula.printed is not None and len(faults) == known:
         faults.append(f"nothing is derived for {formula.name}; pass `derived`")
     shown = take(formula.printed, f"the print of {formula.name}", faults) if formula.printed is not None else None
     renamed = renaming(formula.renamed, f"`renamed` of {formula.name}", faults)
     where = renaming(formula.where, f"`where` of {formula.name}", faults)
-    if shown is not None and derived is not None and shown.shape != derived.shape and not formula.errata \
-            and not formula.conventions:
-        faults.append(f"{formula.name} is printed as {_shape(shown)}, derived as {_shape(derived)}; the shapes must be the same")
     printed = shown.replaced(by_name(shown, renamed)) if shown is not None else None
     return _Taken(formula, shown, printed, derived, where) if len(faults) == known else None
 
@@ -68,10 +77,14 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
         return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, None, _shown(taken.derived),
                              (entry,))
     derived, decisions, convention = _best(taken)
+    if decisions[0].how == SHAPE and not formula.errata:
+        faults.append(f"{formula.name} is printed as {_shape(taken.printed)}, derived as {_shape(derived)}"
+                      f"{' in every convention it names' if formula.conventions else ''}; the shapes must be the same")
     errata = [_Errata(e, taken, derived, decisions, faults) for e in formula.errata]
     unreadable = formula.unreadable if isinstance(formula.unreadable, Mapping) else {}
     entries = []
-    shown = taken.printed.rebuilt().entries, derived.rebuilt().entries
+    assert taken.shown is not None
+    shown = taken.shown.rebuilt().entries, derived.rebuilt().entries
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
         printed, right = (shown[0][k], shown[1][k]) if decision.how != SHAPE else (None, None)
         entry = EntryResult(place, Verdict.EQUAL, decision.how, "", printed, right, decision.point, decision.values)
@@ -156,9 +169,12 @@ def _decide(taken: _Taken, derived: Value) -> list[Decision]:
     assert printed is not None
     if printed.shape != derived.shape:
         return [Decision(False, SHAPE)]
-    a, b = (v.replaced(by_name(v, taken.where)).entries for v in (printed, derived))
-    same = canonical(a, b)
-    a, b = tuple(e.xreplace(same) for e in a), tuple(e.xreplace(same) for e in b)
+    try:
+        a, b = (v.replaced(by_name(v, taken.where)).entries for v in (printed, derived))
+        same = canonical(a, b)
+        a, b = tuple(e.xreplace(same) for e in a), tuple(e.xreplace(same) for e in b)
+    except (ValueError, TypeError) as error:  # such as the larger of a complex number and another
+        return [Decision(None, f"SymPy cannot form it with real symbols: {error}") for _ in printed.entries]
     decisions = decide(a, b, taken.formula.decimals)
     if printed.sides is None:
         return decisions

@@ -15,9 +15,13 @@ from symdyn.tape.sympy_bridge import record_expression
 from symdyn.tape.tape import Tape
 
 DIGITS = 50
-# Points that are drawn until enough of them lie where the expressions have real values.
-TRIES = 60
+# Draws until enough points lie where the expressions have real values.
+TRIES = 120
 SEED = 20101
+# Distances from zero: near points lie inside the ranges of roots and arc functions, far ones see where an angle leaves its own.
+NEAR, FAR = (0.2, 1.3), (1.5, 7.0)
+# Of a difference that is rounding nothing remains with twice the digits.
+REMAINDER = 1e-20
 
 
 def context(digits: int = DIGITS) -> Any:
@@ -32,33 +36,47 @@ class Expressions:
 
     def __init__(self, expressions: Sequence[sp.Expr]) -> None:
         recorder = Recorder()
-        symbols = sorted({s.name for e in expressions for s in e.free_symbols})
-        leaves = {name: recorder.leaf(name, 0) for name in symbols}
+        self.names = sorted({s.name for e in expressions for s in e.free_symbols})
+        leaves = {name: recorder.leaf(name, 0) for name in self.names}
         memory: dict[sp.Basic, Any] = {}
         nodes = [record_expression(recorder, e, {s: leaves[s.name] for s in e.free_symbols}, memory) for e in expressions]
-        self.names = symbols
         self.tape = Tape.of(recorder, values=nodes)
+        self.alone = [Tape.of(recorder, values=[node]) for node in nodes]
 
     def at(self, point: Mapping[str, Any], digits: int = DIGITS) -> list[Any]:
         """Real values, None where an expression has none."""
-        try:
-            values = evaluate(self.tape, point, digits)["values"].tolist()
-        except (TypeError, ValueError, OverflowError):  # an order between complex numbers, a function outside its range
-            return [None] * len(self.tape.outputs["values"].entries)
-        return [None if isinstance(v, bool) or hasattr(v, "_mpc_") or not abs(v) < mpmath.inf else v for v in values]
+        together = _values(self.tape, point, digits)
+        if together is None:
+            together = [(_values(tape, point, digits) or [None])[0] for tape in self.alone]
+        return [None if v is None or isinstance(v, bool) or hasattr(v, "_mpc_") or not abs(v) < mpmath.inf else v
+                for v in together]
+
+
+def _values(tape: Tape, point: Mapping[str, Any], digits: int) -> list[Any] | None:
+    """None where one of the expressions orders complex numbers or leaves the range of a function."""
+    try:
+        return evaluate(tape, point, digits)["values"].tolist()  # type: ignore[no-any-return]
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        return None
 
 
 def points(symbols: Iterable[sp.Symbol], seed: int = SEED) -> Iterator[dict[str, Any]]:
-    """Random points, always the same: positive symbols from 0.3 to 1.7, others 0.2 to 1.3 away from zero."""
+    """Random points, always the same, each followed by its mirror image, where all symbols but positive ones change their signs.
+
+    Points with all symbols near zero and with all symbols far from it take turns.
+    """
     own = context()
     stream = random.Random(seed)
     ordered = sorted({s.name: s for s in symbols}.items())
-    for _ in range(TRIES):
-        point = {}
+    for k in range(TRIES):
+        least, most = map(own.mpf, (NEAR, FAR)[k % 2])
+        point, mirror = {}, {}
         for name, symbol in ordered:
             x = own.mpf(stream.getrandbits(160)) / 2**160
-            if symbol.is_positive:
-                point[name] = own.mpf("0.3") + own.mpf("1.4") * x
-            else:
-                point[name] = (own.mpf("0.2") + own.mpf("1.1") * x) * stream.choice((1, -1))
+            size = least + (most - least) * x
+            sign = 1 if symbol.is_positive else stream.choice((1, -1))
+            point[name] = sign * size
+            mirror[name] = size if symbol.is_positive else -sign * size
         yield point
+        if any(not symbol.is_positive for _, symbol in ordered):
+            yield mirror

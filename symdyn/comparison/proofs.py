@@ -5,22 +5,24 @@ Every proof measures a residual, which vanishes for a right formula, at random p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from symdyn.comparison.points import DIGITS, Expressions, context, points
-from symdyn.comparison.values import canonical, take
-from symdyn.errors import CaseError
+from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points
+from symdyn.comparison.values import Value, canonical, renaming, take
+from symdyn.errors import CaseError, SymdynError
 
-POINTS = 3
-# A residual of a right formula is rounding; with decimal fractions in it, that of a float.
-ZERO, ZERO_DECIMAL = 1e-25, 1e-12
-# A residual of a wrong formula must be plainly visible.
-VISIBLE = 1e-6
+POINTS = 4
+# With decimal fractions in it, the residual of a right formula is the rounding of a float, and that of a wrong one stands out.
+ZERO_DECIMAL, VISIBLE = 1e-12, 1e-6
+# Numeric derivatives and balances, relative to what is subtracted.
+ZERO_MEASURED = 1e-25
+# Stands for the value of a formula that has none in a limit.
+INFINITE = sp.Integer(10) ** 30
 Entries = Sequence[tuple[int, ...]] | None
 
 
@@ -33,9 +35,23 @@ class Evidence:
     printed: float
     right: float
     holds: bool
+    blind: tuple[tuple[int, ...], ...] = ()
 
     def __str__(self) -> str:
-        return f"{self.sentence} ({self.kind}: printed {self.printed:.2g}, right {self.right:.2g})"
+        blind = f"; it does not see entries {', '.join(map(str, self.blind))}" if self.blind else ""
+        return f"{self.sentence} ({self.kind}: printed {self.printed:.2g}, right {self.right:.2g}{blind})"
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One entry of a residual: its largest size at the points, whether it vanishes at all of them, whether it is visible at one.
+
+    Entries without real values neither vanish nor are visible.
+    """
+
+    size: float
+    vanishes: bool
+    visible: bool
 
 
 @dataclass(frozen=True)
@@ -53,63 +69,117 @@ class Proof:
     residual: Callable[[Any], Any]
 
     def check(self, printed: Any, right: Any, where: Mapping[str, sp.Expr], entries: Entries = None) -> Evidence:
-        """Measure the residuals; entries: those of the formula that are claimed to be wrong."""
-        of_printed, _ = self.largest(printed, where, entries)
-        of_right, decimal = self.largest(right, where, None)
-        bound = ZERO_DECIMAL if decimal else ZERO
-        holds = of_right is not None and of_right <= bound and of_printed is not None and of_printed >= VISIBLE
-        return Evidence(self.kind, self.sentence, _number(of_printed), _number(of_right), holds)
+        """Measure both. It holds if the residual of the right formula vanishes and that of the print does not; if residuals are
+        entry by entry, that of every entry that is claimed to be wrong.
 
-    def largest(self, formula: Any, where: Mapping[str, sp.Expr], entries: Entries) -> tuple[Any, bool]:
-        """The largest residual relative to 1 + its terms at the points, None if it has no value; whether floats are in it."""
-        faults: list[str] = []
-        taken = take(self.residual(formula), "the residual of a proof", faults)
-        if taken is None:
-            raise CaseError(faults)
-        shape = getattr(formula, "shape", ())
-        own = taken.entries
-        if entries is not None and taken.shape == tuple(shape):
-            places = {tuple(e) for e in entries}
-            own = tuple(e for e, place in zip(own, taken.indices()) if place in places)
-        replaced = [sp.sympify(e.xreplace({s: where[s.name] for s in e.free_symbols if s.name in where})) for e in own]
+        Raises CaseError if the residual cannot be formed.
+        """
+        moving = _names(printed) | _names(right)
+        of_printed, of_right = (self._measured(formula, where, moving) for formula in (printed, right))
+        seen = of_printed
+        blind: tuple[tuple[int, ...], ...] = ()
+        if entries is not None and len(of_printed) == len(_places(printed)):
+            by_place = dict(zip(_places(printed), of_printed))
+            seen = [by_place[tuple(e)] for e in entries]
+            blind = tuple(tuple(e) for e in entries if not by_place[tuple(e)].visible)
+        holds = bool(of_right) and all(r.vanishes for r in of_right) and any(r.visible for r in seen) and not blind
+        return Evidence(self.kind, self.sentence, _largest(seen), _largest(of_right), holds, blind)
+
+    def _measured(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
+        try:
+            return self.measure(formula, where, moving)
+        except SymdynError as error:
+            raise CaseError([f"the proof {self.sentence!r}: {error}"]) from None
+        except Exception as error:  # whatever a user's residual raises is told as its own
+            raise CaseError([f"the proof {self.sentence!r} ended with {type(error).__name__}: {error}"]) from error
+
+    def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
+        """Entry by entry; moving: names of the symbols of both formulas."""
+        residual = _taken(self.residual(formula), "the residual")
+        replaced = [sp.sympify(e.xreplace({s: where[s.name] for s in e.free_symbols if s.name in where}))
+                    for e in residual.entries]
         same = canonical(replaced)
         expressions = [e.xreplace(same) for e in replaced]
         evaluator = Expressions(expressions)
-        worst, found = 0.0, 0
+        found: list[list[Residual]] = []
         for point in points(set(same.values())):
             values = evaluator.at(point)
             if any(v is None for v in values):
                 continue
-            worst = max([worst, *(float(abs(v)) for v in values)])
-            found += 1
-            if found == POINTS or not same:
+            again = evaluator.at(point, 2 * DIGITS)
+            found.append([_residual(v, w, e.has(sp.Float)) for v, w, e in zip(values, again, expressions)])
+            if len(found) == POINTS or not same:
                 break
-        return (worst if found else None), any(e.has(sp.Float) for e in expressions)
+        return _over_points(found, len(expressions))
 
 
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
+def _residual(value: Any, again: Any, decimal: bool) -> Residual:
+    """Of a value, and of the same with twice the digits: rounding shrinks."""
+    size = float(abs(value))
+    if decimal:
+        return Residual(size, size <= ZERO_DECIMAL, size >= VISIBLE)
+    vanishes = value == 0 or (again is not None and abs(again) <= REMAINDER * abs(value))
+    return Residual(size, vanishes, not vanishes)
+
+
+def _over_points(found: list[list[Residual]], n: int) -> list[Residual]:
+    if not found:
+        return [Residual(float("nan"), False, False)] * n
+    return [Residual(max(r.size for r in entry), all(r.vanishes for r in entry), any(r.visible for r in entry))
+            for entry in zip(*found)]
+
+
+def _largest(residuals: list[Residual]) -> float:
+    return max((r.size for r in residuals), default=float("nan"))
+
+
+def _taken(value: Any, what: str) -> Value:
+    faults: list[str] = []
+    taken = take(value, what, faults)
+    if taken is None:
+        raise CaseError(faults)
+    return taken
+
+
+def _names(formula: Any) -> set[str]:
+    return {s.name for s in getattr(formula, "free_symbols", ())}
+
+
+def _places(formula: Any) -> list[tuple[int, ...]]:
+    return _taken(formula, "the formula").indices()
+
+
+def _minus(formula: Any, value: Any, what: str) -> Any:
+    """formula - value, with a message where the shapes differ."""
+    own, other_one = _taken(formula, "the formula"), _taken(value, what)
+    if own.shape != other_one.shape:
+        raise CaseError([f"{what} has the shape {other_one.shape}, the formula {own.shape}; they must be the same"])
+    return own.as_sympy() - other_one.as_sympy()
 
 
 def other(sentence: str, value: Any) -> Proof:
     """Another formulation gives `value`, of the formula's shape; or a function that returns it."""
-    def residual(formula: Any) -> Any:
-        own = value() if callable(value) else value
-        return sp.Matrix(formula) - sp.Matrix(own) if hasattr(formula, "shape") else formula - own
-
-    return Proof("another formulation", sentence, residual)
+    return Proof("another formulation", sentence,
+                 lambda formula: _minus(formula, value() if callable(value) else value, "what the other formulation gives"))
 
 
 def limit(sentence: str, at: Mapping[Any, Any], value: Any) -> Proof:
-    """With these values of symbols the formula must become `value`, of its shape."""
+    """With these values of symbols the formula must become `value`, of its shape.
+
+    Raises CaseError for values that are no expressions.
+    """
+    faults: list[str] = []
+    names = renaming(at, f"the limit {sentence!r}", faults)
+    if faults:
+        raise CaseError(faults)
+
+    def put(e: sp.Expr) -> sp.Expr:
+        return e.subs({s: names[s.name] for s in e.free_symbols if s.name in names}, simultaneous=True)
+
     def residual(formula: Any) -> Any:
-        names = {str(key): sp.sympify(v) for key, v in at.items()}
-
-        def put(e: sp.Expr) -> sp.Expr:
-            return e.subs({s: names[s.name] for s in e.free_symbols if s.name in names}, simultaneous=True)
-
-        there = sp.Matrix(formula).applyfunc(put) if hasattr(formula, "shape") else put(formula)
-        return there - sp.Matrix(value) if hasattr(formula, "shape") else there - sp.sympify(value)
+        own = _taken(formula, "the formula")
+        there = [INFINITE if (limited := put(e)).has(sp.zoo, sp.oo, sp.nan) else limited for e in own.entries]
+        return _minus(sp.Matrix(*own.shape, there) if own.shape else there[0], value, "the value of the limit")
 
     return Proof("limit", sentence, residual)
 
@@ -118,45 +188,34 @@ def dimensions(sentence: str, units: Mapping[Any, Sequence[float]], unit: Sequen
     """The formula must have the unit (kg, m, s) when its symbols have theirs: units = {m: (1, 0, 0), v: (0, 1, -1), ...}.
 
     Symbols that are left out are pure numbers. Every unit is made smaller by a factor of its own, and the value must follow.
+    Raises CaseError for units that are not three numbers.
     """
     factors = (sp.Rational(7, 5), sp.Rational(11, 7), sp.Rational(5, 3))
     powers = {str(key): list(value) for key, value in units.items()}
+    faults = [f"the unit of {name} is {given!r}; pass the exponents of kg, m and s" for name, given in
+              [*powers.items(), ("the formula", list(unit))]
+              if len(given) != 3 or not all(isinstance(e, (int, float, sp.Rational)) for e in given)]
+    if faults:
+        raise CaseError(faults)
 
     def scale(exponents: Sequence[float]) -> sp.Expr:
-        return sp.Mul(*[f ** sp.nsimplify(e) for f, e in zip(factors, exponents, strict=True)])
+        return sp.Mul(*[f ** sp.nsimplify(e) for f, e in zip(factors, exponents)])
+
+    def change(e: sp.Expr) -> sp.Expr:
+        return e.xreplace({s: s * scale(powers[s.name]) for s in e.free_symbols if s.name in powers}) - scale(unit) * e
 
     def residual(formula: Any) -> Any:
-        def change(e: sp.Expr) -> sp.Expr:
-            return e.xreplace({s: s * scale(powers[s.name]) for s in e.free_symbols if s.name in powers}) - scale(unit) * e
-
-        return sp.Matrix(formula).applyfunc(change) if hasattr(formula, "shape") else change(formula)
+        own = _taken(formula, "the formula")
+        changes = [change(e) for e in own.entries]
+        return sp.Matrix(*own.shape, changes) if own.shape else changes[0]
 
     return Proof("dimensions", sentence, residual)
 
 
-@dataclass(frozen=True)
-class _Measured(Proof):
-    """A proof whose residual is measured at each point instead of being an expression."""
-
-    def measure(self, formula: list[sp.Expr], where: Mapping[str, sp.Expr]) -> Iterator[list[Any]]:
-        raise NotImplementedError
-
-    def largest(self, formula: Any, where: Mapping[str, sp.Expr], entries: Entries) -> tuple[Any, bool]:
-        shape = tuple(getattr(formula, "shape", ()))
-        taken = take(formula, "the formula of a proof", [])
-        assert taken is not None
-        worst, found = 0.0, 0
-        for values in self.measure(list(taken.entries), where):
-            if entries is not None and len(values) == len(taken.entries):
-                places = {tuple(e) for e in entries}
-                values = [v for v, place in zip(values, taken.indices() if shape else [()]) if place in places]
-            if any(v is None for v in values):
-                continue
-            worst = max([worst, *(float(abs(v)) for v in values)])
-            found += 1
-            if found == POINTS:
-                break
-        return (worst if found else None), any(e.has(sp.Float) for e in taken.entries)
+def _relative(value: Any, scale: Any) -> Residual:
+    """Of a difference, beside the size of what was subtracted."""
+    size = float(abs(value) / scale) if scale else float(abs(value))
+    return Residual(size, size <= ZERO_MEASURED, size >= VISIBLE)
 
 
 def numeric_derivative(sentence: str, of: Any, order: int = 1) -> Proof:
@@ -164,52 +223,58 @@ def numeric_derivative(sentence: str, of: Any, order: int = 1) -> Proof:
 
     Symbols X, X_dot, X_ddot are a motion and its derivatives, t is the time; all others are constant.
     order   1 or 2
-    Raises CaseError for another order.
+    Raises CaseError for another order, and if `of` is no formula.
     """
     if order not in (1, 2):
         raise CaseError([f"numeric differentiation of order {order} asked for; there are orders 1 and 2"])
-    return _Differentiation("numeric differentiation", sentence, lambda formula: formula, of, order)
+    return _Differentiation("numeric differentiation", sentence, lambda formula: formula,
+                            _taken(of, f"what the proof {sentence!r} differentiates"), order)
 
 
 @dataclass(frozen=True)
-class _Differentiation(_Measured):
-    of: Any = None
+class _Differentiation(Proof):
+    of: Value
     order: int = 1
 
-    def measure(self, formula: list[sp.Expr], where: Mapping[str, sp.Expr]) -> Iterator[list[Any]]:
-        taken = take(self.of, "what is differentiated", [])
-        assert taken is not None and len(taken.entries) == len(formula), "`of` must have the shape of the formula"
-        same = canonical(taken.entries, formula)
-        moving, target = Expressions(taken.entries), Expressions([e.xreplace(same) for e in formula])
+    def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
+        given = _taken(formula, "the formula")
+        if given.shape != self.of.shape:
+            raise CaseError([f"what is differentiated has the shape {self.of.shape}, the formula {given.shape}; they must be the "
+                             "same"])
+        same = canonical(self.of.entries, given.entries)
+        path, target = Expressions(self.of.entries), Expressions([e.xreplace(same) for e in given.entries])
         own = context(2 * DIGITS)
         step = own.mpf(10) ** -(DIGITS * 3 // 5)
-        names = set(moving.names) | set(target.names)
+        names = set(path.names) | set(target.names) | moving
         heads = {n.removesuffix("_dot").removesuffix("_ddot") for n in names if n.endswith(("_dot", "_ddot"))}
         every = {sp.Symbol(n) for n in names | {h + end for h in heads for end in ("", "_dot", "_ddot")}} | set(same.values())
+        found: list[list[Residual]] = []
         for drawn in points(_one_each(every)):
             point = {name: own.mpf(value) for name, value in drawn.items()}
-            known: dict[Any, list[Any]] = {}
 
-            def at(tau: Any, point: dict[str, Any] = point, known: dict[Any, list[Any]] = known) -> list[Any]:
-                if tau not in known:
-                    moved = dict(point)
-                    for head in heads:
-                        q, v, a = (point[head + end] for end in ("", "_dot", "_ddot"))
-                        moved |= {head: q + v * tau + a * tau**2 / 2, f"{head}_dot": v + a * tau}
-                    if "t" in moved:
-                        moved["t"] = point["t"] + tau
-                    known[tau] = moving.at(moved, 2 * DIGITS)
-                return known[tau]
+            def at(tau: Any, point: dict[str, Any] = point) -> list[Any]:
+                moved = dict(point)
+                for head in heads:
+                    q, v, a = (point[head + end] for end in ("", "_dot", "_ddot"))
+                    moved |= {head: q + v * tau + a * tau**2 / 2, f"{head}_dot": v + a * tau}
+                if "t" in moved:
+                    moved["t"] = point["t"] + tau
+                return path.at(moved, 2 * DIGITS)
 
-            values = target.at(point)
-            if any(v is None for v in [*values, *at(own.zero)]):
+            values, three = target.at(point), [at(step), at(own.zero), at(-step)]
+            if any(v is None for v in [*values, *(v for row in three for v in row)]):
                 continue
-            slopes = _central_difference(at(step), at(own.zero), at(-step), step, self.order)
-            yield [x - y for x, y in zip(values, slopes)]
+            slopes = _central_difference(three, step, self.order)
+            scale = max(abs(v) for v in [*values, *slopes])
+            found.append([_relative(x - y, scale) for x, y in zip(values, slopes)])
+            if len(found) == POINTS:
+                break
+        return _over_points(found, len(given.entries))
 
 
-def _central_difference(after: list[Any], here: list[Any], before: list[Any], step: Any, order: int) -> list[Any]:
-    """First or second derivative; the error is of the order of step^2."""
+def _central_difference(three: list[list[Any]], step: Any, order: int) -> list[Any]:
+    """First or second derivative from values after, here and before; the error is of the order of step^2."""
+    after, here, before = three
     if order == 1:
         return [(a - b) / (2 * step) for a, b in zip(after, before)]
     return [(a - 2 * x + b) / step**2 for a, x, b in zip(after, here, before)]
@@ -228,27 +293,31 @@ def energy_balance(sentence: str, coordinates: Sequence[sp.Symbol], energy: Any,
     """The accelerations that solve the equations must change the energy at the rate `power`.
 
     coordinates   whose second derivatives the equations determine
-    energy        E of coordinates, their derivatives (and t)
+    energy        E of coordinates, their derivatives (and t); where a motion is driven, an integral such as Jacobi's does as well
     equations     makes, of the formula, residuals linear in the second derivatives, as many as coordinates; default: the formula
     power         of what is not in the energy, W
+    Raises CaseError for an energy or power that is no expression.
     """
-    return _EnergyBalance("energy balance", sentence, equations or (lambda formula: formula), tuple(coordinates), energy, power)
+    symbols = (coordinates,) if isinstance(coordinates, sp.Symbol) else tuple(coordinates)
+    E, P = (_taken(e, f"the {what} of the proof {sentence!r}").entries[0] for e, what in ((energy, "energy"), (power, "power")))
+    return _EnergyBalance("energy balance", sentence, equations or (lambda formula: formula), symbols, E, P)
 
 
 @dataclass(frozen=True)
-class _EnergyBalance(_Measured):
-    coordinates: tuple[Any, ...] = ()
-    energy: Any = None
-    power: Any = 0
+class _EnergyBalance(Proof):
+    coordinates: tuple[Any, ...]
+    energy: sp.Expr
+    power: sp.Expr
 
-    def largest(self, formula: Any, where: Mapping[str, sp.Expr], entries: Entries) -> tuple[Any, bool]:
-        return super().largest(sp.Matrix([self.residual(formula)]), where, None)
-
-    def measure(self, formula: list[sp.Expr], where: Mapping[str, sp.Expr]) -> Iterator[list[Any]]:
+    def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
         names = [str(q) for q in self.coordinates]
-        plain = canonical(formula, [sp.sympify(self.energy), sp.sympify(self.power)])
-        rows = [e.xreplace(plain) for e in formula]
-        E, P = (sp.sympify(e).xreplace(plain) for e in (self.energy, self.power))
+        residuals = _taken(self.residual(formula), "the equations").entries
+        if len(residuals) != len(names):
+            raise CaseError([f"there are {len(residuals)} equations for the second derivatives of {len(names)} coordinates; pass "
+                             "`equations` or `coordinates` so that there are as many"])
+        plain = canonical(residuals, [self.energy, self.power])
+        rows = [e.xreplace(plain) for e in residuals]
+        E, P = self.energy.xreplace(plain), self.power.xreplace(plain)
         by_name = {s.name: s for s in plain.values()}
 
         def symbol(name: str) -> sp.Symbol:
@@ -261,20 +330,24 @@ class _EnergyBalance(_Measured):
                                    *[sp.diff(E, x) for x in q], *[sp.diff(E, x) for x in v],
                                    sp.diff(E, symbol("t")), P])
         own = context()
+        found: list[list[Residual]] = []
         for point in points({*plain.values(), *q, *v, *a}):
             values = expressions.at(point)
             if any(value is None for value in values):
                 continue
-            A = own.matrix(np.array(values[:n * len(rows)], dtype=object).reshape(len(rows), n).tolist())
-            b = own.matrix(values[n * len(rows):(n + 1) * len(rows)])
-            rest = values[(n + 1) * len(rows):]
+            A = own.matrix(np.array(values[:n * n], dtype=object).reshape(n, n).tolist())
+            rest = values[n * n + n:]
             try:
-                accelerations = own.lu_solve(A, -b)
+                accelerations = own.lu_solve(A, -own.matrix(values[n * n:n * n + n]))
             except ZeroDivisionError:
                 continue
-            rate = sum(E_q * point[x.name] for E_q, x in zip(rest[:n], v))
-            rate += sum(E_v * accelerations[k] for k, E_v in enumerate(rest[n:2 * n]))
-            yield [rate + rest[-2] - rest[-1]]
+            terms = [E_q * point[x.name] for E_q, x in zip(rest[:n], v)]
+            terms += [E_v * accelerations[k] for k, E_v in enumerate(rest[n:2 * n])]
+            terms += [rest[-2], -rest[-1]]
+            found.append([_relative(sum(terms), max(abs(term) for term in terms))])
+            if len(found) == POINTS:
+                break
+        return _over_points(found, 1)
 
 
 __all__ = ["Evidence", "Proof", "dimensions", "energy_balance", "limit", "numeric_derivative", "other"]

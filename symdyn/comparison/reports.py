@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,29 @@ import jinja2
 
 from symdyn.backend.source import template_folders
 from symdyn.comparison.result import COLUMNS, Comparison, Comparisons
-from symdyn.comparison.typeset import SHOWN, corrections, formula_latex, marked, mathml, place, where_latex
+from symdyn.comparison.typeset import (
+    SHOWN,
+    Lines,
+    Places,
+    corrections,
+    formula_latex,
+    marked,
+    mathml,
+    place,
+    where_latex,
+    where_lines,
+    width,
+)
 from symdyn.comparison.verdict import FormulaResult, Verdict
 from symdyn.errors import ArgumentError
+from symdyn.report.latex import letters
 
 FILES = {"comparison.html": "comparison.html", "comparison.tex": "comparison.tex", "errata.html": "errata.html",
          "errata.md": "errata.md"}
+# Letters in a line of a column, and of a page.
+COLUMN, PAGE = 50, 106
+# The same of the list of errata.
+ERRATA_COLUMN, ERRATA_PAGE = 30, 90
 
 
 def write_reports(comparisons: Comparisons, folder: Path) -> list[Path]:
@@ -40,14 +58,25 @@ def report(comparisons: Comparisons, name: str) -> str:
                                      trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
                                      autoescape=ending == "html")
     environment.filters["tex"] = _tex
-    color = "#b00020" if ending == "html" else "wrong"
-    typeset: Callable[[str], Any] = cache(lambda latex: _safe(mathml(latex))) if ending == "html" else str
+    environment.filters["count"] = _count
+    pages = Pages(*((cache(lambda latex: _safe(mathml(latex))), "#b00020") if ending == "html" else (str, "wrong")))
     of_errata = name.startswith("errata")
-    cases = [] if of_errata else [_case(c, typeset, color) for c in comparisons]
-    errata = [e for c in comparisons for e in (_errata(c, typeset) if of_errata else c.errata)]
+    cases = [] if of_errata else [_case(c, pages) for c in comparisons]
+    errata = [e for c in comparisons for e in (_errata(c, pages, ending == "html") if of_errata else c.errata)]
     return environment.get_template(f"report/{name}.jinja").render(
         cases=cases, errata=errata, columns=[(v.name.lower(), text) for v, text in COLUMNS.items()],
         counts={v.name.lower(): comparisons.counts[v] for v in Verdict}, total=sum(comparisons.counts.values()))
+
+
+@dataclass(frozen=True)
+class Pages:
+    """How LaTeX becomes what the report holds, and the colour of what is wrong."""
+
+    typeset: Callable[[str], Any]
+    color: str
+
+    def lines(self, room: float, value: Any, wrong: Places = (), left: str = "") -> list[Any]:
+        return [self.typeset(line) for line in Lines(room, self.color).of(value, wrong, left)]
 
 
 def _safe(text: str) -> Any:
@@ -56,38 +85,58 @@ def _safe(text: str) -> Any:
     return Markup(text)  # made by latex2mathml, which escapes what it is given
 
 
-def _case(case: Comparison, typeset: Callable[[str], Any], color: str) -> dict[str, Any]:
+def _case(case: Comparison, pages: Pages) -> dict[str, Any]:
     return {"name": case.name, "title": case.title, "section": case.slide.section if case.slide else "",
             "counts": {v.name.lower(): case.counts[v] for v in Verdict},
-            "formulas": [_formula(f, typeset, color) for f in case.formulas]}
+            "formulas": [_formula(f, pages) for f in case.formulas]}
 
 
-def _formula(formula: FormulaResult, typeset: Callable[[str], Any], color: str) -> dict[str, Any]:
-    wrong = marked(formula)
-    notes = list(dict.fromkeys(f"{place(e.index)}: {e.note}" if e.verdict is Verdict.UNREADABLE and e.index else e.note
-                               for e in formula.entries if e.note))
+def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
+    name = formula.latex or ""
+    printed = width(formula.printed) + letters(f"{name} = ") if formula.printed is not None else 0
+    derived = width(formula.derived) if formula.derived is not None else 0
+    where = max(map(letters, where_latex(formula)), default=0)
+    wide = max(printed, derived, where) > COLUMN
+    room = PAGE if wide else COLUMN
+    notes = list(dict.fromkeys(": ".join(filter(None, (place(formula, e.index), e.note))) if e.verdict is Verdict.UNREADABLE
+                               else e.note for e in formula.entries if e.note))
     ways = list(dict.fromkeys(e.how for e in formula.entries if e.how))
-    return {"name": formula.name, "latex": typeset(formula.latex) if formula.latex else "", "slide": str(formula.slide),
-            "also": ", ".join(map(str, formula.also)), "verdict": formula.verdict.name.lower(),
+    return {"name": formula.name, "slide": str(formula.slide), "also": ", ".join(map(str, formula.also)), "wide": wide,
+            "verdict": formula.verdict.name.lower(),
             "told": ", ".join(f"{n} {v.value}" if len(formula.entries) > 1 else v.value
                               for v in Verdict if (n := formula.counts[v])),
-            "printed": typeset(formula_latex(formula.printed, wrong, color)) if formula.printed is not None else "",
-            "derived": typeset(formula_latex(formula.derived)) if formula.derived is not None else "",
-            "where": typeset(where_latex(formula)) if formula.where else "", "notes": notes, "ways": ", ".join(ways),
+            "printed": pages.lines(room, formula.printed, marked(formula), name) if formula.printed is not None
+            else [pages.typeset(name)] if name else [],
+            "derived": pages.lines(room, formula.derived) if formula.derived is not None else [],
+            "where": [pages.typeset(line) for line in where_lines(formula, room)], "notes": notes,
+            "ways": ", ".join([*ways, "on the states told"] if formula.where and ways else ways),
             "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
 
 
-def _errata(case: Comparison, typeset: Callable[[str], Any]) -> list[dict[str, Any]]:
+def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]]:
+    """broken: formulas are lists of lines that fit the page, otherwise one line each."""
     rows = []
     for formula, erratum in case.errata:
-        evidence = erratum.evidence
-        rows.append({"case": case.name, "formula": formula.name, "slide": formula.slide, "why": erratum.why,
-                     "also": ", ".join(map(str, formula.also)), "kind": evidence.kind, "sentence": evidence.sentence,
+        evidence, found = erratum.evidence, corrections(formula, erratum.entries)
+        wide = any(max(width(c.printed), width(c.right)) > ERRATA_COLUMN for c in found)
+        room = ERRATA_PAGE if wide else ERRATA_COLUMN
+        slide = f"{formula.slide.section} {formula.slide.title}".strip()
+        letters = formula.latex or ""
+        rows.append({"case": case.name, "formula": formula.name,
+                     "latex": [pages.typeset(letters)] if broken and letters else letters, "slide": slide or case.title or case.name, "why": erratum.why,
+                     "line": formula.slide.line, "also": ", ".join(map(str, formula.also)), "wide": wide,
+                     "kind": evidence.kind, "sentence": evidence.sentence.rstrip(".") + ".",
                      "printed_residual": f"{evidence.printed:.2g}", "right_residual": _rounding(evidence.right),
                      "more": max(len(erratum.entries) - SHOWN, 0) if not isinstance(formula.printed, tuple) else 0,
-                     "corrections": [{"place": where, "printed": typeset(a), "right": typeset(b)}
-                                     for where, a, b in corrections(formula, erratum.entries)]})
+                     "corrections": [{"place": c.place,
+                                      "printed": pages.lines(room, c.printed, c.wrong) if broken else formula_latex(c.printed),
+                                      "right": pages.lines(room, c.right) if broken else formula_latex(c.right)}
+                                     for c in found]})
     return rows
+
+
+def _count(n: int, one: str, many: str) -> str:
+    return f"{n} {one if n == 1 else many}"
 
 
 def _rounding(residual: float) -> str:

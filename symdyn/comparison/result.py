@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
 
 from symdyn.comparison.case import Slide
 from symdyn.comparison.verdict import ErratumResult, FormulaResult, Verdict
@@ -44,13 +48,17 @@ class Comparison:
         lines = [head]
         for f in self.formulas:
             line = f"{f.slide.line:>6}  " if f.slide.line is not None else ""
-            lines.append(f"  {f.name:{width}}  {line}{_told(f.counts)}")
+            lines.append(f"  {f.name:{width}}  {line}{_told(f.counts)}{', on the states told' if f.where else ''}")
             lines += [f"    {text}" for text in _remarks(f)]
         lines.append(f"  {_total(self.counts)}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
         return str(self)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the reports on this case alone into a folder; see Comparisons.write."""
+        return Comparisons((self,), self.seconds).write(folder)
 
     def _repr_html_(self) -> str:
         from symdyn.comparison.html import comparison_html
@@ -75,6 +83,15 @@ class Comparisons:
         """Whether every entry has a verdict that stands."""
         return all(c.decided for c in self.cases)
 
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the reports into a folder: a page, a LaTeX document, the errata as a page and as text; returns their paths.
+
+        Raises ArgumentError if the folder cannot be made, MissingExtra without latex2mathml.
+        """
+        from symdyn.comparison.reports import write_reports
+
+        return write_reports(self, Path(folder))
+
     def rows(self) -> list[tuple[str, ...]]:
         """The table: a head, then case, section, formulas and number of entries of each verdict."""
         head = ("case", "section", "formulas", *COLUMNS.values())
@@ -95,7 +112,8 @@ class Comparisons:
         width = max(len(row[0]) for row in rows)
         lines = [f"{row[0]:{width}}{row[1]:>8}{row[2]:>9}" + "".join(f"{text:>12}" for text in row[3:]) for row in (head, *rows)]
         errors = sum(len(c.errata) for c in self.cases)
-        lines.append(f"{len(self.cases)} cases, {sum(self.counts.values())} entries in {self.seconds:.0f} s; {errors} errata")
+        lines.append(f"{_number(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
+                     f"{_number(errors, 'erratum', 'errata')}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -112,7 +130,9 @@ def _remarks(formula: FormulaResult) -> list[str]:
     said: dict[str, None] = {}
     for entry in formula.entries:
         if entry.verdict is Verdict.WRONG:
-            lines.append(f"  {_place(entry.index)}printed {entry.printed}, right {entry.right}")
+            whole = entry.printed is None  # of another shape than the right form
+            printed, right = (formula.printed, formula.derived) if whole else (entry.printed, entry.right)
+            lines.append(f"  {_place(entry.index)}printed {_text(printed)}, right {_text(right)}")
         elif entry.verdict is Verdict.DIFFERENT:
             where = ", ".join(f"{name} = {value:.3g}" for name, value in (entry.point or {}).items())
             there = "" if entry.values is None else f"; printed {entry.values[0]:.6g}, derived {entry.values[1]:.6g} at {where}"
@@ -126,8 +146,22 @@ def _place(index: tuple[int, ...]) -> str:
     return f"[{', '.join(map(str, index))}] " if index else ""
 
 
+def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return " = ".join(map(_text, value))
+    return str(value.tolist()) if isinstance(value, sp.MatrixBase) else str(value)
+
+
+def _number(n: int, one: str, many: str) -> str:
+    return f"{n} {one if n == 1 else many}"
+
+
+def _entries(counts: Counter[Verdict]) -> str:
+    return _number(sum(counts.values()), "entry", "entries")
+
+
 def _total(counts: Counter[Verdict]) -> str:
-    return f"{sum(counts.values())} entries: {_told(counts)}"
+    return f"{_entries(counts)}: {_told(counts)}"
 
 
 def _told(counts: Counter[Verdict]) -> str:

@@ -3,50 +3,59 @@
 from __future__ import annotations
 
 import difflib
+import re
 import time as clock
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import overload
+from typing import Any, overload
 
 from symdyn.comparison.case import Case
 from symdyn.comparison.judge import judge
 from symdyn.comparison.result import Comparison, Comparisons
 from symdyn.errors import CaseError, UnknownCase
 
+_SECTION = re.compile(r"\d+(\.\d+)*")
+
 
 @overload
-def compare(case: Case | str) -> Comparison: ...  # type: ignore[overload-overlap]  # text is iterable too
+def compare(case: Case) -> Comparison: ...
+
+
+@overload
+def compare(case: str) -> Any: ...  # a Comparison, of a section Comparisons
 
 
 @overload
 def compare(case: Iterable[Case | str]) -> Comparisons: ...
 
 
-def compare(case: Case | str | Iterable[Case | str]) -> Comparison | Comparisons:
+def compare(case: Case | str | Iterable[Case | str]) -> Any:
     """What slides print beside what symdyn derives, entry by entry, with a verdict each.
 
-    case   the name of a case of the lecture ("pendulum-augmented"; names: symdyn.lecture.names()), a Case of your own, or
-           several of them
+    case   a Case of your own; the name of a case of the lecture ("pendulum-augmented"; names: symdyn.lecture.names()); a section
+           or a chapter of it ("3.5", "3"), for all of its cases; or several of these
+    Returns a Comparison of one case, Comparisons of a section or of several.
 
     Raises UnknownCase (the nearest names are offered) and CaseError with every fault of a case.
     """
-    if isinstance(case, (str, Case)):
-        return _compared(_find(case))
+    if isinstance(case, Case):
+        return _compared(case)
     if not isinstance(case, Iterable):
-        raise CaseError([f"compare takes a name, a Case or several of them, found {case!r} of type {type(case).__name__}"])
+        raise CaseError([_neither(case)])
     start = clock.monotonic()
-    return Comparisons(tuple(_compared(_find(c)) for c in case), clock.monotonic() - start)
+    cases = find([case] if isinstance(case, str) else case)
+    if isinstance(case, str) and not _SECTION.fullmatch(case):
+        return _compared(cases[0])
+    return Comparisons(tuple(map(_compared, cases)), clock.monotonic() - start)
 
 
 def compare_lecture(names: Sequence[str] | None = None, jobs: int = 1) -> Comparisons:
-    """Cases of the lecture, all of them or those named, on `jobs` processes."""
+    """Cases of the lecture, all of them or those of the names, sections and chapters given, on `jobs` processes."""
     from symdyn.lecture import cases
 
     start = clock.monotonic()
-    chosen = list(names) if names is not None else [c.name for c in cases()]
-    for name in chosen:
-        _find(name)
+    chosen = list(dict.fromkeys(c.name for c in (find(names) if names is not None else cases())))
     if jobs == 1:
         results = [_named(name) for name in chosen]
     else:
@@ -55,26 +64,47 @@ def compare_lecture(names: Sequence[str] | None = None, jobs: int = 1) -> Compar
     return Comparisons(tuple(results), clock.monotonic() - start)
 
 
-def _named(name: str) -> Comparison:
-    return _compared(_find(name))
+def find(cases: Iterable[Case | str]) -> list[Case]:
+    """The cases themselves; for names those of the lecture, for a section or a chapter all of it.
+
+    Raises UnknownCase, and CaseError for anything else.
+    """
+    return [found for case in cases for found in ([case] if isinstance(case, Case) else _of_lecture(case))]
 
 
-def _find(case: Case | str) -> Case:
-    if isinstance(case, Case):
-        return case
-    if not isinstance(case, str):
-        raise CaseError([f"compare takes a name, a Case or several of them, found {case!r} of type {type(case).__name__}"])
+def _of_lecture(name: Any) -> list[Case]:
+    if not isinstance(name, str):
+        raise CaseError([_neither(name)])
     from symdyn.lecture import cases
 
     there = {c.name: c for c in cases()}
-    if case in there:
-        return there[case]
-    near = difflib.get_close_matches(case, there, n=4, cutoff=0.4) or sorted(n for n in there if case.lower() in n)[:4]
-    offer = f"the nearest are {', '.join(near)}" if near else f"there are {len(there)}, listed by `symdyn compare --list`"
-    raise UnknownCase(f"there is no case {case!r}; {offer}")
+    if name in there:
+        return [there[name]]
+    if _SECTION.fullmatch(name):
+        found = [c for c in cases() if c.slide is not None and f"{c.slide.section}.".startswith(f"{name}.")]
+        if found:
+            return found
+        sections = dict.fromkeys(c.slide.section for c in cases() if c.slide is not None)
+        raise UnknownCase(f"there is no case of section {name}; sections with cases are {', '.join(sections)}")
+    near = difflib.get_close_matches(name, there, n=4, cutoff=0.4) or sorted(n for n in there if name.lower() in n)[:4]
+    offer = f"the nearest are {', '.join(near)}" if near else f"there are {len(there)}; `symdyn compare` lists them"
+    raise UnknownCase(f"there is no case {name!r}; {offer}")
+
+
+def _neither(found: Any) -> str:
+    return f"compare takes a name, a Case or several of them, found {found!r:.80} of type {type(found).__name__}"
+
+
+def _named(name: str) -> Comparison:
+    return _compared(find([name])[0])
 
 
 def _compared(case: Case) -> Comparison:
     start = clock.monotonic()
-    formulas = judge(case)
+    try:
+        formulas = judge(case)
+    except CaseError as error:
+        if error.name:
+            raise
+        raise CaseError(error.faults, case.name) from error.__cause__
     return Comparison(case.name, case.title, case.slide or formulas[0].slide, formulas, clock.monotonic() - start)

@@ -52,9 +52,10 @@ def angular_velocity() -> list[Formula]:
     columns = [sp.Matrix([1, 0, 0]), sp.Matrix([0, cos(phi), sin(phi)]),
                sp.Matrix([sin(theta), -sin(phi) * cos(theta), cos(phi) * cos(theta)])]
     w = sp.Matrix(sp.symbols("omega_1:4"))
+    # While the angles are zero, the three axes of rotation are those of the n-frame.
+    upright = {**dict.fromkeys(turning, 0), **dict(zip((angle.dot for angle in turning), w, strict=True))}
     return [
-        Formula("sum along e", w[0] * x_axis + w[1] * y_axis + w[2] * z_axis, sd.rotation.vee(sd.rotation.skew(w)), line=2857,
-                also=(2849,)),
+        Formula("sum along e", w[0] * x_axis + w[1] * y_axis + w[2] * z_axis, omega.subs(upright), line=2857, also=(2849,)),
         Formula("along the turned axes", n_x * rates[0] + n_y * rates[1] + n_z * rates[2], omega, line=2873, also=(2882,)),
         Formula("with the matrices",
                 one * x_axis * rates[0] + one * R_01 * y_axis * rates[1] + one * R_01 * R_12 * z_axis * rates[2],

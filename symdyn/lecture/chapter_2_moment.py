@@ -87,6 +87,8 @@ def forces() -> list[Formula]:
     turned = sd.rotation.about("Z", theta) * sp.Matrix([size_f, 0, 0])
     size = equivalent_force_system(turned, [size_r, 0, 0]).moment[2]
     letters = along
+    # Along the force and across it: the distance of O from the line of the force is the component across.
+    arm = -(sd.rotation.about("Z", theta).T * sp.Matrix([size_r, 0, 0]))[1]
     return [
         Formula("moment of all forces", r1.cross(F1 + f12) + r2.cross(F2 + f21), total, line=2367, also=(2435,),
                 latex=r"\Sigma M_O", renamed=letters),
@@ -94,6 +96,8 @@ def forces() -> list[Formula]:
         *[Formula(f"size of the moment of {f}", sp.Symbol(f) * sp.Symbol(r) * sp.sin(sp.Symbol(angle)), size, line=line,
                   renamed={f: size_f, r: size_r, angle: theta})
           for f, r, angle, line in (("f_12", "r_1O", "theta_1", 2408), ("f_21", "r_2O", "theta_2", 2415))],
+        *[Formula(f"size of the moment of {f} by the arm", sp.Symbol(f) * sp.Symbol("l"), size, line=line,
+                  renamed={f: size_f, "l": arm}) for f, line in (("f_12", 2408), ("f_21", 2415))],
         Formula("multiplied out", r1.cross(F1) + r1.cross(f12) + r2.cross(F2) + r2.cross(f21), total, line=2437, renamed=letters),
         Formula("f_12 replaced", r1.cross(F1) - r2.cross(f21) + r2.cross(F2) + r2.cross(f21), total, line=2441, renamed=letters),
         Formula("moment of the outer forces", r1.cross(F1) + r2.cross(F2), total, line=2443, also=(2427,), latex=r"\Sigma M_O"),

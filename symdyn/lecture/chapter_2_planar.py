@@ -6,6 +6,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Formula, Slide
+from symdyn.comparison.conventions import Convention
 from symdyn.frames.rigid_body import equivalent_force_system, moment_equation, point_inertia
 from symdyn.lecture.letters import constant, ddot, dot, moving, stands_for, symmetric
 
@@ -34,7 +35,17 @@ def equations_of_motion() -> list[Formula]:
     at_G = equivalent_force_system(FLAT * F, P)
     w = b.angular_velocity(components=b)
     third = sp.Matrix([0, 0, theta.ddot])
+    # A frame that turns as the body does, with its origin at E: what the dots over components in the b-frame say in 1.7.
+    about_E = b.root.frame("e", rotation=R)
+    from_E = about_E.point("G", list(R.T * sp.Matrix([x, y, 0])))
+    parts = from_E.acceleration_parts(through=about_E, seen_from=b.root, components=about_E)
+    seen_from_n = Convention("rate of a vector",
+                             "The dots are rates seen from the n-frame, taken in the b-frame; in 1.7 those of the components.",
+                             lambda a: a - parts.euler - parts.centripetal - parts.coriolis)
+    second_rate = stands_for(rG, R.T * sp.Matrix([x, y, 0]), dots=2)
     return [
+        Formula("acceleration in the force equation", ddot(rG), b.acceleration(seen_from=b.root, components=b), line=2658,
+                conventions=[seen_from_n], renamed=second_rate, latex=r"{}^b\ddot{r}_{G/E}"),
         Formula("force equation", (m * FLAT * ddot(rG), FLAT * F), (b_needs, b_has), line=2658, renamed=acceleration),
         Formula("force at G", FLAT * F, at_G.force, line=2662, also=(2697,), latex=r"{}^bF_G"),
         Formula("moment equation", (I_G * third, P.cross(FLAT * F)), (sp.Matrix([0, 0, needs[2]]), sp.Matrix([0, 0, has[2]])),

@@ -62,9 +62,10 @@ def _vector_and_frame() -> list[Formula]:
     b = n.frame("b", rotation=sd.rotation.about(list(a), phi))
     turned = b.point("P'", list(r))
     in_n, in_b = turned.position(of=n, components=n), turned.position(of=b, components=b)
-    half_turn = proofs.limit("A half turn about z carries P to the opposite side.", at={phi: sp.pi, a_x: 0, a_y: 0, a_z: 1},
-                             value=[-r_x, -r_y, r_z])
-    rotated = Erratum("The components of P' in b are those of P in n; in n those of P' are R times them.", half_turn)
+    third = 1 / sp.sqrt(3)
+    third_turn = proofs.limit("A third of a turn about the diagonal (1, 1, 1) carries x to y, y to z and z to x.",
+                              at={phi: 2 * sp.pi / 3, a_x: third, a_y: third, a_z: third}, value=[r_z, r_x, r_y])
+    rotated = Erratum("The components of P' in b are those of P in n; in n those of P' are R times them.", third_turn)
     return [
         Formula("components of P' in n", b.rotation(n) * in_b, in_n, line=6621, also=(6635, 6842), latex="{}^nr_{P'/E}"),
         Formula("components of P' in n, those of P' in b", in_b, in_n, line=6639, errata=[rotated], latex="{}^nr_{P'/E}"),

@@ -9,8 +9,8 @@ import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, conventions, proofs
 from symdyn.lecture.chapter_4_xyz_angles import G, gamma_dot, phi, psi, theta
 
-# The angles of an infinitesimal rotation have a prime.
-small = sd.coordinates("phi' theta' psi'")
+# The angles of an infinitesimal rotation have a prime; SymPy typesets the names so.
+small = sd.coordinates("phiprime thetaprime psiprime")
 phi_, theta_, psi_ = small
 
 TO_B = conventions.transposed("The slide's rotations take components in n to components in b.")

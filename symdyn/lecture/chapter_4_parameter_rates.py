@@ -90,10 +90,12 @@ def _angular_velocity_matrix() -> list[Formula]:
     turned = sd.rotation.from_parameters(p)
     E_bar_d = sd.rate(E_bar)
     c, s = cos(phi / 2), sin(phi / 2)
-    about_z = proofs.limit("The rotation about z with the rate phi_dot has omega = (0, 0, phi_dot).",
-                           at=dict(zip([*p, *pd], [c, 0, 0, s, -s * phi.dot / 2, 0, 0, c * phi.dot / 2])),
-                           value=[[0, -phi.dot, 0], [phi.dot, 0, 0], [0, 0, 0]])
-    bar = Erratum("The second factor is E^T without the bar, as the slides prove; 2 E_dot E_bar^T is R_dot.", about_z)
+    third = 1 / sp.sqrt(3)
+    rates = [-s * phi.dot / 2, *[third * c * phi.dot / 2] * 3]
+    about_diagonal = proofs.limit("The rotation about (1, 1, 1) with the rate phi_dot has omega along it, of that size.",
+                                  at=dict(zip([*p, *pd], [c, *[third * s] * 3, *rates])),
+                                  value=third * phi.dot * sp.Matrix([[0, -1, 1], [1, 0, -1], [-1, 1, 0]]))
+    bar = Erratum("The second factor is E^T without the bar, as the slides prove; 2 E_dot E_bar^T is R_dot.", about_diagonal)
     projector = I_4 + p * p.T
     matrix: dict[str, Any] = {"where": NORM, "latex": r"{}^n\tilde\omega_{b/n}"}
     rate: dict[str, Any] = {"where": NORM, "latex": r"{}^n\dot R_b"}

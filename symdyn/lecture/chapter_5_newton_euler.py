@@ -46,8 +46,8 @@ class PlanarArm:
         """Moment and force "f" through the joint or "f_G" resultant at the centre of mass, n-components, without weight."""
         R = (self.b1, self.b2)[link - 1].rotation(self.n)
         wrench = self.equations.explicit(f"{name}_{link}", simplify=False).subs(sp.Symbol("g"), 0)
-        # The moment of link 2 is short when simplified, and is printed where the slide is wrong.
-        moment = wrench[2] if link == 1 else simplified(wrench[2], 1.0)
+        # Those that are printed where the slide is wrong are short when simplified; the moment in joint 1 is not.
+        moment = wrench[2] if (link, name) == (1, "f") else simplified(wrench[2], 1.0)
         return R * sp.Matrix([*wrench[:2], moment]), R * wrench[3:, :]
 
     @cached_property
@@ -84,7 +84,7 @@ def accelerations() -> list[Formula]:
         "Link 2 turns with omega_b2/n, and the slide lets it turn with omega_b2/b1, so that the turning of link 1 is missing.",
         numeric_derivative("it must be the second derivative of the position of G_2", of=a.G2.position(a.n), order=2))
     one_dot = Erratum(
-        "An angular acceleration is the first derivative of an angular velocity; with two dots it is a rate of it.",
+        "The next step needs angular accelerations, the first derivatives of omega; the slide puts two dots on every omega.",
         dimensions("an angular acceleration has the unit 1/s^2", UNITS, (0, 0, -2)))
     third = sp.symbols("q1_dddot") + sp.symbols("q2_dddot")
     return [
@@ -113,10 +113,19 @@ def resultants() -> list[Formula]:
     (M_1, F_1), (M_2, F_2) = a.force(1, "f_G"), a.force(2, "f_G")
     alpha_1, alpha_2 = a.b1.angular_acceleration(a.n), a.b2.angular_acceleration(a.n)
     third_1, third_2 = sp.symbols("q1_dddot q2_dddot")
-    two_dots = Erratum("A moment is I times the first derivative of omega, and the slide puts two dots on omega.",
+    two_dots = Erratum("A moment is I times the first derivative of omega; two dots are right only on an angle, which the line "
+                       "prints for omega besides.",
                        dimensions("a moment has the unit kg m^2/s^2", UNITS, (1, 2, -2)))
     newton = r"\mathbf F_{{G_{0}}}", r"\mathbf M_{{G_{0}}}"
+    given = sp.Matrix([a.equations.symbols.coordinates[1]])
+    turned = Erratum(
+        "Given is theta_b2/b1, the angle of link 2 against link 1; with the indices exchanged it has the other sign.",
+        Proof("rotation", "turning about z by it must take b2- to b1-components",
+              lambda angle: sd.rotation.about("Z", sp.Matrix(angle)[0]) - a.b2.rotation(a.b1)))
     return [
+        # theta_b1/b2, of link 1 against link 2
+        Formula("angle of link 2 that is given", -given, given, line=7756, also=(7815, 8022), latex=r"\theta_{b_2/b_1}",
+                errata=[turned]),
         Formula("F_G1", a.m1 * a.G1.acceleration(a.n), F_1, line=7772, also=(8061,), latex=newton[0].format(1)),
         Formula("F_G2", a.m2 * a.G2.acceleration(a.n), F_2, line=7774, also=(8063,), latex=newton[0].format(2)),
         Formula("M_G1", a.I1 * along_z(third_1), M_1, line=7772, latex=newton[1].format(1), errata=[two_dots]),

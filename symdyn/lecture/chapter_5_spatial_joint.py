@@ -76,7 +76,7 @@ def at_center() -> list[Formula]:
     v_motion = block([[tilde(s.omega), 0], [tilde(s.v), tilde(s.omega)]])
     v_force = block([[tilde(s.omega), tilde(s.v)], [0, tilde(s.omega)]])
     motion_for_force = Erratum(
-        "I v is a momentum, which turns like a force, with v x*; v x is for motions and adds v x I omega to the force.",
+        "I v is a momentum, which turns like a force, with v x*; here the star of line 8859 is missing, and v x is for motions.",
         Proof("limit", "with m2 = 0 the lower half must vanish, since without mass no force is needed",
               lambda f: sp.Matrix(f)[3:, :].applyfunc(lambda e: e.subs({s: 0 for s in e.free_symbols if s.name == "m2"}))))
     latex = r"{}^{b_{G2}}\hat{\mathbf f}^B_{G_2}"

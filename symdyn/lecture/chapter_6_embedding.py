@@ -78,7 +78,8 @@ def embedding() -> list[Formula]:
         Formula("M_bar", J.T * MJ, M_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{M}"),
         Formula("k_bar", k_bar, k_tilde, line=11865, also=(11881, 12149), latex=r"\bar{k}"),
         Formula("F_bar", J.T * forces, F_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{F}"),
-        Formula("equations of motion", M_qdd + k_bar - J.T * forces, equations, line=11885, also=(11863, 11879, 12147, 12167)),
+        Formula("equations of motion", M_qdd + k_bar - J.T * forces, equations, line=11885, also=(11863, 11879, 12147, 12161,
+                12167, 12177)),
         Formula("k_bar of chapter 6.3, upright", k_without_dot.xreplace(upright), k_tilde.xreplace(upright), slide=again,
                 also=(12179,), errata=[lost_dot], latex=r"\bar{k}"),
     ]

@@ -65,7 +65,9 @@ class Body:
 
 def platform() -> list[Formula]:
     P = Body("P")
-    w, r = P.omega, constant("r")
+    w, r, chi = P.omega, constant("r"), moving("chi_P")
+    # chi has the integrals of omega, line 11650.
+    s_dot = sd.rate(sp.Matrix.vstack(P.r, chi)).xreplace(dict(zip(dot(chi), w, strict=True)))
     matrix = P.needed.jacobian(P.s_ddot)
     rest = P.needed.xreplace(dict.fromkeys(P.s_ddot, sp.S.Zero))
     derived = (P.needed, P.forces)
@@ -81,7 +83,7 @@ def platform() -> list[Formula]:
                 also=(11697, 11706, 11720, 11985, 11987, 11996, 12010)),
         Formula("omega tilde", skew(w), sd.rotation.skew(w), line=11702, also=(11992,), latex=r"\tilde{\omega}"),
         Formula("omega x r", skew(w) * r, w.cross(r), line=11702, also=(11992,), latex=r"\omega \times r"),
-        Formula("s_dot", [*dot(P.r), *w], P.s_dot, line=11708, also=(11998,), latex=r"\dot{s}_P"),
+        Formula("s_dot", [*dot(P.r), *w], s_dot, line=11708, also=(11998,), latex=r"\dot{s}_P"),
         Formula("s_ddot", [*ddot(P.r), *dot(w)], sd.rate(P.s_dot), line=11710, also=(12000,), latex=r"\ddot{s}_P"),
     ]
 

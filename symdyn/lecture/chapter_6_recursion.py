@@ -10,6 +10,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.comparison import Case, Formula, Slide
 from symdyn.lecture.letters import skew
+from symdyn.lecture.propagation_letters import typeset
 
 LINKS = (1, 2, 3)
 g = sp.Symbol("g", positive=True)
@@ -103,11 +104,14 @@ def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] 
         # Nothing hangs on the last link: f_4 = 0.
         beyond = chain.of("X_star", link + 1) * chain.of("f", link + 1) if link < 3 else sp.zeros(6, 1)
         found += [
-            Formula(f"a_{link}", chain.acceleration(link), chain.of("a", link), line=line, also=also[0]),
-            Formula(f"f_{link}^B", chain.own_force(link), own, line=line + 2, also=also[1]),
-            Formula(f"f_{link}", own + beyond, chain.of("f", link), line=line + 4, also=also[2]),
+            Formula(f"a_{link}", chain.acceleration(link), chain.of("a", link), line=line, also=also[0],
+                    latex=typeset(_acceleration(link))),
+            Formula(f"f_{link}^B", chain.own_force(link), own, line=line + 2, also=also[1],
+                    latex=typeset(f"f{link}B = I{link} a{link} + p{link}")),
+            Formula(f"f_{link}", own + beyond, chain.of("f", link), line=line + 4, also=also[2],
+                    latex=typeset(f"f{link} = f{link}B + {link}X{link + 1}* f{link + 1}")),
             Formula(f"tau_{link}", chain.of("S", link).T * chain.of("f", link), chain.needed[link - 1], line=line + 6,
-                    also=also[3]),
+                    also=also[3], latex=typeset(f"tau_{link} = S{link}^T f{link}")),
         ]
     return found
 
@@ -136,12 +140,18 @@ def forward_dynamics() -> list[Formula]:
         I_A, p_A = (of(name, link) for name in (("I", "p") if link == 3 else ("I_A", "p_A")))
         before = chain.a_0 if link == 1 else of("a", link - 1)
         inertia = (S.T * I_A * S)[0]
+        I, p = ("I3", "p3") if link == 3 else (f"I{link}A", f"p{link}A")
         found += [
-            Formula(f"a_{link}", X * before + S * chain.qdd[link - 1] + c, of("a", link), line=line),
-            Formula(f"f_{link}", I_A * of("a", link) + p_A, f, line=line + 2, where=given),
-            Formula(f"tau_{link}", S.T * f, chain.needed[link - 1], line=line + 4),
+            Formula(f"a_{link}", X * before + S * chain.qdd[link - 1] + c, of("a", link), line=line,
+                    latex=typeset(_acceleration(link))),
+            Formula(f"f_{link}", I_A * of("a", link) + p_A, f, line=line + 2, where=given,
+                    latex=typeset(f"f{link} = {I} a{link} + {p}")),
+            Formula(f"tau_{link}", S.T * f, chain.needed[link - 1], line=line + 4,
+                    latex=typeset(f"tau_{link} = S{link}^T f{link}")),
             Formula(f"qdd_{link}", (sp.Symbol(f"tau_{link}") - (S.T * (I_A * (X * before + c) + p_A))[0]) / inertia,
-                    chain.qdd[link - 1][0], line=line + 6, where=given, latex=rf"\ddot{{q}}_{link}"),
+                    chain.qdd[link - 1][0], line=line + 6, where=given,
+                    latex=typeset(f"q{link}'' = (S{link}^T {I} S{link})^-1 "
+                                  f"(tau_{link} - S{link}^T ({I} ({link}X{link - 1} a{link - 1} + c{link}) + {p}))")),
         ]
     for link in (1, 2):
         last = link == 2
@@ -149,13 +159,21 @@ def forward_dynamics() -> list[Formula]:
         X, X_star, S, c = (of(name, link + 1) for name in ("X", "X_star", "S", "c"))
         inverse = sp.Matrix([1 / (S.T * I_A * S)[0]])
         force = sp.Matrix([sp.Symbol(f"tau_{link + 1}")]) - S.T * (I_A * c + p_A)
+        n, I, p = link + 1, *(("I3", "p3") if last else ("I2A", "p2A"))
+        back = f"{link}X{n}* {I} S{n} (S{n}^T {I} S{n})^-1"
         found += [
             Formula(f"I_{link}^A", of("I", link) + X_star * I_A * X - X_star * I_A * S * inverse * S.T * I_A * X, of("I_A", link),
-                    line=12344),
+                    line=12344, latex=typeset(f"I{link}A = I{link} + {link}X{n}* {I} {n}X{link} - {back} S{n}^T {I} {n}X{link}")),
             Formula(f"p_{link}^A", of("p", link) + X_star * p_A + X_star * I_A * c + X_star * I_A * S * inverse * force,
-                    of("p_A", link), line=12345),
+                    of("p_A", link), line=12345,
+                    latex=typeset(f"p{link}A = p{link} + {link}X{n}* {p} + {link}X{n}* {I} c{n}"
+                                  f" + {back} (tau_{n} - S{n}^T ({I} c{n} + {p}))")),
         ]
     return found
+
+
+def _acceleration(link: int) -> str:
+    return f"a{link} = {link}X{link - 1} a{link - 1} + S{link} q{link}'' + c{link}"
 
 
 CASES = (

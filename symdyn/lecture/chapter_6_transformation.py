@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import sympy as sp
+from sympy.physics.vector import ReferenceFrame
 
 import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, conventions, proofs
@@ -69,6 +70,13 @@ class Platform:
         return sp.Matrix.vstack(position.jacobian(q), omega.jacobian(self.qd))
 
 
+def turned_arm() -> sp.Matrix:
+    """c in the n-frame, turned by the frames of SymPy."""
+    n = ReferenceFrame("n")
+    b = n.orientnew("b", "Body", (psi, theta, phi), "ZYX")
+    return sp.Matrix((c[0] * b.x + c[1] * b.y + c[2] * b.z).to_matrix(n))
+
+
 def to_G() -> list[Formula]:
     """Chapter 6.2; r_O/G is O seen from G, as everywhere in the lecture."""
     p = Platform()
@@ -81,11 +89,11 @@ def to_G() -> list[Formula]:
     letters = stands_for(r_OG, -c)
     J_derived = sp.Matrix.vstack(velocity, p.frame.angular_velocity()).jacobian(p.qd)
     why = "The arm from O to G is r_G/O; r_O/G points the other way."
-    upright = proofs.limit("At the upright attitude G stands at r_O + c.", at={psi: 0, theta: 0, phi: 0}, value=rO + c)
+    turned = proofs.other("G is where the frames of SymPy carry c from O.", rO + turned_arm())
     moved = proofs.numeric_derivative("It is the rate of the position of G.", of=rO + p.R * c)
     J_right = proofs.other("Derivatives of the position of G and of the rotation by the coordinates.", p.by_positions)
     return [
-        Formula("r_G", rO + arm, position, line=11811, errata=[Erratum(why, upright)], latex="r_{G_P/E}", renamed=letters),
+        Formula("r_G", rO + arm, position, line=11811, errata=[Erratum(why, turned)], latex="r_{G_P/E}", renamed=letters),
         Formula("velocity of G", dot(rO) + (p.G * gd).cross(arm), velocity, line=11817, also=(11819,),
                 errata=[Erratum(why, moved)],
                 latex=r"\dot{r}_{G_P/E}", renamed=letters),
@@ -109,13 +117,13 @@ def from_G() -> list[Formula]:
     J = sp.Matrix(sp.BlockMatrix([[sp.eye(3), -skew(arm) * p.G], [sp.zeros(3), p.G]]))
     letters = stands_for(r_GO, c)
     why = "G and O are interchanged: r_G = r_O + R r_G/O, and s_dot holds the velocity of G, q_dot that of O."
-    upright = proofs.limit("At the upright attitude O stands at r_G - c.", at={psi: 0, theta: 0, phi: 0}, value=rG - c)
+    turned = proofs.other("O is where the frames of SymPy carry -c from G.", rG - turned_arm())
     moved = proofs.numeric_derivative("It is the rate of the position of O.", of=rG - p.R * c)
     velocity, omega = point.velocity(), frame.angular_velocity()
     speeds = sp.Matrix.vstack(dot(rG), gd)
     both = proofs.other("Rate of the position of O.", sp.Matrix.vstack(sd.rate(rG - p.R * c), omega))
     return [
-        Formula("r_O", rG + arm, point.position(), line=12095, errata=[Erratum(why, upright)], latex="r_{O_P/E}",
+        Formula("r_O", rG + arm, point.position(), line=12095, errata=[Erratum(why, turned)], latex="r_{O_P/E}",
                 renamed=letters),
         Formula("velocity of O", dot(rG) + (p.G * gd).cross(arm), velocity, line=12101, also=(12103,),
                 errata=[Erratum(why, moved)],

@@ -1,4 +1,4 @@
-"""The matrix formulas of chapters 5.7 and 5.8 as they are printed: typed once, they are both typeset and evaluated.
+"""The matrix formulas of chapters 5.7, 5.8 and 6.4 as they are printed: typed once, they can be typeset and evaluated.
 
 Letters stand apart, products are written side by side, and a transposed, starred or dotted letter is a letter of its own:
 "f1 = I1 a1 + p1 + 1X2* f2", "q2'' = (S2^T I2 S2)^-1 (tau_2 - S2^T p2)"; v x and v x* are the matrices of the products.
@@ -64,7 +64,7 @@ def _short(token: str) -> str:
     for pattern, made in _SHORT:
         if found := re.fullmatch(pattern, token):
             return made(found)
-    raise ValueError(f"there is no letter {token!r} in chapters 5.7 and 5.8; write it as in 'f1 = I1 a1 + p1 + 1X2* f2'")
+    raise ValueError(f"there is no letter {token!r} in chapters 5.7, 5.8 and 6.4; write it as in 'f1 = I1 a1 + p1 + 1X2* f2'")
 
 
 def _sum(tokens: list[str], letter: Callable[[str], Any]) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -128,16 +128,9 @@ def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: 
 
 def _matrix(left: str, name: str, value: Any, width: int) -> list[str]:
     """A matrix; where it is too wide its longest entries get names and stand below."""
-    entries = [[str(sp.latex(e)) for e in value.row(i)] for i in range(value.rows)]
-    below: list[tuple[int, int, str]] = []
-    while _columns(entries) > width - letters(left) - 3:
-        i, j = max(((i, j) for i in range(value.rows) for j in range(value.cols)), key=lambda p: letters(entries[p[0]][p[1]]))
-        short = entry_latex(name or "a", (i, j) if value.cols > 1 else (i,))
-        if letters(entries[i][j]) <= letters(short):
-            break
-        below.append((i, j, short))
-        long = entries[i][j]
-        entries = [[short if text == long else text for text in row] for row in entries]
+    written = [[str(sp.latex(e)) for e in value.row(i)] for i in range(value.rows)]
+    entries, below = named_entries(written, width - letters(left) - 3,
+                                   lambda i, j: entry_latex(name or "a", (i, j) if value.cols > 1 else (i,)))
     rows = r"\\".join(" & ".join(row) for row in entries)
     matrix = rf"\left[\begin{{matrix}}{rows}\end{{matrix}}\right]"
     lines = [f"{left} &= {matrix}" if left else f"&{matrix}"]
@@ -146,40 +139,68 @@ def _matrix(left: str, name: str, value: Any, width: int) -> list[str]:
     return lines
 
 
-def _columns(entries: Sequence[Sequence[str]]) -> float:
+def named_entries(entries: Sequence[Sequence[str]], room: float, name: Callable[[int, int], str],
+                  ) -> tuple[Sequence[Sequence[str]], list[tuple[int, int, str]]]:
+    """Entries of a matrix in LaTeX with names for the longest, until its columns fit; and (row, column, name) of those."""
+    below: list[tuple[int, int, str]] = []
+    while columns(entries) > room:
+        i, j = max(((i, j) for i, row in enumerate(entries) for j in range(len(row))), key=lambda p: letters(entries[p[0]][p[1]]))
+        short, long = name(i, j), entries[i][j]
+        if letters(long) <= letters(short):
+            break
+        below.append((i, j, short))
+        entries = [[short if text == long else text for text in row] for row in entries]
+    return entries, below
+
+
+def columns(entries: Sequence[Sequence[str]]) -> float:
+    """About how wide a matrix becomes, in letters."""
     return sum(max(letters(text) for text in column) + 2 for column in zip(*entries))
 
 
 def _sum(left: str, value: sp.Expr, width: int) -> list[str]:
     """left &= value, on as many lines as it takes."""
-    lines = _wrapped(value, width - letters(left) - 3)
+    lines = wrapped(value, width - letters(left) - 3)
     return [f"{left} &= {lines[0]}" if left else f"&{lines[0]}", *[rf"&\quad {line}" for line in lines[1:]]]
 
 
-def _wrapped(value: sp.Expr, room: float) -> list[str]:
+def wrapped(value: sp.Expr, room: float, mul_symbol: str | None = None) -> list[str]:
     """Lines of a sum, or of a product with a long sum in it; anything else is one line."""
-    whole = str(sp.latex(value))
+    whole = str(sp.latex(value, mul_symbol=mul_symbol))
     if letters(whole) <= room or room < NARROWEST:
         return [whole]
     if value.is_Add:
-        return _terms(value, room)
-    sums = [a for a in value.args if a.is_Add] if value.is_Mul else []
+        return _terms(value, room, mul_symbol)
+    if value.is_Pow and value.base.is_Add:
+        return _bracketed("", value, room, mul_symbol)
+    sums = [a for a in value.args if a.is_Add or (a.is_Pow and a.base.is_Add)] if value.is_Mul else []
     if not sums:
         return [whole]
     long = max(sums, key=lambda a: letters(sp.latex(a)))
-    before = sp.latex(sp.Mul(*[a for a in value.args if a != long]))
-    before = "-" if before == "-1" else f"{before} "
-    lines = _wrapped(long, room - letters(before) - 2)
+    other = sp.Mul(*[a for a in value.args if a != long])
+    before = sp.latex(other, mul_symbol=mul_symbol)
+    before = "-" if before == "-1" else rf"\left({before}\right) " if other.is_Add else f"{before} "
+    if letters(before) <= room / 2:
+        return _bracketed(before, long, room, mul_symbol)
+    first = _bracketed("", other, room, mul_symbol) if other.is_Add else wrapped(other, room, mul_symbol)
+    return [*first, *[rf"\quad {line}" for line in _bracketed("", long, room - 2, mul_symbol)]]
+
+
+def _bracketed(before: str, value: sp.Expr, room: float, mul_symbol: str | None) -> list[str]:
+    """Lines of before [value], value being a sum or the power of one."""
+    base, exponent = value.as_base_exp() if value.is_Pow else (value, sp.S.One)
+    power = "" if exponent == 1 else f"^{{{sp.latex(exponent)}}}"
+    lines = wrapped(base, room - letters(before) - letters(power) - 2, mul_symbol)
     lines[0] = rf"{before}\bigl[{lines[0]}"
-    lines[-1] = rf"{lines[-1]}\bigr]"
+    lines[-1] = rf"{lines[-1]}\bigr]{power}"
     return [lines[0], *[rf"\quad {line}" for line in lines[1:]]]
 
 
-def _terms(value: sp.Expr, room: float) -> list[str]:
+def _terms(value: sp.Expr, room: float, mul_symbol: str | None) -> list[str]:
     """The terms of a sum, as many on a line as there is room for."""
     lines: list[str] = []
     for term in value.as_ordered_terms():
-        first, *rest = _wrapped(term, room)
+        first, *rest = wrapped(term, room, mul_symbol)
         signed = first if first.startswith("-") or not lines else f"+ {first}"
         if lines and not rest and letters(lines[-1]) + letters(signed) <= room:
             lines[-1] = f"{lines[-1]} {signed}"

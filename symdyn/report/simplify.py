@@ -34,6 +34,12 @@ def simplified(value: Any, seconds: float) -> Any:
     return result
 
 
+def shown_zero(e: sp.Expr) -> bool:
+    """Whether multiplying out, with the sums of squares and of angles, shows that an expression is zero; no is no proof."""
+    over = sp.fraction(sp.together(e))[0]
+    return any(attempt(over) == 0 for attempt in (_polynomial, _angle_sums))
+
+
 def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
     """The shortest of what each method makes of the best so far."""
     best = e

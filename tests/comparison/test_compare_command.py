@@ -1,11 +1,12 @@
 """`symdyn compare`."""
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from symdyn.cli import main
-from symdyn.lecture import names
+from symdyn.lecture import cases, names
 
 MINE = """
 import sympy as sp
@@ -60,7 +61,79 @@ def test_files_that_are_no_cases(capsys, tmp_path, text, message):
     (["compare", "newtons-lew"], "there is no case 'newtons-lew'; the nearest are newtons-law"),
     (["compare", "newtons-law", "--all"], "name cases, or pass --all, not both"),
     (["compare", "newtons-law", "--jobs", "0"], "--jobs takes a number of processes from 1 on, found 0"),
+    (["compare", "9.9"], "there is no case of section 9.9; sections with cases are 1.1"),
     (["compare", "missing.py"], "there is no file missing.py")])
 def test_what_is_asked_wrongly(capsys, arguments, message):
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
+
+
+SEVERAL = MINE + """
+def fails():
+    raise ValueError("no such body")
+
+CASES = [sd.Case("first", formulas=[sd.Formula("late", q, fails)]), *CASES, sd.Case("third", formulas=[("a", q, q)])]
+"""
+
+
+def test_a_section_is_all_of_its_cases(capsys):
+    assert main(["compare", "1.5", "1.1"]) == 0
+    said = capsys.readouterr().out
+    wanted = [c for c in cases() if c.slide.section in ("1.5", "1.1")]
+    assert len(wanted) == 3 and all(f"{c.name} ({c.title})" in said for c in wanted)
+
+
+def test_an_error_in_one_case_does_not_hide_the_others(capsys, tmp_path):
+    assert main(["compare", write(tmp_path, SEVERAL), "--output", str(tmp_path / "report")]) == 2
+    said = capsys.readouterr()
+    assert "mine (My pendulum)" in said.out and "1 equal" in said.out
+    assert "the case 'first': what is derived for late ended with ValueError: no such body" in said.err
+    assert "the case 'third': formulas[0] is ('a', q, q) of type tuple" in said.err
+    assert "mine" in (tmp_path / "report" / "comparison.html").read_text(encoding="utf-8")
+
+
+def test_a_file_whose_only_case_has_faults(capsys, tmp_path):
+    text = MINE.replace("sd.rate(sp.sin(q))", "None")
+    assert main(["compare", write(tmp_path, text), "--output", str(tmp_path / "report")]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and "the case 'mine': nothing is derived for rate" in said.err
+
+
+def test_names_are_looked_up_before_anything_is_compared(capsys, tmp_path):
+    assert main(["compare", write(tmp_path, MINE), "newtons-lew", "--output", str(tmp_path / "report")]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and "the nearest are newtons-law" in said.err and not (tmp_path / "report").exists()
+
+
+def test_processes_are_for_the_lecture(capsys, tmp_path):
+    path = write(tmp_path, MINE)
+    assert main(["compare", path, "--jobs", "2"]) == 2
+    assert f"--jobs shares cases of the lecture, and {path} is a file of your own" in capsys.readouterr().err
+    assert main(["compare", path, "--jobs", "1"]) == 0
+
+
+@pytest.fixture
+def nothing_is_compared(monkeypatch):
+    def compared(*_):
+        raise AssertionError("compared before it was clear that the reports can be written")
+
+    monkeypatch.setattr("symdyn.comparison.run.judge", compared)
+
+
+@pytest.mark.usefixtures("nothing_is_compared")
+@pytest.mark.parametrize("asked", [["newtons-law"], ["--all", "--jobs", "1"]])
+def test_what_the_reports_need_is_looked_at_first(capsys, tmp_path, monkeypatch, asked):
+    (tmp_path / "file").write_text("")
+    assert main(["compare", *asked, "--output", str(tmp_path / "file" / "folder")]) == 2
+    assert "for the reports cannot be made" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "latex2mathml.converter", None)
+    assert main(["compare", *asked, "--output", str(tmp_path / "report")]) == 1
+    said = capsys.readouterr()
+    assert "pip install 'symdyn[report]'" in said.err and said.out == "" and not (tmp_path / "report").exists()
+
+
+def test_help_tells_the_exit_codes(capsys):
+    with pytest.raises(SystemExit):
+        main(["compare", "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Exit codes: 0 all is decided; 1 an entry is different or not decided" in said and "2 it was asked wrongly" in said

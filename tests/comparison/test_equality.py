@@ -33,6 +33,33 @@ def test_different_formulas_come_with_a_point_where_they_differ(printed, derived
     assert decision.values[0] != decision.values[1]
 
 
+@pytest.mark.parametrize("printed, derived", [
+    (-x * y, y * sp.Abs(x)), (y * sp.sign(x), -y), (sp.Abs(sp.cos(x)), sp.cos(x)), (sp.sqrt(1 - sp.sin(x) ** 2), sp.cos(x)),
+    (sp.asin(sp.sin(x)), x), (sp.atan2(sp.sin(x), sp.cos(x)), x), (sp.acos(sp.cos(x - y)), sp.Abs(x - y)), (sp.Min(x, 2), x),
+    (sp.Piecewise((x, x < 2), (0, True)), x)])
+def test_signs_and_ranges_are_not_taken_for_granted(printed, derived):
+    assert decide([printed], [derived])[0].equal is False
+
+
+@pytest.mark.parametrize("printed, derived", [
+    (sp.Float("6.67e-11") * x, sp.Float("6.674e-11") * x), (sp.Float(1.2e-14), sp.Float(3.4e-14)),
+    (sp.Rational(1, 10**31) * x, sp.Rational(2, 10**31) * x), (10**40 + x, sp.Integer(10) ** 40),
+    (sp.Float(1.2e-9), sp.Float(1.3e-9)), (x + sp.Rational(1, 10**40), x)])
+def test_small_numbers_count(printed, derived):
+    assert decide([printed], [derived])[0].equal is False
+
+
+def test_rounding_of_large_terms_that_cancel_does_not_count():
+    big = sp.Integer(10) ** 30 * (sp.atan2(sp.sin(x) * a, sp.cos(x) * a) - sp.atan2(sp.sin(x), sp.cos(x)))
+    assert decide([big], [sp.S.Zero])[0].equal is True
+
+
+def test_one_entry_that_cannot_be_evaluated_leaves_the_others_decided():
+    decisions = decide([sp.besselj(0, x), x, sp.Max(sp.atan2(-x, sp.sqrt(1 - x**2)), 0)],
+                       [sp.besselj(0, x) + 1, 2 * x, sp.Max(sp.asin(-x), 0)])
+    assert [d.equal for d in decisions] == [None, False, True]
+
+
 def test_what_cannot_be_evaluated_is_not_decided_and_not_different():
     (nowhere,) = decide([sp.sqrt(-1 - x**2)], [sp.sqrt(-2 - x**2)])
     assert nowhere.equal is None and "no real values" in nowhere.how
@@ -51,11 +78,12 @@ def test_decimal_fractions_are_as_exact_as_floats():
     assert decide([sp.Float(9.81) * x], [sp.Rational(9810001, 1000000) * x])[0].equal is False
 
 
-def test_points_are_the_same_in_every_run_and_keep_signs_of_positive_symbols():
+def test_points_are_the_same_in_every_run_and_come_near_and_far_with_both_signs():
     first, again = list(points([x, a])), list(points([a, x]))
     assert first == again
-    assert all(0.3 <= p["a"] <= 1.7 and 0.2 <= abs(p["x"]) <= 1.3 for p in first)
-    assert {p["x"] > 0 for p in first} == {True, False}
+    assert all(p["a"] >= 0.2 and 0.2 <= abs(p["x"]) <= 7 for p in first)
+    assert all(p["a"] == m["a"] and p["x"] == -m["x"] for p, m in zip(first[::2], first[1::2]))
+    assert all(abs(p["x"]) <= 1.3 for p in first[::4]) and all(abs(p["x"]) >= 1.5 for p in first[2::4])
 
 
 def test_values_have_fifty_digits():

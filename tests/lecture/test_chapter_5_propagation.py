@@ -75,7 +75,7 @@ def test_letters_are_evaluated_as_they_are_typeset() -> None:
     assert typeset("f1B = I1 a1 + 1X2* p2A - (S1^T I1 S1)^-1 tau_1 q1''") == (
         r"f_1^B = I_1 a_1 + {}^1X_2^* p_2^A - ( S_1^T I_1 S_1 )^{-1} \tau_1 \ddot{q}_1")
     assert typeset("v_2 x* I_2 [v_2]") == r"{}^{b_2}\hat{v}_{b_2} \times^* {}^{b_2}\hat{I}_{b_2} [ {}^{b_2}\hat{v}_{b_2} ]"
-    with pytest.raises(ValueError, match=r"no letter 'Y1' in chapters 5\.7 and 5\.8; write it as"):
+    with pytest.raises(ValueError, match=r"no letter 'Y1' in chapters 5\.7, 5\.8 and 6\.4; write it as"):
         typeset("Y1 = a1")
     with pytest.raises(ValueError, match=r"goes on with '\) B' after its end; brackets come in pairs"):
         evaluated("A ) B", values)

@@ -98,6 +98,21 @@ def test_broken_sums_keep_all_their_terms():
     assert joined.count(r"\bigl[") == joined.count(r"\bigr]") == 1
 
 
+def test_of_two_sums_multiplied_both_keep_their_brackets():
+    text = "".join(sd.latex((q1 + m) * sp.Add(*sp.symbols("a_1:40")), "tau", width=50).lines)
+    assert r"\left(m + q_{1}\right) \bigl[" in text and text.count(r"\bigr]") == 1
+
+
+def test_products_and_powers_of_long_sums_are_broken():
+    a, b = (sp.Add(*sp.symbols(f"{letter}_1:30")) for letter in "ab")
+    for value in (a * b, m * a / sp.sqrt(b), sp.sin(q1) / a, b**3):
+        lines = sd.latex(value, width=50).lines
+        text = "".join(lines)
+        assert max(letters(line.replace("&", "")) for line in lines) <= 55
+        assert all(str(sp.latex(s)) in text for s in value.free_symbols) and text.count(r"\bigl[") == text.count(r"\bigr]")
+    assert r"\bigr]^{3}" in text
+
+
 def test_a_short_matrix_is_one_line(arm):
     assert str(sd.latex(sp.zeros(0, 1), "C")).startswith(r"\mathbf{C} = \left[")
     assert len(arm.latex("F_tilde").lines) == 1 and len(sd.latex(sp.Matrix([[m, l]]), "C_r").lines) == 1
