@@ -123,7 +123,8 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
         slide = f"{formula.slide.section} {formula.slide.title}".strip()
         letters = formula.latex or ""
         rows.append({"case": case.name, "formula": formula.name,
-                     "latex": [pages.typeset(letters)] if broken and letters else letters, "slide": slide or case.title or case.name, "why": erratum.why,
+                     "latex": [pages.typeset(letters)] if broken and letters else letters,
+                     "slide": slide or case.title or case.name, "why": erratum.why,
                      "line": formula.slide.line, "also": ", ".join(map(str, formula.also)), "wide": wide,
                      "kind": evidence.kind, "sentence": evidence.sentence.rstrip(".") + ".",
                      "printed_residual": f"{evidence.printed:.2g}", "right_residual": _rounding(evidence.right),
