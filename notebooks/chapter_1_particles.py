@@ -22,7 +22,6 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
-from symdyn.lecture import cases
 
 n = sd.Frame("n")
 k = sp.Matrix([0, 0, 1])
@@ -184,7 +183,7 @@ display(sp.simplify(parts.total - sd.rate(sd.rate(P.position(of=n)))).T)
 # does not use the formula shows it.
 
 # %%
-chapter = sd.compare([case for case in cases() if case.slide.section.startswith("1.")])
+chapter = sd.compare("1")
 display(chapter)
 
 # %%

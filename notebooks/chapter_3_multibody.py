@@ -25,8 +25,6 @@ from scipy.integrate import solve_ivp
 from sympy import latex
 
 import symdyn as sd
-from symdyn import lecture
-from symdyn.comparison import compare_lecture
 
 # %% [markdown]
 # ## 1. One reaction, found three times
@@ -221,5 +219,4 @@ assert power != 0
 # limit, an energy balance, numeric differentiation or another formulation.
 
 # %%
-chapter = [case.name for case in lecture.cases() if case.slide.section.startswith("3")]
-compare_lecture(chapter, jobs=2)
+sd.compare("3")

@@ -29,7 +29,6 @@ from sympy import latex
 
 import symdyn as sd
 from symdyn import rotation
-from symdyn.lecture import cases
 
 
 def show(name, value):
@@ -248,7 +247,7 @@ print(f"error of R: {abs(rotation.from_parameters(rotation.normalized(end)) - ro
 # arms. Where a slide is wrong, a proof that does not use the formula shows it.
 
 # %%
-chapter = sd.compare([case for case in cases() if case.slide.section.startswith("4.")])
+chapter = sd.compare("4")
 display(chapter)
 
 # %%

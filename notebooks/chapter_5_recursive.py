@@ -23,8 +23,6 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
-from symdyn import lecture
-from symdyn.comparison import compare_lecture
 
 
 def show(name, value):
@@ -177,7 +175,7 @@ show(r"M_{O_1}\text{, as printed}", sp.factor((misprinted.T * push)[2]))
 # numeric differentiation, Lagrange's equation, a limit, units.
 
 # %%
-chapter = compare_lecture([case.name for case in lecture.cases() if case.slide.section.startswith("5.")], jobs=2)
+chapter = sd.compare("5")
 display(chapter)
 assert chapter.decided
 

@@ -23,8 +23,6 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
-from symdyn.comparison import compare_lecture
-from symdyn.lecture import cases
 
 # %% [markdown]
 # ## 1. Bodies and joints
@@ -148,7 +146,7 @@ assert difference < 1e-6
 # where an independent proof shows it.
 
 # %%
-chapter = compare_lecture([case.name for case in cases() if case.slide.section.startswith("6.")], jobs=2)
+chapter = sd.compare("6")
 display(chapter)
 
 # %%

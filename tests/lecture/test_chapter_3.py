@@ -7,6 +7,7 @@ import importlib
 import numpy as np
 import pytest
 import sympy as sp
+from compared import compared
 from scipy.integrate import solve_ivp
 
 import symdyn as sd
@@ -18,7 +19,7 @@ LENGTH, G = 1.3, 9.81
 
 def largest_stretch(right: bool) -> float:
     """How far the mass of the pendulum leaves the circle in 1 s, by the last row as printed or as derived."""
-    formula = next(f for f in sd.compare("pendulum-augmented").formulas if f.name == "right side")
+    formula = next(f for f in compared("pendulum-augmented").formulas if f.name == "right side")
     last = (formula.derived if right else formula.printed)[2]
     names = ("x_P_dot", "y_P_dot")
 
@@ -52,14 +53,14 @@ WRONG = {
 @pytest.mark.parametrize("module", WRONG)
 def test_errors_stand_where_they_are_known(module: str) -> None:
     cases = importlib.import_module(f"symdyn.lecture.chapter_3_{module}").CASES
-    formulas = [f for case in cases for f in sd.compare(case).formulas]
+    formulas = [f for case in cases for f in compared(case.name).formulas]
     wrong = [f for f in formulas if f.counts[Verdict.WRONG]]
     assert sorted({line for f in wrong for line in (f.slide.line, *f.also)}) == WRONG[module]
     assert not any(f.counts[Verdict.DIFFERENT] or f.counts[Verdict.UNDECIDED] for f in formulas)
 
 
 def test_the_reaction_of_the_wire_is_right_at_rest_only() -> None:
-    verdicts = {f.name: f.verdict for f in sd.compare("pendulum-reaction").formulas}
+    verdicts = {f.name: f.verdict for f in compared("pendulum-reaction").formulas}
     assert verdicts["F_c at rest"] is Verdict.EQUAL
     assert verdicts["F_c"] is Verdict.WRONG
 

@@ -6,8 +6,8 @@ import importlib
 
 import pytest
 import sympy as sp
+from compared import compared
 
-import symdyn as sd
 from symdyn.comparison import Verdict
 from symdyn.lecture import cases
 from symdyn.lecture.arm_in_space import block, cross, typeset
@@ -26,7 +26,7 @@ WRONG = {
 @pytest.mark.parametrize("module", WRONG)
 def test_errors_stand_where_they_are_known(module: str) -> None:
     of_module = importlib.import_module(f"symdyn.lecture.chapter_5_{module}").CASES
-    formulas = [f for case in of_module for f in sd.compare(case).formulas]
+    formulas = [f for case in of_module for f in compared(case.name).formulas]
     wrong = [f for f in formulas if f.counts[Verdict.WRONG]]
     assert sorted({line for f in wrong for line in (f.slide.line, *f.also)}) == WRONG[module]
     assert not any(f.counts[Verdict.DIFFERENT] or f.counts[Verdict.UNDECIDED] for f in formulas)
@@ -34,7 +34,7 @@ def test_errors_stand_where_they_are_known(module: str) -> None:
 
 def test_the_plane_hides_errors() -> None:
     """While the base stands still, both links turn about parallel axes, and the wrong print gives what the right one does."""
-    wrong = next(f for f in sd.compare("spatial-angular-acceleration").formulas if f.verdict is Verdict.WRONG)
+    wrong = next(f for f in compared("spatial-angular-acceleration").formulas if f.verdict is Verdict.WRONG)
     assert wrong.slide.line == 8439
     of_case = next(case for case in cases() if case.name == "spatial-angular-acceleration")
     typed = next(f for f in of_case.taken() if f.name == wrong.name)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
+from compared import compared
 
 import symdyn as sd
 from symdyn.comparison import Case, Verdict
@@ -44,7 +45,7 @@ def verdicts(changed) -> list[Verdict]:
 
 @pytest.mark.parametrize("name", ERRORS)
 def test_errors_that_were_found(name: str) -> None:
-    assert {f.slide.line for f, _ in sd.compare(CASES[name]).errata} == ERRORS[name]
+    assert {f.slide.line for f, _ in compared(name).errata} == ERRORS[name]
 
 
 @pytest.mark.parametrize("name", ["r_G", "velocity of G", "velocity of G, exchanged", "J"])

@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import pytest
+from compared import compared
 
 import symdyn as sd
 from symdyn.comparison import Comparisons, Verdict, compare_lecture
@@ -42,7 +43,7 @@ def test_the_committed_errata_and_verdicts_are_of_the_cases_there_are(update):
 def test_every_entry_is_decided_as_committed(name, update):
     if update:
         pytest.skip("the committed files are being rewritten")
-    found = sd.compare(name)
+    found = compared(name)
     assert found.decided, str(found)
     for formula in found.formulas:
         for entry in formula.entries:
