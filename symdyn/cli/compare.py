@@ -27,6 +27,7 @@ def compare(arguments: argparse.Namespace) -> int:
     if not arguments.all and not arguments.cases:
         return _list()
     from symdyn.comparison import compare_lecture
+    from symdyn.comparison.reports import prepare
 
     files = [name for name in arguments.cases if name.endswith(".py")]
     if files and (arguments.jobs or 1) > 1:
@@ -35,7 +36,8 @@ def compare(arguments: argparse.Namespace) -> int:
     cases = _chosen(arguments.cases)
     folder = arguments.output or (OUTPUT if arguments.all else None)
     if folder is not None:
-        _prepare(folder)
+        # What the reports need is looked at before the time for comparing is spent.
+        prepare(folder)
     errors: list[SymdynError] = []
     if files:
         found = _one_by_one(cases, errors)
@@ -73,17 +75,6 @@ def _one_by_one(cases: Sequence[Case], errors: list[SymdynError]) -> Comparisons
         except SymdynError as error:
             errors.append(error)
     return Comparisons(tuple(done), clock.monotonic() - start)
-
-
-def _prepare(folder: Path) -> None:
-    """What the reports need, looked at before the time for comparing is spent."""
-    from symdyn.comparison.typeset import mathml
-
-    mathml("x")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Stop(f"the folder {folder} for the reports cannot be made: {error.strerror}") from None
 
 
 def _write(found: Comparisons, folder: Path) -> None:

@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.comparison.case import Case, Erratum, Formula
 from symdyn.comparison.equality import Decision, decide
 from symdyn.comparison.values import Value, by_name, canonical, rebuilt, renaming, take
+from symdyn.comparison.values import taken as value_of
 from symdyn.comparison.verdict import EntryResult, ErratumResult, FormulaResult, Verdict
 from symdyn.errors import CaseError
 
@@ -74,7 +75,8 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     assert formula.slide is not None
     if taken.printed is None:
         entry = EntryResult((), Verdict.UNREADABLE, note=str(formula.unreadable))
-        return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, None, _shown(taken.derived),
+        derived_alone = _shown(taken.derived.rebuilt()) if taken.derived is not None else None
+        return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, None, derived_alone,
                              (entry,))
     derived, decisions, convention = _best(taken)
     if decisions[0].how == SHAPE and not formula.errata:
@@ -84,12 +86,12 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     unreadable = formula.unreadable if isinstance(formula.unreadable, Mapping) else {}
     entries = []
     assert taken.shown is not None
-    shown = taken.shown.rebuilt().entries, derived.rebuilt().entries
+    shown, right = taken.shown.rebuilt(), derived.rebuilt()
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
-        printed, right = (shown[0][k], shown[1][k]) if decision.how != SHAPE else (None, None)
-        entry = EntryResult(place, Verdict.EQUAL, decision.how, "", printed, right, decision.point, decision.values)
+        a, b = (shown.entries[k], right.entries[k]) if decision.how != SHAPE else (None, None)
+        entry = EntryResult(place, Verdict.EQUAL, decision.how, "", a, b, decision.point, decision.values)
         entries.append(_verdict(entry, decision, convention, errata, unreadable.get(place, "")))
-    return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(taken.shown), _shown(derived),
+    return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(shown), _shown(right),
                          tuple(entries), tuple(e.result for e in errata), convention.name if convention else "",
                          tuple((name, rebuilt(e)) for name, e in taken.where.items()))
 
@@ -145,7 +147,9 @@ def _best(taken: _Taken) -> tuple[Value, list[Decision], Any]:
     assert taken.derived is not None
     best: tuple[int, Value, list[Decision], Any] | None = None
     for convention in (None, *taken.formula.conventions):
-        derived = taken.derived if convention is None else _changed(taken.derived, convention)
+        derived = taken.derived
+        if convention is not None:
+            derived = value_of(convention.to_slide(derived.as_sympy()), f"what the convention {convention.name!r} makes")
         decisions = _decide(taken, derived)
         differing = sum(1 for d in decisions if not d.equal)
         if best is None or differing < best[0]:
@@ -154,14 +158,6 @@ def _best(taken: _Taken) -> tuple[Value, list[Decision], Any]:
             break
     assert best is not None
     return best[1], best[2], best[3]
-
-
-def _changed(derived: Value, convention: Any) -> Value:
-    faults: list[str] = []
-    changed = take(convention.to_slide(derived.as_sympy()), f"what the convention {convention.name!r} makes", faults)
-    if changed is None:
-        raise CaseError(faults)
-    return changed
 
 
 def _decide(taken: _Taken, derived: Value) -> list[Decision]:
@@ -176,17 +172,14 @@ def _decide(taken: _Taken, derived: Value) -> list[Decision]:
     except (ValueError, TypeError) as error:  # such as the larger of a complex number and another
         return [Decision(None, f"SymPy cannot form it with real symbols: {error}") for _ in printed.entries]
     decisions = decide(a, b, taken.formula.decimals)
-    if printed.sides is None:
+    if printed.sides is None or all(d.equal for d in decisions):
         return decisions
     # An equation stays the same when its terms change sides.
     exchanged = decide(a, tuple(-e for e in b), taken.formula.decimals)
     return [d if d.equal or not e.equal else e for d, e in zip(decisions, exchanged)]
 
 
-def _shown(value: Value | None) -> Any:
-    if value is None:
-        return None
-    value = value.rebuilt()
+def _shown(value: Value) -> Any:
     if value.sides is not None:
         return value.sides[0].as_sympy(), value.sides[1].as_sympy()
     return value.as_sympy()

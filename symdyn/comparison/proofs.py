@@ -13,7 +13,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points
-from symdyn.comparison.values import Value, canonical, renaming, take
+from symdyn.comparison.values import Value, by_name, canonical, renaming, taken
 from symdyn.errors import CaseError, SymdynError
 
 POINTS = 4
@@ -78,8 +78,9 @@ class Proof:
         of_printed, of_right = (self._measured(formula, where, moving) for formula in (printed, right))
         seen = of_printed
         blind: tuple[tuple[int, ...], ...] = ()
-        if entries is not None and len(of_printed) == len(_places(printed)):
-            by_place = dict(zip(_places(printed), of_printed))
+        places = taken(printed, "the formula").indices()
+        if entries is not None and len(of_printed) == len(places):
+            by_place = dict(zip(places, of_printed))
             seen = [by_place[tuple(e)] for e in entries]
             blind = tuple(tuple(e) for e in entries if not by_place[tuple(e)].visible)
         holds = bool(of_right) and all(r.vanishes for r in of_right) and any(r.visible for r in seen) and not blind
@@ -95,11 +96,10 @@ class Proof:
 
     def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
         """Entry by entry; moving: names of the symbols of both formulas."""
-        residual = _taken(self.residual(formula), "the residual")
-        replaced = [sp.sympify(e.xreplace({s: where[s.name] for s in e.free_symbols if s.name in where}))
-                    for e in residual.entries]
-        same = canonical(replaced)
-        expressions = [e.xreplace(same) for e in replaced]
+        residual = taken(self.residual(formula), "the residual")
+        residual = residual.replaced(by_name(residual, where))
+        same = canonical(residual.entries)
+        expressions = [e.xreplace(same) for e in residual.entries]
         evaluator = Expressions(expressions)
         found: list[list[Residual]] = []
         for point in points(set(same.values())):
@@ -133,25 +133,13 @@ def _largest(residuals: list[Residual]) -> float:
     return max((r.size for r in residuals), default=float("nan"))
 
 
-def _taken(value: Any, what: str) -> Value:
-    faults: list[str] = []
-    taken = take(value, what, faults)
-    if taken is None:
-        raise CaseError(faults)
-    return taken
-
-
 def _names(formula: Any) -> set[str]:
     return {s.name for s in getattr(formula, "free_symbols", ())}
 
 
-def _places(formula: Any) -> list[tuple[int, ...]]:
-    return _taken(formula, "the formula").indices()
-
-
 def _minus(formula: Any, value: Any, what: str) -> Any:
     """formula - value, with a message where the shapes differ."""
-    own, other_one = _taken(formula, "the formula"), _taken(value, what)
+    own, other_one = taken(formula, "the formula"), taken(value, what)
     if own.shape != other_one.shape:
         raise CaseError([f"{what} has the shape {other_one.shape}, the formula {own.shape}; they must be the same"])
     return own.as_sympy() - other_one.as_sympy()
@@ -177,7 +165,7 @@ def limit(sentence: str, at: Mapping[Any, Any], value: Any) -> Proof:
         return e.subs({s: names[s.name] for s in e.free_symbols if s.name in names}, simultaneous=True)
 
     def residual(formula: Any) -> Any:
-        own = _taken(formula, "the formula")
+        own = taken(formula, "the formula")
         there = [INFINITE if (limited := put(e)).has(sp.zoo, sp.oo, sp.nan) else limited for e in own.entries]
         return _minus(sp.Matrix(*own.shape, there) if own.shape else there[0], value, "the value of the limit")
 
@@ -205,7 +193,7 @@ def dimensions(sentence: str, units: Mapping[Any, Sequence[float]], unit: Sequen
         return e.xreplace({s: s * scale(powers[s.name]) for s in e.free_symbols if s.name in powers}) - scale(unit) * e
 
     def residual(formula: Any) -> Any:
-        own = _taken(formula, "the formula")
+        own = taken(formula, "the formula")
         changes = [change(e) for e in own.entries]
         return sp.Matrix(*own.shape, changes) if own.shape else changes[0]
 
@@ -228,7 +216,7 @@ def numeric_derivative(sentence: str, of: Any, order: int = 1) -> Proof:
     if order not in (1, 2):
         raise CaseError([f"numeric differentiation of order {order} asked for; there are orders 1 and 2"])
     return _Differentiation("numeric differentiation", sentence, lambda formula: formula,
-                            _taken(of, f"what the proof {sentence!r} differentiates"), order)
+                            taken(of, f"what the proof {sentence!r} differentiates"), order)
 
 
 @dataclass(frozen=True)
@@ -237,7 +225,7 @@ class _Differentiation(Proof):
     order: int = 1
 
     def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
-        given = _taken(formula, "the formula")
+        given = taken(formula, "the formula")
         if given.shape != self.of.shape:
             raise CaseError([f"what is differentiated has the shape {self.of.shape}, the formula {given.shape}; they must be the "
                              "same"])
@@ -299,7 +287,7 @@ def energy_balance(sentence: str, coordinates: Sequence[sp.Symbol], energy: Any,
     Raises CaseError for an energy or power that is no expression.
     """
     symbols = (coordinates,) if isinstance(coordinates, sp.Symbol) else tuple(coordinates)
-    E, P = (_taken(e, f"the {what} of the proof {sentence!r}").entries[0] for e, what in ((energy, "energy"), (power, "power")))
+    E, P = (taken(e, f"the {what} of the proof {sentence!r}").entries[0] for e, what in ((energy, "energy"), (power, "power")))
     return _EnergyBalance("energy balance", sentence, equations or (lambda formula: formula), symbols, E, P)
 
 
@@ -311,7 +299,7 @@ class _EnergyBalance(Proof):
 
     def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:
         names = [str(q) for q in self.coordinates]
-        residuals = _taken(self.residual(formula), "the equations").entries
+        residuals = taken(self.residual(formula), "the equations").entries
         if len(residuals) != len(names):
             raise CaseError([f"there are {len(residuals)} equations for the second derivatives of {len(names)} coordinates; pass "
                              "`equations` or `coordinates` so that there are as many"])

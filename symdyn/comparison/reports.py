@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 
 from symdyn.backend.source import template_folders
-from symdyn.comparison.result import COLUMNS, Comparison, Comparisons
+from symdyn.comparison.result import COLUMNS, Comparison, Comparisons, counted
 from symdyn.comparison.typeset import (
     SHOWN,
     Lines,
@@ -30,8 +30,7 @@ from symdyn.comparison.verdict import FormulaResult, Verdict
 from symdyn.errors import ArgumentError
 from symdyn.report.latex import letters
 
-FILES = {"comparison.html": "comparison.html", "comparison.tex": "comparison.tex", "errata.html": "errata.html",
-         "errata.md": "errata.md"}
+FILES = ("comparison.html", "comparison.tex", "errata.html", "errata.md")
 # Letters in a line of a column, and of a page.
 COLUMN, PAGE = 50, 106
 # The same of the list of errata.
@@ -41,14 +40,20 @@ ERRATA_COLUMN, ERRATA_PAGE = 30, 90
 def write_reports(comparisons: Comparisons, folder: Path) -> list[Path]:
     """Write all reports into a folder; returns their paths. Raises ArgumentError if the folder cannot be made, MissingExtra
     without latex2mathml."""
+    prepare(folder)
     texts = {name: report(comparisons, name) for name in FILES}
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return [folder / name for name in texts]
+
+
+def prepare(folder: Path) -> None:
+    """Look for what the reports need, and make their folder; raises as write_reports does."""
+    mathml("x")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ArgumentError(f"the folder {folder} for the reports cannot be made: {error.strerror}") from None
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return [folder / name for name in texts]
 
 
 def report(comparisons: Comparisons, name: str) -> str:
@@ -58,7 +63,7 @@ def report(comparisons: Comparisons, name: str) -> str:
                                      trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
                                      autoescape=ending == "html")
     environment.filters["tex"] = _tex
-    environment.filters["count"] = _count
+    environment.filters["count"] = counted
     pages = Pages(*((cache(lambda latex: _safe(mathml(latex))), "#b00020") if ending == "html" else (str, "wrong")))
     of_errata = name.startswith("errata")
     cases = [] if of_errata else [_case(c, pages) for c in comparisons]
@@ -134,10 +139,6 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
                                       "right": pages.lines(room, c.right) if broken else formula_latex(c.right)}
                                      for c in found]})
     return rows
-
-
-def _count(n: int, one: str, many: str) -> str:
-    return f"{n} {one if n == 1 else many}"
 
 
 def _rounding(residual: float) -> str:

@@ -112,8 +112,8 @@ class Comparisons:
         width = max(len(row[0]) for row in rows)
         lines = [f"{row[0]:{width}}{row[1]:>8}{row[2]:>9}" + "".join(f"{text:>12}" for text in row[3:]) for row in (head, *rows)]
         errors = sum(len(c.errata) for c in self.cases)
-        lines.append(f"{_number(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
-                     f"{_number(errors, 'erratum', 'errata')}")
+        lines.append(f"{counted(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
+                     f"{counted(errors, 'erratum', 'errata')}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -152,12 +152,13 @@ def _text(value: Any) -> str:
     return str(value.tolist()) if isinstance(value, sp.MatrixBase) else str(value)
 
 
-def _number(n: int, one: str, many: str) -> str:
+def counted(n: int, one: str, many: str) -> str:
+    """A number with its noun."""
     return f"{n} {one if n == 1 else many}"
 
 
 def _entries(counts: Counter[Verdict]) -> str:
-    return _number(sum(counts.values()), "entry", "entries")
+    return counted(sum(counts.values()), "entry", "entries")
 
 
 def _total(counts: Counter[Verdict]) -> str:

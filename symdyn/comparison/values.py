@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 
-from symdyn.errors import ModelError
+from symdyn.errors import CaseError, ModelError
 from symdyn.model.symbols import as_expression, take_over
 
 
@@ -37,7 +37,7 @@ class Value:
         if not symbols:
             return self
         sides = None if self.sides is None else (self.sides[0].replaced(symbols), self.sides[1].replaced(symbols))
-        return Value(self.shape, tuple(sp.sympify(e.xreplace(symbols)) for e in self.entries), sides)
+        return Value(self.shape, tuple(e.xreplace(symbols) for e in self.entries), sides)
 
     def indices(self) -> list[tuple[int, ...]]:
         """Place of each entry; of a vector its row."""
@@ -74,6 +74,15 @@ def take(value: Any, what: str, faults: list[str]) -> Value | None:
     if isinstance(value, (list, tuple)):
         return _nested(value, what, faults)
     return _entries((), [value], what, faults)
+
+
+def taken(value: Any, what: str) -> Value:
+    """The same; raises CaseError where `take` would add faults."""
+    faults: list[str] = []
+    found = take(value, what, faults)
+    if found is None:
+        raise CaseError(faults)
+    return found
 
 
 def _is_matrix(value: Any) -> bool:

@@ -122,8 +122,7 @@ def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: 
         shown = short.short(value) if short else value
         left = name if k < raw or not name else name_latex(name)
         lines += _matrix(left, name, shown, width) if isinstance(shown, sp.MatrixBase) else _sum(left, shown, width)
-    used = set().union(*[v.free_symbols for v in short.symbols.values()]) if short else set()
-    return Typeset(tuple(lines), short.legend if short and used else ())
+    return Typeset(tuple(lines), short.legend if short else ())
 
 
 def _matrix(left: str, name: str, value: Any, width: int) -> list[str]:

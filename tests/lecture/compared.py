@@ -7,7 +7,18 @@ import pickle
 from pathlib import Path
 
 import symdyn as sd
-from symdyn.comparison import Comparison
+from symdyn.comparison import Case, Comparison, Formula, Verdict
+from symdyn.lecture import cases
+
+
+def formula(case: str, name: str) -> Formula:
+    """A formula of a case of the lecture."""
+    return next(f for c in cases() if c.name == case for f in c.taken() if f.name == name)
+
+
+def verdicts(changed: Formula) -> list[Verdict]:
+    """The verdicts on the entries of one formula alone."""
+    return [entry.verdict for entry in sd.compare(Case("changed", formulas=[changed])).formulas[0].entries]
 
 
 def compared(name: str) -> Comparison:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
-from compared import compared
+from compared import compared, formula, verdicts
 from scipy.integrate import solve_ivp
 
 import symdyn as sd
-from symdyn.comparison import Case, Verdict
+from symdyn.comparison import Verdict
 from symdyn.lecture import (
     chapter_1_ball,
     chapter_1_circular,
@@ -25,14 +25,6 @@ from symdyn.lecture import (
 MODULES = (chapter_1_newton, chapter_1_circular, chapter_1_coriolis, chapter_1_decomposition, chapter_1_rotating_frame,
            chapter_1_disk, chapter_1_ball)
 CASES = {case.name: case for module in MODULES for case in module.CASES}
-
-
-def formula(case: str, name: str):
-    return next(f for f in CASES[case].taken() if f.name == name)
-
-
-def verdicts(changed) -> list[Verdict]:
-    return [entry.verdict for entry in sd.compare(Case("changed", formulas=[changed])).formulas[0].entries]
 
 
 def test_errors_that_were_found() -> None:

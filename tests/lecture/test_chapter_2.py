@@ -6,30 +6,12 @@ from dataclasses import replace
 
 import pytest
 import sympy as sp
-from compared import compared
+from compared import compared, formula, verdicts
 
 import symdyn as sd
-from symdyn.comparison import Case, Verdict
-from symdyn.lecture import (
-    chapter_2_euler_angles,
-    chapter_2_inertia,
-    chapter_2_moment,
-    chapter_2_planar,
-    chapter_2_plane,
-    chapter_2_translation,
-)
+from symdyn.comparison import Verdict
+from symdyn.lecture import chapter_2_inertia, chapter_2_moment
 from symdyn.lecture.letters import constant, ddot, dot, moving, stands_for, symmetric
-
-MODULES = (chapter_2_translation, chapter_2_moment, chapter_2_inertia, chapter_2_planar, chapter_2_euler_angles, chapter_2_plane)
-CASES = {case.name: case for module in MODULES for case in module.CASES}
-
-
-def formula(case: str, name: str):
-    return next(f for f in CASES[case].taken() if f.name == name)
-
-
-def verdicts(changed) -> list[Verdict]:
-    return [entry.verdict for entry in sd.compare(Case("changed", formulas=[changed])).formulas[0].entries]
 
 
 def test_errors_that_were_found() -> None:

@@ -7,25 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
-from compared import compared
+from compared import compared, formula, verdicts
 
 import symdyn as sd
-from symdyn.comparison import Case, Verdict
-from symdyn.lecture import (
-    chapter_6_augmented,
-    chapter_6_constraints,
-    chapter_6_embedding,
-    chapter_6_joints,
-    chapter_6_platform,
-    chapter_6_recursion,
-    chapter_6_transformation,
-)
+from symdyn.comparison import Verdict
+from symdyn.lecture import chapter_6_constraints, chapter_6_platform
 from symdyn.lecture.chapter_6_transformation import Platform, c, q
 from symdyn.lecture.letters import moving
 
-MODULES = (chapter_6_platform, chapter_6_transformation, chapter_6_embedding, chapter_6_augmented, chapter_6_constraints,
-           chapter_6_joints, chapter_6_recursion)
-CASES = {case.name: case for module in MODULES for case in module.CASES}
 ERRORS = {
     "turbine-newton-euler": {11749}, "platform-transformation": {11811, 11817, 11821, 11831},
     "platform-transformation-augmented": {12095, 12101, 12105, 12113}, "platform-virtual-work": {11771},
@@ -33,14 +22,6 @@ ERRORS = {
     "fixed-joint-constraint": {12237}, "prismatic-joint-S": {12532},
     "six-dof-joint-S": {12634, 12648},
 }
-
-
-def formula(case: str, name: str):
-    return next(f for f in CASES[case].taken() if f.name == name)
-
-
-def verdicts(changed) -> list[Verdict]:
-    return [entry.verdict for entry in sd.compare(Case("changed", formulas=[changed])).formulas[0].entries]
 
 
 @pytest.mark.parametrize("name", ERRORS)
