@@ -15,12 +15,18 @@ _HOME = {
     "symdyn.model.bodies": ("acceleration", "bias_acceleration", "jacobian", "position", "velocity"),
     "symdyn.model.joints": ("Custom", "Cylindrical", "Fixed", "Free", "Helical", "Planar", "Prismatic", "Revolute",
                             "Spherical", "Universal"),
+    "symdyn.model.elements.added_mass": ("AddedMass",),
     "symdyn.model.closures": ("Gear", "Rod"),
+    "symdyn.model.elements": ("Box", "Buoyancy", "Drag", "LinearDamping", "LinearStiffness", "MooringLine", "Thrust",
+                              "WaveExcitation"),
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
+    "symdyn.model.external": ("External",),
     "symdyn.model.system": ("System",),
     "symdyn.formulation.explicit": ("embedding",),
     "symdyn.formulation.explicit_augmented": ("augmented",),
     "symdyn.report.latex": ("latex",),
+    "symdyn.flexible.beam": ("Beam",),
+    "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
     "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EvaluationError", "GimbalLock",
@@ -30,7 +36,7 @@ _HOME = {
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("frames", "lecture", "rotation", "systems")} | {
-    name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")}
+    name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")} | {"shapes": "symdyn.model.shapes"}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]
 

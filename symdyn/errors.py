@@ -99,3 +99,11 @@ class UnknownCase(SymdynError, KeyError):
 
 class MissingExtra(SymdynError, ImportError):
     """Something optional is not installed; the message tells how to get it."""
+
+
+class NoEquilibrium(SymdynError, ArithmeticError):
+    """No state of rest was found; the message tells what is left, in numbers."""
+
+
+class EquilibriumNotUnique(NoEquilibrium):
+    """Something can move without any stiffness; the message names the direction."""

@@ -21,9 +21,10 @@ from symdyn.backend.source import CORRECTIONS, Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.skipped import skipped
 from symdyn.runtime.arguments import some
-from symdyn.runtime.compiler import find_compiler, no_compiler_reason, require_compiler
+from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 from symdyn.tape.balance import balance
@@ -70,9 +71,32 @@ FUNCTIONS = {
     "joint_points": ("joint_points", "where every joint sits on its parent, then on its child, n-frame, m"),
     "frames": ("frames", "origin and rotation (row by row) of every body's frame, n-frame"),
     "positions": ("positions", "centres of mass, n-frame, m"),
+    "watches": ("watches", "values that loads want to be looked at: draft, tilt and the like"),
+    "drawn_lengths": ("drawn_lengths", "lengths in pictures that follow from parameters, m"),
     "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
     "jacobian_inputs": ("jacobian_inputs", "exact derivative of x_dot by the inputs"),
     "jacobian_params": ("jacobian_params", "exact derivative of x_dot by the parameters"),
+}
+# Of statics and linearization, compiled together, with what they are used with; the headers' words.
+STATICS = {
+    "balance": "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot]; ud: u_dot, lam",
+    "balance_x": "exact derivative of the balance by x",
+    "balance_inputs": "exact derivative of the balance by the inputs",
+    "N_dot": "derivative of N by time",
+    "rates_q": "derivative of q_dot by q",
+}
+# Along directions that are arguments; made for derivatives by parameters.
+VARIATIONS = {
+    "variation": "derivative of the balance along a direction of [q; u; z; inputs; p; lam]",
+    "second_variation": "the same derivative of the balance's linear form in v (q' = N v), u', u_dot', z', lam'",
+}
+# The parts of the balance that forces are, by themselves.
+FORCES = {
+    "stiffness": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by q; ud: u_dot, lam",
+    "damping": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by u; ud: u_dot, lam",
+    "rows_q": "derivative of the rate of the constraints, C_dot, by q",
+    "outputs_x": "derivative of the outputs by x",
+    "outputs_inputs": "derivative of the outputs by the inputs",
 }
 # The extra state of a simulation that integrates the work of the loads.
 WORK = "(work)"
@@ -142,7 +166,9 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
     def source_of(name: str) -> Source:
         if not name.startswith("rhs"):
-            group = CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
+            group: tuple[str, ...] = CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
+            if name in STATICS:
+                group = (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
             return emit(equations, backend, group, templates, standalone=False, specialize=specialize)
         needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in name,
@@ -155,7 +181,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         text = next(iter(source.files.values()))
         if backend == "c":
             assert compiler is not None
-            return CUnit(text, source.metadata, compiler)
+            seldom = name in STATICS or name in VARIATIONS or name in FORCES
+            return CUnit(text, source.metadata, plain(compiler) if seldom else compiler)
         return PythonUnit.from_source(text, source.metadata["name"])
 
     def write(folder: Path) -> list[Path]:
@@ -169,9 +196,11 @@ def compile_equations(equations: Equations, backend: str | None = None, template
     metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
                 "reactions": [name for name, *_ in equations.joints], "bodies": list(equations.bodies),
+                "drawn": list(equations.drawn), "planar": equations.planar,
                 "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "watches": [[w.label, w.least, w.most, w.message] for w in equations.watched()],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
     return Module(metadata, provide, backend, fallback, write, report)
@@ -211,7 +240,8 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
               "inputs": [s.name for s in symbols.inputs],
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * baumgarte]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
-    titles = {n: FUNCTIONS[n][1] if n in FUNCTIONS else n for n in names}
+    told = {**{n: title for n, (_, title) in FUNCTIONS.items()}, **STATICS, **VARIATIONS, **FORCES}
+    titles = {n: told.get(n, n) for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
@@ -234,12 +264,17 @@ def _entries(tape: Tape) -> tuple[Any, ...]:
 
 
 def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
-    """What stands in the group ud: accelerations; for the residual also the rates of the coordinates, and multipliers."""
-    symbols = equations.symbols
-    accelerations = [f"{s.name}_dot" for s in symbols.speeds]
-    if "residual" not in names:
-        return accelerations
-    return residual_names(symbols.coordinates, symbols.speeds, symbols.states, len(equations.constraints))
+    """What stands in the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
+    for the residual the rates of the coordinates, too, and multipliers."""
+    symbols, n_c = equations.symbols, len(equations.constraints)
+    if "residual" in names:
+        return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
+    given = [f"{s.name}_dot" for s in symbols.speeds]
+    if any(n in STATICS or n in VARIATIONS or n in FORCES for n in names):
+        given += multiplier_names(n_c)
+    if any(n in VARIATIONS for n in names):
+        given += variation_names(symbols, n_c, "second_variation" in names)
+    return given
 
 
 def function_tape(equations: Equations, name: str) -> Tape:

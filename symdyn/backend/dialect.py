@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import re
 import tomllib
 from dataclasses import dataclass
@@ -11,17 +10,8 @@ from typing import Any
 
 from symdyn.errors import SymdynError
 from symdyn.tape.ops import OPERATIONS
+from symdyn.tape.reserved import RESERVED
 
-_C_WORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
-register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while asm bool
-class complex delete explicit export false friend imaginary mutable namespace new operator private protected public
-template this throw true try typename using virtual NULL main""".split()
-_LIBRARY = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp log sqrt cbrt pow fabs fmin fmax floor
-ceil erf erfc gamma lgamma tgamma j0 j1 jn y0 y1 yn isnan isinf abs max min sign pi where sum range len print math numpy
-np t q u z x ud xd p c inputs out n status""".split()
-_OTHERS = """logical_and logical_or logical_not symdyn_sign let var function null undefined typeof super arguments eval
-debugger instanceof angles sines cosines""".split()
-RESERVED = frozenset([*_C_WORDS, *_LIBRARY, *_OTHERS, *keyword.kwlist, *keyword.softkwlist])
 LOADED = ("q", "u", "z", "ud", "inputs", "p", "c")
 PARTS = ("whole", "longest", "load", "store")
 SINCOS = ("least", "take", "sin", "cos")
@@ -62,8 +52,8 @@ class Parts:
 class Call:
     """How a numeric algorithm of the tape is called; its text is the template {function}.*.jinja of the backend.
 
-    take   one statement a line, with {name} of its results, {function}, {sizes} and {arguments} separated by commas, {n_in}
-           and {n_out} their numbers, and {code} to return where it fails
+    take   one statement a line, with {name} of its results, {function}, {sizes} each followed by a comma, {arguments} separated
+           by commas, {n_in} and {n_out} the numbers of arguments and results, and {code} to return where it fails
     item   what then reads result {k}
     """
 
@@ -157,7 +147,7 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         call = table["call"]
         faults += [f"call.{key} is missing" for key in CALL if key not in call]
         faults += [f"call.{key} is not known" for key in call if key not in CALL]
-        take = {"name": "r", "function": "f", "sizes": "1", "arguments": "a", "n_in": 1, "n_out": 1, "code": 1}
+        take = {"name": "r", "function": "f", "sizes": "1, ", "arguments": "a", "n_in": 1, "n_out": 1, "code": 1}
         trials += [(f"call.{key}", call[key], take if key == "take" else {"name": "r", "k": 0}) for key in CALL if key in call]
     for key, text, given in trials:
         try:

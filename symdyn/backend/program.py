@@ -13,7 +13,9 @@ from typing import Any
 from symdyn.backend.dialect import Dialect, identifier
 from symdyn.backend.divide import divide
 from symdyn.backend.printer import Printer
+from symdyn.backend.user_functions import called
 from symdyn.errors import SymdynError
+from symdyn.tape.external import UserFunction
 from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
 from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
@@ -93,6 +95,7 @@ class Program:
 
     reasons   what the return codes 1, 2, ... mean
     kernels   numeric algorithms that are called: name -> largest size of each kind
+    user_functions   functions of the user that are called, by name
     n_c       number of constants that the prologue computes
     """
 
@@ -101,6 +104,7 @@ class Program:
     n_c: int
     reasons: tuple[str, ...]
     kernels: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    user_functions: tuple[UserFunction, ...] = ()
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
@@ -127,7 +131,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
         else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
     prologue = _Writer(dialect, whole, places, {}, codes, late).prologue(constants)
-    return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole))
+    return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole), called(whole))
 
 
 def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
@@ -155,7 +159,7 @@ def _either(name: str, title: str, regular: Function, otherwise: Function) -> Fu
 def _kernels(tape: Tape) -> dict[str, tuple[int, ...]]:
     sizes: dict[str, tuple[int, ...]] = {}
     for node in tape.steps:
-        if node.op == "call":
+        if node.op == "call" and not isinstance(node.args[0], UserFunction):
             kernel = node.args[0]
             sizes[kernel.name] = tuple(map(max, zip(kernel.sizes, sizes.get(kernel.name, kernel.sizes), strict=True)))
     return dict(sorted(sizes.items()))
@@ -368,13 +372,15 @@ class _Writer:
         """The statements that call one; its node stands for the array of results."""
         kernel, *values = node.args
         way = self.dialect.call
+        mine = isinstance(kernel, UserFunction)
         if way is None:
-            raise SymdynError(f"the equations call the numeric algorithm {kernel.name}, which the backend {self.dialect.name} "
-                              "does not have; add [call] to its dialect.toml, and the algorithm to its templates")
+            called = f"function {kernel.signature}" if mine else f"numeric algorithm {kernel.name}"
+            raise SymdynError(f"the equations call the {called}, which the backend {self.dialect.name} does not have; "
+                              "add [call] to its dialect.toml, and the algorithm to its templates")
         self.n_calls += 1
-        self.text[node] = identifier(f"solved{self.n_calls}", self.taken)
+        self.text[node] = identifier(f"{kernel.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
         arguments = fill(", ".join(map(self.printer.text, values)), 116, subsequent_indent="    ", break_long_words=False)
-        return way.take.format(name=self.text[node], function=kernel.name, sizes=", ".join(map(str, kernel.sizes)),
+        return way.take.format(name=self.text[node], function=kernel.name, sizes="".join(f"{size}, " for size in kernel.sizes),
                                arguments=arguments, n_in=len(values), n_out=kernel.n_out,
                                code=self.codes[self.checks[node]]).strip().split("\n")
 

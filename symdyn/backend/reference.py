@@ -9,6 +9,7 @@ from typing import Any
 
 import mpmath
 
+from symdyn.errors import UnsupportedExpression
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Output, Tape
 
@@ -84,7 +85,7 @@ def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> Refe
     try:
         exact, positive = (r.ravel() for r in evaluate(checked, values, DIGITS).values())
         double = next(iter(evaluate(tape, values, 16).values())).ravel()
-    except (ArithmeticError, ValueError, TypeError):  # also comparisons of complex numbers
+    except (ArithmeticError, ValueError, TypeError, UnsupportedExpression):  # also comparisons of complex numbers
         return None
     if not all(hasattr(e, "_mpf_") and mpmath.isfinite(e) for e in [*exact, *positive]) or any(e <= 0 for e in positive):
         return None

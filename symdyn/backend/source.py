@@ -18,7 +18,10 @@ import symdyn
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.program import Function, Part, Program, build
 from symdyn.backend.reference import DIGITS, make_reference
+from symdyn.backend.user_functions import header as header_of_user_functions
+from symdyn.backend.user_functions import texts as texts_of_user_functions
 from symdyn.errors import SymdynError
+from symdyn.folders import templates_folder
 from symdyn.tape.kernels import CLEANINGS, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
 
@@ -69,9 +72,7 @@ def template_folders(extra: str | os.PathLike | None = None) -> list[Path]:
 
     Raises SymdynError if the user's folder does not exist.
     """
-    package = Path(symdyn.__file__).parent
-    shipped = package / "templates" if (package / "templates").is_dir() else package.parent / "templates"
-    folders = [shipped]
+    folders = [templates_folder()]
     if extra is not None:
         if not Path(extra).is_dir():
             raise SymdynError(f"the template folder {extra} does not exist; pass a folder that holds one folder a backend")
@@ -200,9 +201,11 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "arguments": {f.name: list(f.arguments) for f in program.functions},
     }
     text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, program.prologue)])
+    user_texts = texts_of_user_functions(program.user_functions, dialect.name, name)
+    identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
-        "hash": hashlib.sha256(text.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
+        "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
@@ -210,7 +213,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
         "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
-        "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels,
+        "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call("rhs", "xd"), "projection": projection,
@@ -239,6 +242,7 @@ def _header(content: Content, program: Program) -> list[str]:
             lines.append(f"    {k}  {n}{tail}")
     if program.n_c:
         lines.append(f"  constants c ({program.n_c}): what the prologue computes from the parameters")
+    lines += header_of_user_functions(program.user_functions)
     return [*lines, *[f"Skipped: {note}." for note in content.notes]]
 
 

@@ -29,6 +29,8 @@ def simulate(arguments: argparse.Namespace) -> int:
         ("inputs", "--input", arguments.input))}
     if arguments.keep and not arguments.consistent:
         raise Stop("--keep goes with --consistent")
+    if arguments.report is not None and arguments.report.suffix.lower() not in (".html", ".htm"):
+        raise Stop(f"--report takes a file that ends in .html, found {arguments.report}")
     module = find_module(arguments)
     if arguments.consistent:
         _make_consistent(module, values, t[0] if t else 0.0, arguments.keep)
@@ -46,6 +48,8 @@ def simulate(arguments: argparse.Namespace) -> int:
         complain(solution.message, code)
     summarize(solution)
     save(solution, folder, picture=not arguments.no_picture, film=arguments.gif)
+    if arguments.report is not None:
+        print(f"wrote {solution.report(arguments.report)}")
     return code
 
 

@@ -17,7 +17,8 @@ import sympy as sp
 
 from symdyn.model.bodies import Body, Point
 from symdyn.model.closures import Gear
-from symdyn.model.joints import Custom, Free, Helical, Joint, Planar
+from symdyn.model.elements import Element
+from symdyn.model.joints import Custom, Free, Helical, Joint, Modal, Planar
 from symdyn.model.loads import JointForce
 from symdyn.model.loop_check import carried
 from symdyn.model.orientation import EulerAngles, EulerParameters
@@ -42,7 +43,7 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
     for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True):
         if parent == -1 and _allows_everything(joint, model.planar):
             free[child] = joint
-        elif model.bodies[child].name in carriers:
+        elif model.bodies[child].name in carriers or isinstance(joint, Modal):  # the ends of a beam stay together
             moving.append((joint, parent, child))
             carried_already.add(child)
         elif _needs_coordinates(joint, used):
@@ -139,7 +140,9 @@ def _used(model: Model) -> set[Any]:
             expressions += output.value if isinstance(output.value, tuple) else [output.value]
     names: set[Any] = set()
     for load in model.loads:
-        expressions += [*getattr(load, "force", ()), *getattr(load, "torque", ()), *getattr(load, "values", ())]
+        used = load.expressions if isinstance(load, Element) else (*getattr(load, "force", ()), *getattr(load, "torque", ()),
+                                                                   *getattr(load, "values", ()))
+        expressions += used
         if isinstance(load, JointForce):
             names.add(getattr(load.joint, "name", load.joint))
     for gear in (g for g in model.loops if isinstance(g, Gear)):

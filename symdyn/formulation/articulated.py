@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.composite import Factors, factorize
+from symdyn.formulation.composite import Factors, factorize, own_inertias
+from symdyn.formulation.flexible import FlexibleLink
+from symdyn.formulation.link_motion import Wrench
 from symdyn.formulation.lumping import coordinate_axis
 from symdyn.formulation.tree import GROUND, Link, Tree
-from symdyn.spatial.inertia import ArticulatedInertia
+from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import Vector, cross, inner, zeros
 from symdyn.tape.node import is_zero
-
-Wrench = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Released:
     """A link whose joint is free to move.
 
     places   speeds of the joint that accelerate freely
-    S, U     (6, k) motion subspace of these speeds; U = I^A S
-    D        factors of S^T I^A S, (k, k)
+    S, U     (6, k) motion subspace of these speeds; U = I^A S, with N for elastic coordinates, see `_release`
+    D        factors of S^T I^A S, with M_e for elastic coordinates, (k, k)
     axes     places in the link's twist (6,) that the columns of S fill, if each is one coordinate direction, else ()
     gain     U D^-1, (6, 1), for one column along a coordinate direction, else None
     """
@@ -56,13 +56,14 @@ class Articulated:
         self.tree = tree
         self.pivots: list[tuple[int, Any]] = []
         algebra, links = tree.algebra, tree.links
-        IA = [ArticulatedInertia.rigid(link.effective) for link in links]
+        IA = [ArticulatedInertia.rigid(own) if isinstance(own, Inertia) else own for own in own_inertias(tree)]
         self.released: dict[int, Released] = {}
         for k in reversed(range(len(links))):
             link = links[k]
             with algebra.section(f"link {link.name}: articulated inertia"):
                 places = tuple(place for place in link.speeds if place in reasons)
-                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, places, [reasons[p] for p in places])
+                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, places, [reasons[p] for p in places],
+                                                    tree.elastic(k))
                 self.pivots += zip(places, joint.D.D, strict=True)
                 if link.parent == GROUND or any(is_zero(pivot) for pivot in joint.D.D):
                     continue
@@ -106,8 +107,12 @@ class Articulated:
 
 
 def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, places: tuple[int, ...],
-             reasons: Sequence[str]) -> Released:
-    """U = I^A S and the factors of D = S^T I^A S."""
+             reasons: Sequence[str], elastic: FlexibleLink | None) -> Released:
+    """U = I^A S and the factors of D = S^T I^A S.
+
+    Elastic coordinates also move the mass between the ends of their body: D = S^T I^A S + M_e, and U = I^A S + N with N the
+    wrench that their accelerations need at the clamped end, carried to the link at the free end.
+    """
     S = link.S[:, [place - link.speeds.start for place in places]]
     k = len(places)
     U = algebra.name(f"U{number}", IA.matrix() @ S) if places else zeros(6, 0)
@@ -115,12 +120,22 @@ def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, plac
     for i in range(k):
         for j in range(i + 1):
             D[i, j] = D[j, i] = inner(S[:, i], U[:, j])
+    if elastic is not None:
+        U = algebra.name(f"N{number}", U + np.column_stack([_outwards(link, elastic.coupling(column)) for column in range(k)]))
+        D = D + elastic.Me
+        return Released(places, S, U, factorize(algebra, D, reasons), (), None)
     factors = factorize(algebra, D, reasons)
     directions = [coordinate_axis(S[:, column]) for column in range(k)]
     axes = tuple(axis for column, axis in enumerate(directions) if axis is not None and abs(S[axis, column]) == 1)
     single = k == 1 and len(axes) == 1
     gain = algebra.name(f"G{number}", U[:, 0] * factors.inverse_D[0]) if single else None
     return Released(places, S, U, factors, axes if len(axes) == k else (), gain)
+
+
+def _outwards(link: Link, wrench: Wrench) -> np.ndarray:
+    """A wrench about the origin of the link before, about that of the link, link axes, (6,) moment first."""
+    f, n = wrench
+    return np.concatenate([link.R.T @ (n - cross(link.r, f)), link.R.T @ f])
 
 
 def _felt_across(IA: ArticulatedInertia, joint: Released) -> ArticulatedInertia:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.link_motion import Wrench
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.inertia import ArticulatedInertia, Inertia, total
 from symdyn.spatial.vectors import cross, dot, zeros
 from symdyn.tape.node import Node, is_zero
 
@@ -21,34 +22,56 @@ from symdyn.tape.node import Node, is_zero
 def mass_matrix(tree: Tree) -> np.ndarray:
     """Mass matrix in the joints' speeds, (n_w, n_w): each entry one link's composite inertia moved to another joint."""
     algebra = tree.algebra
-    composite: list[Inertia] = [link.effective for link in tree.links]
+    composite = own_inertias(tree)
     M = zeros(len(tree.w), len(tree.w))
     for i in reversed(range(len(tree.links))):
         link = tree.links[i]
+        elastic = tree.elastic(i)
         with algebra.section(f"mass matrix: composite body from link {link.name} outwards"):
             for column, place in enumerate(link.speeds):
                 f, n = composite[i].momentum(link.S[:3, column], link.S[3:, column])
                 for other in range(column + 1):
-                    M[place, link.speeds[other]] = dot(link.S[:3, other], n) + dot(link.S[3:, other], f)
-                    M[link.speeds[other], place] = M[place, link.speeds[other]]
-                _carry(tree, M, i, place, f, n)
+                    entry = dot(link.S[:3, other], n) + dot(link.S[3:, other], f)
+                    if elastic is not None:
+                        entry = entry + elastic.Me[other, column]
+                    M[place, link.speeds[other]] = M[link.speeds[other], place] = entry
+                _carry(tree, M, i, place, f, n, None if elastic is None else elastic.coupling(column))
             if link.parent != GROUND:
-                total = composite[link.parent] + composite[i].moved(link.R, link.r)
-                number = link.parent + 1
-                algebra.name(f"mc{number}", total.m)
-                algebra.vector(f"hc{number}", total.h)
-                algebra.vector(f"Ic{number}", total.I)
-                composite[link.parent] = total
+                composite[link.parent] = total(composite[link.parent], composite[i].moved(link.R, link.r))
+                _name(algebra, link.parent + 1, composite[link.parent])
     return M
 
 
-def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.ndarray) -> None:
-    """Carry the wrench of one column to the joints inwards of link i."""
+def own_inertias(tree: Tree) -> list[Inertia | ArticulatedInertia]:
+    """Of every link, with the deflection of elastic bodies clamped to it and the water it moves along."""
+    inertias: list[Inertia | ArticulatedInertia] = [link.effective for link in tree.links]
+    for body in tree.flexible:
+        if body.root != GROUND:
+            inertias[body.root] = total(inertias[body.root], body.inertia)
+    for k, added in tree.added:
+        inertias[k] = total(inertias[k], added)
+    return inertias
+
+
+def _name(algebra: Any, number: int, inertia: Inertia | ArticulatedInertia) -> None:
+    if isinstance(inertia, Inertia):
+        algebra.name(f"mc{number}", inertia.m)
+        algebra.vector(f"hc{number}", inertia.h)
+        algebra.vector(f"Ic{number}", inertia.I)
+    else:
+        for letter, block in (("Ac", inertia.A), ("Hc", inertia.H), ("Mc", inertia.M)):
+            algebra.vector(f"{letter}{number}", block)
+
+
+def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.ndarray, coupling: Wrench | None) -> None:
+    """Carry the wrench of one column to the joints inwards of link i; coupling: what an elastic body adds at its clamped end."""
     link = tree.links[i]
     while link.parent != GROUND:
         force = link.R @ f
         n = link.R @ n + cross(link.r, force)
         f = force
+        if coupling is not None:
+            f, n, coupling = f + coupling[0], n + coupling[1], None
         link = tree.links[link.parent]
         for column, row in enumerate(link.speeds):
             M[place, row] = M[row, place] = dot(link.S[:3, column], n) + dot(link.S[3:, column], f)

@@ -19,7 +19,7 @@ from symdyn.formulation.null_space import NullSpaceSolver
 from symdyn.formulation.saddle import KernelSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
 from symdyn.spatial.vectors import inner, vector, zeros
 from symdyn.tape import node as kinds
-from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.differentiate import forward
 from symdyn.tape.kernels import DAMPED, SMOOTHED
 from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
@@ -60,7 +60,7 @@ class Constrained(Motion):
         own: dict[str, Callable[[], Any]] = {
             "C": lambda: vector(*[r.value for r in self.rows]), "C_r": self.C_r, "C_t": self.C_t, "C_dot": self.C_dot,
             "F_d": self.F_d, "lam": self.lam, "matrix": self.matrix, "right_side": self.right_side,
-            "C_scale": self.C_scale, "length": lambda: self.length, "N": self.N,
+            "C_scale": self.C_scale, "length": lambda: self.length,
             "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
             "rhs_baumgarte": self.rhs_baumgarte, "residual": self.residual}
         return {**super().quantities(), **own}
@@ -180,10 +180,6 @@ class Constrained(Motion):
         return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
 
     # -- staying on the manifold
-
-    def N(self) -> np.ndarray:
-        """q_dot = N u + n_t, (n_q, n_u)."""
-        return jacobian(self.algebra.recorder, self.rates, self._leaves(self.speeds), "forward")
 
     def position_correction(self) -> np.ndarray:
         """[C as lengths; dq]: one Newton step to C = 0, the smallest change in the mass metric, dq = N dv, C_r dv = -C."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Symbols:
-    """The symbols of the equations, in the order of the generated code's arguments, with numbers and units."""
+    """The symbols of the equations, in the order of the generated code's arguments, with numbers and units.
+
+    reach   how far from zero a coordinate may sensibly be, where it must stay small: elastic ones
+    """
 
     coordinates: tuple[sp.Symbol, ...]
     speeds: tuple[sp.Symbol, ...]
@@ -33,6 +36,7 @@ class Symbols:
     initial: Mapping[sp.Symbol, float] = field(default_factory=dict)
     units: Mapping[sp.Symbol, str] = field(default_factory=dict)
     duration: float = 10.0
+    reach: Mapping[sp.Symbol, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,8 @@ class Equations:
     constraints  names of the constraint rows; holonomic: whether each holds positions; bodies: names
     joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
+    drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
+    watched      gives what elements of load want to be looked at, in the order of the quantity watches
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
@@ -72,6 +78,8 @@ class Equations:
     bodies: tuple[str, ...] = ()
     joints: tuple[tuple[str, str, str, str], ...] = ()
     otherwise: Equations | None = None
+    drawn: tuple[Mapping[str, Any], ...] = ()
+    watched: Callable[[], Sequence[Any]] = tuple
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.newton_euler import LinkMotion, outward
+from symdyn.formulation import water
+from symdyn.formulation.link_motion import LinkMotion
+from symdyn.formulation.newton_euler import outward
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.spatial.vectors import cross, dot, identity, zeros
 
@@ -111,7 +113,12 @@ class Kinematics:
         for link, (omega, v) in zip(self.tree.links, self.twists, strict=True):
             i = link.inertia
             total = total + dot(omega, i.I @ omega) + 2 * dot(v, cross(omega, i.h)) + i.m * dot(v, v)
-        return total / 2
+        total = total / 2
+        for k, added in self.tree.added:
+            total = total + water.kinetic_energy(added, *self.twists[k])
+        for body in self.tree.flexible:
+            total = total + body.kinetic_energy(*(self.twists[body.root] if body.root != GROUND else (zeros(3), zeros(3))))
+        return total
 
     def gravity_potential(self) -> Any:
         """- sum of g . (m p + R h), zero for masses at the n-frame's origin, J."""
@@ -123,4 +130,6 @@ class Kinematics:
         for pose, body in zip(self.tree.poses, self.tree.model.bodies, strict=True):
             if pose.link == GROUND:
                 total = total - dot(g, self.algebra.expression(body.mass) * pose.point(self.algebra.constants(body.com)))
+        for flexible in self.tree.flexible:
+            total = total - dot(g, self.frame(flexible.root)[0] @ flexible.h)
         return total

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ModelError
+from symdyn.formulation.kinematics import Kinematics
+from symdyn.formulation.site import BodySite
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
+from symdyn.model.elements import Action, Element, Watch
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.spatial.vectors import cross, dot, zeros
 from symdyn.tape.differentiate import forward
@@ -47,38 +50,73 @@ class Applied:
 class Loads:
     """Records the loads of a model on its tree."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, kinematics: Kinematics | None = None) -> None:
         self.tree = tree
+        self.kinematics = kinematics or Kinematics(tree)
         self.algebra = tree.algebra
         self.model = tree.model
+        self._actions: dict[int, Action] = {}
 
     def applied(self, conservative: bool = True, other: bool = True) -> Applied:
-        """All loads but gravity; springs are the conservative ones, everything else is not."""
+        """All loads but gravity; conservative are springs, elastic bodies, and what elements have a potential for."""
         result = Applied([(zeros(3), zeros(3)) for _ in self.tree.links], zeros(len(self.tree.w)), self.tree.poses,
                          [(zeros(3), zeros(3)) for _ in self.tree.poses])
         for load in self.model.loads:
             with self.algebra.section(f"load {load.label}"):
                 if isinstance(load, SpringDamper):
                     self._spring(result, load, conservative, other)
+                elif isinstance(load, Element):
+                    self._element(result, load, conservative, other)
                 elif other and isinstance(load, Force):
                     self._force(result, load)
                 elif other and isinstance(load, Torque):
                     self._torque(result, load)
                 elif other and isinstance(load, JointForce):
                     self._joint(result, load)
+        for body in self.tree.flexible:
+            with self.algebra.section(f"link {self.tree.links[body.link].name}: elastic forces and damping"):
+                places = slice(body.speeds.start, body.speeds.stop)
+                if conservative:
+                    result.joint[places] -= body.stiffness @ body.eta
+                if other:
+                    result.joint[places] -= body.damping @ body.eta_dot
         return result
 
     def potential(self) -> Any:
-        """Potential energy of the springs, J."""
+        """Potential energy of springs, elements and elastic bodies, J."""
         total: Any = 0
+        for body in self.tree.flexible:
+            total = total + body.strain_energy()
         for load in self.model.loads:
-            if isinstance(load, SpringDamper):
+            if isinstance(load, Element):
+                total = total + self._action(load).potential
+            elif isinstance(load, SpringDamper):
                 with self.algebra.section(f"load {load.label}"):
                     stretch = self._line(load)[1] - self.algebra.expression(load.length)
                     total = total + self.algebra.expression(load.stiffness) * (stretch * stretch) / 2
         return total
 
+    def watches(self) -> list[Watch]:
+        """What elements want to be looked at."""
+        return [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
+
     # -- each kind
+
+    def _action(self, load: Element) -> Action:
+        """What an element does, recorded once."""
+        if id(load) not in self._actions:
+            place = self._place(load.body)
+            assert place is not None  # checked with the model: nothing comes of a load on the ground
+            with self.algebra.section(f"load {load.label}"):
+                self._actions[id(load)] = load.act(BodySite(self.tree, self.kinematics, place))
+        return self._actions[id(load)]
+
+    def _element(self, result: Applied, load: Element, conservative: bool, other: bool) -> None:
+        pose, action = self.pose(load.body), self._action(load)
+        for wanted, (f, n) in ((conservative, action.elastic), (other, action.other)):
+            if wanted:
+                force = pose.R @ f
+                result.add(pose, force, pose.R @ n + cross(pose.p, force))
 
     def _force(self, result: Applied, load: Force) -> None:
         pose = self.pose(load.body)
@@ -143,9 +181,13 @@ class Loads:
 
     def pose(self, body: Any) -> Pose:
         """Where a body's frame sits; the ground's frame for the ground."""
-        names = {b.name: k for k, b in enumerate(self.model.bodies)}
-        place = names.get(body.name if isinstance(body, Body) else body)
+        place = self._place(body)
         return self.tree.ground if place is None else self.tree.poses[place]
+
+    def _place(self, body: Any) -> int | None:
+        """Number of a body; None for the ground."""
+        names = {b.name: k for k, b in enumerate(self.model.bodies)}
+        return names.get(body.name if isinstance(body, Body) else body)
 
     def express(self, components: np.ndarray, frame: Any, link: int) -> np.ndarray:
         """Components given in a body's axes (None: the n-frame) in the axes of a link."""

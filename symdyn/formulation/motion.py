@@ -11,6 +11,7 @@ import sympy as sp
 
 from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.composite import factorize
+from symdyn.formulation.linearization import Varied
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.passes import substitute
@@ -28,7 +29,10 @@ class Motion:
     A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`; one that needs no mass matrix for the
     accelerations has its own `solver` and `accelerations`.
     remarks   speed -> what else to say where the mass matrix is singular along it
+    rows      of constraints
     """
+
+    rows: Sequence[Any] = ()
 
     def __init__(self, algebra: TapeAlgebra, coordinates: Sequence[sp.Symbol], speeds: Sequence[sp.Symbol],
                  rates: Sequence[Any], states: Sequence[tuple[sp.Symbol, sp.Expr]], inputs: Sequence[sp.Symbol],
@@ -45,12 +49,13 @@ class Motion:
         """name -> function that records it."""
         recorded: dict[str, Callable[[], Any]] = {
             "M_tilde": self.M_tilde, "bias": self.bias, "inverse_dynamics": self.inverse_dynamics,
-            "accelerations": self.accelerations, "rates": lambda: vector(*self.rates), "rhs": self.rhs,
+            "accelerations": self.accelerations, "rates": lambda: vector(*self.rates), "N": self.N, "rhs": self.rhs,
             "jacobian_x": lambda: self.jacobian(self.x()),
             "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
             "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
         shared = ("M_tilde", "bias", "accelerations")
-        return {name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()}
+        return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
+                **Varied(self).quantities()}
 
     def M_tilde(self) -> np.ndarray:
         raise NotImplementedError
@@ -87,6 +92,10 @@ class Motion:
         """z_dot of the extra states."""
         with self.algebra.section("rates of the extra states"):
             return [self.algebra.expression(rate) for _, rate in self.states]
+
+    def N(self) -> np.ndarray:
+        """q_dot = N u + n_t, (n_q, n_u)."""
+        return jacobian(self.algebra.recorder, self.rates, self._leaves(self.speeds), "forward")
 
     def rhs(self) -> np.ndarray:
         """x_dot for x = [q; u; z]."""

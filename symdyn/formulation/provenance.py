@@ -141,7 +141,7 @@ class OfBodies:
         for body, J, mass, inertia in self._bodies():
             parts.append((body.name, "translational", "", mass * inner(J[:3, i], J[:3, j])))
             parts.append((body.name, "rotational", "", inner(J[3:, i], inertia @ J[3:, j])))
-        return parts
+        return parts + self._rest("M_tilde", (i, j), parts)
 
     def velocity(self, i: int) -> list[Part]:
         parts: list[Part] = []
@@ -152,7 +152,14 @@ class OfBodies:
             for name, motion, node in own:
                 parts += _by_speeds(self.of, name, motion, node)
             parts.append((body.name, "rotational", "gyroscopic", inner(J[3:, i], cross(omega, inertia @ omega))))
-        return parts
+        return parts + self._rest("k_tilde", (i,), parts)
+
+    def _rest(self, quantity: str, index: tuple[int, ...], parts: list[Part]) -> list[Part]:
+        """What added mass and the deflection of elastic bodies contribute: all that rigid bodies do not."""
+        if self.of.tree.rigid:
+            return []
+        whole = self.of.recall(quantity)[index]
+        return [("added mass and deflection", "", "", whole - sum((node for *_, node in parts), 0))]
 
     def _bodies(self) -> Iterable[tuple[Any, np.ndarray, Any, np.ndarray]]:
         """Body, J in the n-frame (6, n_u), mass, inertia about the centre of mass in n-frame axes."""

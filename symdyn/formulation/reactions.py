@@ -6,17 +6,20 @@ along its speeds is no reaction and is taken off; what holds a prescribed or dep
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from symdyn.formulation import water
 from symdyn.formulation.constraints import Closure
 from symdyn.formulation.kinematics import Kinematics
+from symdyn.formulation.link_motion import LinkMotion, base_motion, inertial_wrench
 from symdyn.formulation.loads import Loads
-from symdyn.formulation.newton_euler import base_motion, inertial_wrench, outward
+from symdyn.formulation.newton_euler import outward
 from symdyn.formulation.tree import GROUND, Pose, Tree
-from symdyn.model.joints import Fixed, Joint
+from symdyn.model.elements import AddedMass
+from symdyn.model.joints import Fixed, Joint, Modal
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.vectors import cross, zeros
 from symdyn.tape.node import is_zero
@@ -47,6 +50,8 @@ def reactions(tree: Tree, loads: Loads, kinematics: Kinematics, w_dot: np.ndarra
             inertia = about_com.moved(pose.R, pose.point(algebra.constants(body.com)))
             force, moment = inertial_wrench(inertia, still if pose.link == GROUND else motions[pose.link])
             wrenches.append((force - f, moment - n))
+    for number, (f, n) in _beyond_rigid(tree, kinematics, motions, w_dot, -gravity):
+        wrenches[number] = (wrenches[number][0] + f, wrenches[number][1] + n)
     drives = applied.joint + _on_joints(tree, along_speeds)
     order = list(zip(model.joints, model.parents, model.children, strict=True))
     for joint, parent, child in reversed(order):
@@ -57,6 +62,26 @@ def reactions(tree: Tree, loads: Loads, kinematics: Kinematics, w_dot: np.ndarra
                 f, n = _carried(tree, pose, tree.poses[parent], force, moment)
                 wrenches[parent] = (wrenches[parent][0] + f, wrenches[parent][1] + n)
     return result
+
+
+def _beyond_rigid(tree: Tree, kinematics: Kinematics, motions: Sequence[LinkMotion], w_dot: np.ndarray,
+                  a_0: np.ndarray) -> Iterator[tuple[int, Wrench]]:
+    """Body number, and what added mass and deflection need beyond its rigid inertia, about the link's origin, link axes."""
+    model, algebra = tree.model, tree.algebra
+    numbers = {body.name: k for k, body in enumerate(model.bodies)}
+    for load in model.loads:
+        if isinstance(load, AddedMass):
+            k = numbers[getattr(load.body, "name", load.body)]
+            pose = tree.poses[k]
+            if pose.link != GROUND:
+                added = water.of_load(algebra, load, pose.R, pose.point(algebra.constants(load.point)))
+                upwards = kinematics.frames[pose.link][0].T @ a_0
+                yield k, water.inertial_wrench(added, motions[pose.link], kinematics.twists[pose.link][1], upwards)
+    for body in tree.flexible:
+        joint = tree.links[body.link].joint
+        k = numbers[getattr(joint.parent, "name", joint.parent)]
+        motion = base_motion(a_0) if body.root == GROUND else motions[body.root]
+        yield k, body.inertial_forces(motion, w_dot[body.speeds.start:body.speeds.stop])[0]
 
 
 def _closing(closure: Closure, lam: np.ndarray, act: Any, kinematics: Kinematics) -> np.ndarray:
@@ -76,7 +101,7 @@ def _at_joint(tree: Tree, joint: Joint, pose: Pose, force: np.ndarray, moment: n
               kinematics: Kinematics) -> np.ndarray:
     at = pose.point(tree.algebra.constants(joint.child_point))
     n = moment - cross(at, force)
-    if not isinstance(joint, Fixed):
+    if not isinstance(joint, (Fixed, Modal)):
         link = tree.links[pose.link]
         f_d, n_d = _drive(link.S, drives[link.speeds.start:link.speeds.stop])
         force, n = force - f_d, n - n_d

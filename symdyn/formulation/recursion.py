@@ -12,9 +12,9 @@ import sympy as sp
 from symdyn.errors import SymdynError
 from symdyn.formulation.articulated import Articulated
 from symdyn.formulation.inertia_faults import demand_pivots, massless
+from symdyn.formulation.inertial_forces import inertial_forces
 from symdyn.formulation.motion import Solver
 from symdyn.formulation.motion_equations import MotionEquations
-from symdyn.formulation.newton_euler import inertial_wrench, outward
 from symdyn.formulation.recursive.page import Page
 from symdyn.formulation.tree import Tree
 from symdyn.formulation.tree_equations import derive_tree
@@ -109,15 +109,15 @@ class RecursiveTree(TreeQuantities):
         super().__init__(tree)
         self.page = Page(tree, self.loads)
         self.own = _own_speeds(tree)
-        self.notes = ["mass matrix: accelerations come from articulated bodies, without it"]
-        if self.own is None:
-            self.notes = ["articulated bodies: a speed moves several joints, or one by a factor, so accelerations come from "
-                          "the mass matrix by composite bodies"]
-        self.notes += self.page.notes
+        self.notes.append("mass matrix: accelerations come from articulated bodies, without it" if self.own is not None else
+                          "articulated bodies: a speed moves several joints, or one by a factor, so accelerations come from "
+                          "the mass matrix by composite bodies")
+        self.notes += self.page.notes if tree.rigid else [
+            "no pages of links, Coriolis matrix or center of mass: they are of rigid bodies, without added mass"]
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
-        return {**super().quantities(), **self.page.quantities()}
+        return {**super().quantities(), **(self.page.quantities() if self.tree.rigid else {})}
 
     def demand_inertia(self) -> None:
         if self.own is None:
@@ -149,13 +149,8 @@ class RecursiveTree(TreeQuantities):
         if self.own is None:
             return super().accelerations()
         applied = self.loads.applied()
-        wrenches = []
-        for k, (link, motion) in enumerate(zip(self.tree.links, outward(self.tree, self.tree.b, -self.gravity()), strict=True)):
-            with self.algebra.section(f"link {link.name}: inertial force and moment"):
-                f, n = inertial_wrench(link.effective, motion)
-                f, n = f - applied.wrenches[k][0], n - applied.wrenches[k][1]
-                wrenches.append((self.algebra.vector(f"f{k + 1}", f), self.algebra.vector(f"n{k + 1}", n)))
-        w_dot = self.articulated().solve(applied.joint, wrenches)
+        wrenches, along = inertial_forces(self.tree, self.tree.b, -self.gravity(), applied.wrenches)
+        w_dot = self.articulated().solve(applied.joint - along, wrenches)
         return self.algebra.name("ud", w_dot[list(self.own)])
 
 

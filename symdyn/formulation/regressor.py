@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.newton_euler import LinkMotion, inertial_wrench, outward, rates_matrix
+from symdyn.formulation.link_motion import LinkMotion, inertial_wrench, rates_matrix
+from symdyn.formulation.newton_euler import outward
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.vectors import Vector, cross, dot, vector, zeros

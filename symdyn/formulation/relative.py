@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.newton_euler import LinkMotion, base_motion, carried_on
+from symdyn.formulation.link_motion import LinkMotion, base_motion
+from symdyn.formulation.newton_euler import carried_on
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.spatial.vectors import cross, identity, zeros
 from symdyn.tape.evaluate import constant

@@ -7,6 +7,7 @@ the links are turned instead, by the sum of the angles, and nothing has to be tu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +15,16 @@ import numpy as np
 
 from symdyn.formulation.algebra import TapeAlgebra, add_rates
 from symdyn.formulation.axes import along_coordinate_axis
+from symdyn.formulation.flexible import FlexibleLink
 from symdyn.formulation.lumping import coordinate_axis, unmoved
-from symdyn.model.joints import Fixed, Joint, JointMotion
+from symdyn.formulation.water import of_load
+from symdyn.model.elements import AddedMass
+from symdyn.model.joints import Fixed, Joint, JointMotion, Modal
 from symdyn.model.joints.base import turn
+from symdyn.model.joints.modal import exactly
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
-from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import identity, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import Node, is_zero
@@ -71,6 +76,8 @@ class Tree:
     w = D u + w_t and w_dot = D u_dot + b, with w the speeds of all joints, (n_w,)
     poses      one for each body; ground: pose of the ground's frame
     rates      q_dot, (n_q,)
+    added      added mass: number of a link, and that of the water it moves along, about its origin, link axes
+    flexible   what elastic coordinates add to the links
     parallel   number of links whose frames are kept parallel to their parents'
     """
 
@@ -84,12 +91,27 @@ class Tree:
     w_t: np.ndarray
     b: np.ndarray
     rates: list[Any]
+    added: tuple[tuple[int, ArticulatedInertia], ...] = ()
+    flexible: tuple[FlexibleLink, ...] = ()
     parallel: int = 0
 
     @property
     def plain(self) -> bool:
         """Whether the joint speeds are the generalized speeds themselves."""
         return self.D.shape[0] == self.D.shape[1] and bool(np.all(np.asarray(np.eye(len(self.w), dtype=int) == self.D)))
+
+    @property
+    def rigid(self) -> bool:
+        """Whether there are rigid bodies only, without added mass."""
+        return not self.added and not self.flexible
+
+    def added_to(self, link: int) -> ArticulatedInertia | None:
+        """The added mass of a link."""
+        return next((added for k, added in self.added if k == link), None)
+
+    def elastic(self, link: int) -> FlexibleLink | None:
+        """The flexible body whose free end is a link."""
+        return next((body for body in self.flexible if body.link == link), None)
 
     def path(self, link: int) -> list[int]:
         """The link and its ancestors, leaf first."""
@@ -168,8 +190,10 @@ class _Builder:
             self._align()
         links = tuple(self._link(k) for k in range(len(self.parts)))
         D = np.array(self.rows, dtype=object).reshape(len(self.w), len(model.speeds))
-        return Tree(model, a, links, tuple(self._worked(p) for p in poses), self._worked(ground), D, vector(*self.w),
-                    vector(*self.w_t), vector(*self.b), self.rates, sum(part.spin is not None for part in self.parts))
+        worked = tuple(self._worked(p) for p in poses)
+        return Tree(model, a, links, worked, self._worked(ground), D, vector(*self.w), vector(*self.w_t), vector(*self.b),
+                    self.rates, self._added(worked), self._flexible(links, worked),
+                    sum(part.spin is not None for part in self.parts))
 
     # -- body-fixed frames
 
@@ -295,6 +319,37 @@ class _Builder:
             a.vector(f"r{k + 1}", r)
         return Link(part.name, part.joint, part.parent, a.vector(f"R{k + 1}", R), r, part.motion.S, part.motion.c, part.speeds,
                     inertia, effective)
+
+    # -- water and elastic bodies
+
+    def _added(self, poses: Sequence[Pose]) -> tuple[tuple[int, ArticulatedInertia], ...]:
+        a = self.algebra
+        numbers = {body.name: k for k, body in enumerate(self.model.bodies)}
+        found: dict[int, ArticulatedInertia] = {}
+        for load in self.model.loads:
+            if isinstance(load, AddedMass):
+                pose = poses[numbers[getattr(load.body, "name", load.body)]]
+                if pose.link == GROUND:
+                    continue
+                with a.section(f"load {load.label}"):
+                    added = of_load(a, load, pose.R, pose.point(a.constants(load.point)))
+                    found[pose.link] = found[pose.link] + added if pose.link in found else added
+        return tuple(sorted(found.items(), key=lambda item: item[0]))
+
+    def _flexible(self, links: Sequence[Link], poses: Sequence[Pose]) -> tuple[FlexibleLink, ...]:
+        a = self.algebra
+        found = []
+        for joint, parent in zip(self.model.joints, self.model.parents, strict=True):
+            if not isinstance(joint, Modal):
+                continue
+            number = next(k for k, link in enumerate(links) if link.joint is joint)
+            pose, speeds = poses[parent], links[number].speeds
+            places = slice(speeds.start, speeds.stop)
+            eta = a.constants(joint.coordinates)
+            K, D = (a.expression(factor) * exactly(matrix) for factor, matrix in
+                    ((joint.stiffness, joint.beam.K), (joint.damping, joint.beam.D)))
+            found.append(FlexibleLink(number, pose.link, pose.R, pose.p, speeds, eta, vector(*self.w[places]), K, D, joint.beam))
+        return tuple(found)
 
     def _worked(self, pose: Pose) -> Pose:
         """A body's pose in the frame that its link is worked in."""

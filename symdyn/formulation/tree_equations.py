@@ -15,7 +15,7 @@ from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.provenance import OfBodies
 from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
-from symdyn.model.joints import Fixed, Joint
+from symdyn.model.joints import Fixed, Joint, Modal
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model
 from symdyn.tape.recorder import Recorder
@@ -52,13 +52,18 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
     """The equations that hold the quantities of a tree; again: derives them anew."""
     model, tree, algebra = quantities.model, quantities.tree, quantities.algebra
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
-                      model.parameters, model.defaults, model.initial, model.units, model.duration)
-    return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, quantities.quantities(),
+                      model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model))
+    recorded = quantities.quantities()
+    lengths = [e for shape in model.shapes for e in shape.expressions]
+    if lengths:
+        recorded["drawn_lengths"] = partial(algebra.constants, lengths)
+    return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, recorded,
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
-                  frames="parallel" if tree.parallel else "body", identification=quantities.identification,
-                  provenance=OfBodies(quantities),
+                  frames="parallel" if tree.parallel else "body",
+                  identification=quantities.identification if tree.rigid else None,
+                  provenance=OfBodies(quantities), watched=quantities.loads.watches,
                   bodies=tuple(b.name for b in model.bodies),
-                  joints=_joints(quantities),
+                  joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
                   **more)
 
 
@@ -79,6 +84,11 @@ def _notes(model: Model, tree: Tree) -> list[str]:
     if tree.parallel:
         notes.append(f"turning between links: the frames of {tree.parallel} links stay parallel to those before them")
     return notes
+
+
+def _reach(model: Model) -> dict[sp.Symbol, float]:
+    """Elastic coordinates: a deflection of a tenth of the beam's length is far."""
+    return {q: joint.reach for joint in model.joints if isinstance(joint, Modal) for q in joint.coordinates}
 
 
 def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:

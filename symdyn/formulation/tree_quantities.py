@@ -10,13 +10,15 @@ import numpy as np
 from symdyn.formulation import composite
 from symdyn.formulation.identification import Identification
 from symdyn.formulation.inertia_faults import demand_mass_matrix
+from symdyn.formulation.inertial_forces import inverse_dynamics
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.loads import Loads
 from symdyn.formulation.motion import Motion
-from symdyn.formulation.newton_euler import inverse_dynamics, inward, outward
+from symdyn.formulation.newton_euler import inward, outward
 from symdyn.formulation.reactions import reactions
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.model.bodies import Point
+from symdyn.model.elements import Element
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, joint_speeds
@@ -34,10 +36,11 @@ class TreeQuantities(Motion):
                          [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters, _gimbal_remarks(model))
         self.tree = tree
         self.model = model
-        self.loads = Loads(tree)
         self.kinematics = Kinematics(tree)
+        self.loads = Loads(tree, self.kinematics)
         self.identification = Identification(tree, self.speed_rates)
-        self.notes: list[str] = []
+        self.notes: list[str] = [] if tree.rigid else [
+            "no regressor, base parameters or momenta: added mass and elastic bodies are no inertias of rigid bodies"]
 
     @property
     def reacting(self) -> tuple[Joint, ...]:
@@ -60,7 +63,9 @@ class TreeQuantities(Motion):
                "joint_points": self.joint_points, "reactions": self.reactions, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
-        return {**super().quantities(), **own, **self.identification.quantities()}
+        if any(isinstance(load, Element) for load in self.model.loads):
+            own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
+        return {**super().quantities(), **own, **(self.identification.quantities() if self.tree.rigid else {})}
 
     # -- the equations, joint by joint
 
@@ -215,6 +220,13 @@ class TreeQuantities(Motion):
                     f = link.effective.m * turned[k]
                     force, moment = applied.wrenches[k]
                     applied.wrenches[k] = (force + f, moment + cross(link.effective.h, turned[k]))
+            for body in self.tree.flexible:
+                with self.algebra.section(f"link {self.tree.links[body.link].name}: weight of the deflected body"):
+                    (f, n), along = body.weight(g if body.root == GROUND else turned[body.root])
+                    if body.root != GROUND:
+                        force, moment = applied.wrenches[body.root]
+                        applied.wrenches[body.root] = (force + f, moment + n)
+                    applied.joint[body.speeds.start:body.speeds.stop] += along
         return inward(self.tree, applied.wrenches) + applied.joint
 
     def project(self, tau: np.ndarray) -> np.ndarray:

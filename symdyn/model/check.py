@@ -15,8 +15,9 @@ import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body, Point
+from symdyn.model.elements import AddedMass, Element
 from symdyn.model.faults import NAME, Faults
-from symdyn.model.joints import Joint
+from symdyn.model.joints import Joint, Modal
 from symdyn.model.loads import Force, JointForce
 from symdyn.model.loop_check import constraint_faults, idle_coordinate_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
@@ -50,10 +51,11 @@ class _Checker:
     def model(self) -> Model:
         s = self.system
         self._names()
+        slender = {id(j.parent) for j in self.joints if isinstance(j, Modal)}
         for body in s.bodies:
             faults, doubts = inertia_faults(body, s.planar)
             self.faults += faults
-            self.doubts += doubts
+            self.doubts += [] if id(body) in slender else doubts
         for joint in [*self.joints, *s.loops]:
             self.faults.extend(joint.faults)
         self.faults += loop_faults(s.loops, {str(j.name): j for j in self.joints}, self._resolve)
@@ -65,6 +67,7 @@ class _Checker:
         elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in _symbols_in(expressions)]
         self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
         self._loads()
+        self._shapes()
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
         initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states],
                                                        *self.inputs], "coordinate, speed, state or input")
@@ -80,7 +83,8 @@ class _Checker:
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
-            defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units})
+            defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units},
+            tuple(s.shapes))
 
     # -- names
 
@@ -297,6 +301,10 @@ class _Checker:
     def _loads(self) -> None:
         joints = {str(j.name): j for j in self.joints}
         for load in self.loads:
+            if isinstance(load, (Element, AddedMass)):
+                self.faults.extend(load.faults)
+                if load.body is self.system.ground or load.body == "ground":
+                    self.faults.append(f"{load.label} acts on the ground, so that nothing comes of it; pass a body that moves")
             if isinstance(load, JointForce):
                 joint = joints.get(load.joint) if isinstance(load.joint, str) else load.joint
                 if joint not in self.joints:
@@ -316,6 +324,20 @@ class _Checker:
         for output in self.system.outputs:
             if isinstance(output.value, Point):
                 self._resolve(output.value.body, f"output {output.name!r}: body")
+
+    def _shapes(self) -> None:
+        """Shapes have the bodies and parameters that the mechanism has without them."""
+        for shape in self.system.shapes:
+            if self.system.ground_motion is not None and shape.about["kind"] != "water" and (
+                    getattr(shape.body, "name", shape.body) == "ground"):
+                self.faults.append(f"{shape.what}: shapes are not drawn on a ground that moves; draw them on a body")
+            ends = [shape.about["to"]] if shape.about.get("to") is not None else []
+            for body in (shape.body, *ends):
+                self._resolve(body, shape.what)
+            strange = [a for a in _symbols_in(shape.expressions) if a not in self.parameters]
+            if strange:
+                self.faults.append(f"{shape.what} uses {', '.join(map(str, strange))}, which the mechanism does not have for a "
+                                   f"parameter; there are {', '.join(map(str, self.parameters)) or 'none'}; pass numbers")
 
     def _numbers(self, given: Any, what: str, allowed: Iterable[sp.Symbol], kind: str) -> dict[sp.Symbol, float]:
         """A table of numbers by symbol; symbols are known by their names."""

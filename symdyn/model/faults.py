@@ -60,6 +60,17 @@ class Faults(list[str]):
             return sp.ImmutableMatrix(sp.zeros(3, 3))
         return sp.ImmutableMatrix(3, 3, lambda i, j: self.expression(entries[i][j], f"{what}[{i + 1}, {j + 1}]"))
 
+    def square(self, value: Any, n: int, what: str) -> sp.ImmutableMatrix:
+        """An n x n matrix; a list of n stands for its diagonal."""
+        rows = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(rows, (list, tuple)) and len(rows) == n:
+            if not any(_is_row(e) for e in rows):
+                rows = [[e if i == k else 0 for k in range(n)] for i, e in enumerate(rows)]
+            if all(_is_row(row) and len(row) == n for row in rows):
+                return sp.ImmutableMatrix(n, n, lambda i, j: self.expression(rows[i][j], f"{what}[{i + 1}, {j + 1}]"))
+        self.append(f"{what} is not a {n} x {n} matrix; pass {n} rows of {n}, or the {n} diagonal entries")
+        return sp.ImmutableMatrix(sp.zeros(n, n))
+
     def _entries(self, value: Any, what: str) -> list:
         if isinstance(value, sp.MatrixBase):
             return list(value)

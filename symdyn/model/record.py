@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.joints import Joint
+from symdyn.model.shapes import Drawn
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Model:
     parameters, inputs   symbols in the order of first use
     defaults      number for each parameter that has one; initial: for coordinates, speeds, states, inputs
     units         symbol -> unit
+    shapes        what bodies look like
     """
 
     name: str
@@ -63,6 +65,7 @@ class Model:
     initial: Mapping[sp.Symbol, float]
     duration: float
     units: Mapping[sp.Symbol, str]
+    shapes: tuple[Drawn, ...] = ()
 
 
 def joint_speeds(joint: Joint) -> tuple[Any, ...]:

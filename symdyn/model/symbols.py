@@ -141,7 +141,7 @@ def as_expression(value: Any, what: str) -> sp.Expr:
     unknown = sorted(map(str, taken.atoms(AppliedUndef, sp.Derivative, sp.Integral)))
     if unknown:
         raise ModelError([f"{what} uses {', '.join(unknown)}, which has no value; write it out, "
-                          "use a coordinate and its .dot, or an input"])
+                          "use a coordinate and its .dot, an input, or a function of your own, sd.External"])
     return taken
 
 

@@ -11,15 +11,20 @@ import sympy as sp
 from symdyn.model.bodies import Body, Point
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
+from symdyn.model.elements import AddedMass, Element
 from symdyn.model.faults import Faults
+from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, NamedOutput, State
+from symdyn.model.shapes import Drawn, drawn
 from symdyn.model.symbols import Coordinate, as_coordinate
 
 if TYPE_CHECKING:
     from symdyn.diagnosis import Diagnosis
+    from symdyn.flexible.beam import Beam
+    from symdyn.flexible.modal_body import ModalBody
     from symdyn.formulation.augmented_equations import AugmentedEquations
     from symdyn.formulation.embedding import EmbeddedEquations
     from symdyn.formulation.motion_equations import MotionEquations
@@ -27,6 +32,7 @@ if TYPE_CHECKING:
 
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
+Load = TypeVar("Load", Element, AddedMass)
 
 
 class System:
@@ -61,6 +67,7 @@ class System:
         self.constraints: list[Constraint] = []
         self.loops: list[Joint | Gear] = []
         self.ground_motion: Joint | None = None
+        self.shapes: list[Drawn] = []
         self.extra_coordinates: list[sp.Symbol] = []
         self.defaults: dict[Any, float] = {}
         self.initial: dict[Any, float] = {}
@@ -96,6 +103,25 @@ class System:
         else:
             self.joints.append(joint)
         return joint
+
+    def add_flexible_body(self, name: str, beam: Beam | ModalBody, coordinates: Sequence[Any] | None = None,
+                          stiffness: Any = 1, damping: Any = 1, carries: bool = True) -> FlexibleBody:
+        """Add a beam that bends in assumed modes; its clamped end is a body for joints, its free end another.
+
+        beam          sd.Beam(...), or its integrals
+        coordinates   elastic coordinates, one a mode; default: named after the body and the modes
+        stiffness, damping   factors of the beam's stiffness and damping, numbers or parameters
+        carries       whether anything sits on the free end; without, its frame stays at the clamped end and costs nothing
+
+        The kinetic energy is complete to second order in the elastic coordinates and their derivatives, their coupling with large
+        motions of the clamped end, centrifugal and gravity stiffening included; see symdyn.flexible.ModalBody. Returns the bodies
+        `root` and `tip`, both with the axes of the beam's frame where it is straight, and the coordinates. Raises ModelError if
+        beam is none.
+        """
+        body = flexible_body(name, beam, coordinates, stiffness, damping, carries)
+        self.bodies += [body.root, body.tip]
+        self.joints.append(body.joint)
+        return body
 
     def close_loop(self, joint: Closure) -> Closure:
         """A joint between two bodies that are already in the tree, an sd.Rod, or an sd.Gear: it becomes constraints.
@@ -165,6 +191,15 @@ class System:
             f.expression(stiffness, f"{label}: stiffness"), f.expression(damping, f"{label}: damping"),
             f.expression(length, f"{label}: length"), label))
 
+    def add_load(self, load: Load) -> Load:
+        """Add a load that follows from the pose and motion of a body, such as sd.Buoyancy or sd.MooringLine, or added mass."""
+        if not isinstance(load, (Element, AddedMass)):
+            self._faults.append(f"add_load was given {load!r}; pass a load such as sd.Buoyancy(...) or sd.LinearDamping(...)")
+        else:
+            load.label = load.label or f"{load.kind}_{len(self.loads) + 1}"
+            self.loads.append(load)
+        return load
+
     # -- outputs, states, constraints
 
     def add_output(self, name: str, value: Any) -> None:
@@ -194,6 +229,13 @@ class System:
         taken = self._faults.expression(expression, label)
         if len(self._faults) == faults:
             self.constraints.append(Constraint(label, taken))
+
+    def draw(self, body: Any, *shapes: Any, color: Any = None) -> None:
+        """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
+
+        color   text such as '#3377aa', '0.8' or 'orange', or three numbers from 0 to 1; default: one for each body
+        """
+        self.shapes += drawn(self._faults, body, shapes, color, self.planar)
 
     # -- what comes of it
 

@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.model.bodies import Point
 from symdyn.model.closures import Gear, Rod
+from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.model.record import joint_speeds
@@ -45,6 +46,9 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
             yield load.label, load.values, False
         elif isinstance(load, SpringDamper):
             yield load.label, [*load.point_a, *load.point_b, load.stiffness, load.damping, load.length], True
+        elif isinstance(load, (Element, AddedMass)):
+            yield load.label, load.constants, True
+            yield load.label, load.expressions, False
     for output in s.outputs:
         if isinstance(output.value, Point):
             yield f"output {output.name!r}: point", output.value.at, True
@@ -101,6 +105,9 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
             note([load.stiffness], "N/m")
             note([load.damping], "N s/m")
             note([load.length, *load.point_a, *load.point_b], "m")
+        elif isinstance(load, (Element, AddedMass)):
+            for unit, expressions in load.units.items():
+                note(expressions, unit)
     for output in s.outputs:
         if isinstance(output.value, Point):
             note(output.value.at, "m")

@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from symdyn.errors import CompilerNotFound
@@ -58,6 +58,12 @@ def require_compiler() -> Compiler:
 def no_compiler_reason() -> str:
     """One sentence: why there is no compiler, what was tried, what to do. Empty if there is one."""
     return _search(*_asked())[1]
+
+
+def plain(compiler: Compiler) -> Compiler:
+    """The same without optimization, where it knows how: for long code that runs seldom. Results keep every bit."""
+    known = compiler.kind in ("gcc", "clang", "zig")
+    return replace(compiler, command=(*compiler.command, "-O0")) if known else compiler
 
 
 def flags(compiler: Compiler) -> list[str]:

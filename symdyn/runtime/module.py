@@ -15,6 +15,10 @@ from symdyn.runtime.unit import Evaluator, Unit
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
+    from symdyn.runtime.statics.campbell import Campbell
+    from symdyn.runtime.statics.equilibria import Equilibria
+    from symdyn.runtime.statics.equilibrium import Equilibrium
+    from symdyn.runtime.statics.linearize import Linearization
 
 Provider = Callable[[str], Unit]
 
@@ -194,6 +198,59 @@ class Module:
         from symdyn.runtime.simulate import simulate
 
         return simulate(self, t, q, u, params, **options)
+
+    # -- statics and linearization
+
+    def equilibrium(self, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None, t: float = 0.0,
+                    inputs: Any = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibrium:
+        """A state of rest, or of steady motion with given speeds, near a start: Newton's method with exact derivatives.
+
+        free      coordinates that are found, by name or symbol; the others stay at the start. Default: all. Parameters and
+                  inputs among them are found, too: each takes one value in `fixed` as its condition, whose equation then
+                  holds (a coordinate that is named in both where it is not clear which)
+        fixed     coordinates, speeds and extra states with the numbers they have; forces along them may be anything. The
+                  coordinate of a speed that is given stays at its start (the azimuth of a rotor that spins steadily)
+        start     by name or symbol, in order (q, or x), or an Equilibrium; default: the system's initial values, speeds zero
+        unknown_params   parameters that are found, in place of naming them in `free`
+
+        Constraints are fulfilled at the same time. Raises NoEquilibrium with the forces that are left,
+        EquilibriumNotUnique with the direction that has no stiffness, ArgumentError for what does not fit.
+        """
+        from symdyn.runtime.statics.equilibrium import equilibrium
+
+        return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
+
+    def equilibria(self, starts: Any = 100, ranges: Any = None, seed: int = 0, **options: Any) -> Equilibria:
+        """Equilibria from many starts, told apart and named; see symdyn.runtime.statics.equilibria.equilibria.
+
+        starts    how many random ones, or the starts themselves, each as for `equilibrium`
+        ranges    coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`
+        options   of `equilibrium`
+        """
+        from symdyn.runtime.statics.equilibria import equilibria
+
+        return equilibria(self, starts, ranges, seed, **options)
+
+    def linearize(self, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
+                  fixed: Any = None, coordinates: Sequence[Any] | None = None) -> Linearization:
+        """The linear equations about a state, by exact derivatives; constraints are eliminated by their null space.
+
+        at            an Equilibrium, with all that belongs to it; a Solution, at its time nearest to t; x in order; (q, u); or by
+                      name or symbol. Default: the system's initial values
+        free, fixed   as for `equilibrium`; what stays is left out
+        coordinates   which changes are independent, where constraints leave a choice; default: the best conditioned
+
+        See symdyn.runtime.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
+        """
+        from symdyn.runtime.statics.linearize import linearize
+
+        return linearize(self, at, params, t, inputs, free, fixed, coordinates)
+
+    def campbell(self, speed: Any, values: Any, **options: Any) -> Campbell:
+        """Natural frequencies over a rotor's speed; see symdyn.runtime.statics.campbell.campbell for all options."""
+        from symdyn.runtime.statics.campbell import campbell
+
+        return campbell(self, speed, values, **options)
 
     # -- about the module
 

@@ -90,7 +90,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if bar is not None:
             bar.close()
     solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
-                        work)
+                        work, (request.rtol, float(request.atol.max(initial=0.0))))
     if outcome.interrupted:
         raise SimulationInterrupted(solution, outcome.message)
     if not outcome.success:

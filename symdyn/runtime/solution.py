@@ -29,11 +29,12 @@ class Solution:
     t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
     success, message    whether the end was reached, and if not when, where and why
     n_steps, n_rejected, nfev   of the integrator; seconds: wall time of the call, integrator_seconds: inside compiled code
+    tolerances    relative, and the largest absolute one, if they are known
     corrections   of projections onto the constraints: the largest of position and speed, how many, how much work
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
-                 seconds: float, work: bool = False) -> None:
+                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None) -> None:
         self.module = module
         self.t = outcome.t
         self.x = outcome.x[:, :-1] if work else outcome.x
@@ -43,7 +44,7 @@ class Solution:
         self.integrator_seconds = outcome.seconds
         self.seconds = seconds
         self.params, self.method, self.backend = params, method, module.backend
-        self.corrections = outcome.corrections
+        self.corrections, self.tolerances = outcome.corrections, tolerances
         self._inputs = inputs
         self._n_c = len(names(module))
 
@@ -117,6 +118,11 @@ class Solution:
         if self.module.metadata["conservative"]:
             return np.zeros(len(self.t))
         raise ArgumentError(f"{self.module.name} has loads that do work; pass work=True to simulate")
+
+    @property
+    def has_work(self) -> bool:
+        """Whether the work of the loads was integrated along with the motion."""
+        return self._work is not None
 
     @cached_property
     def inputs(self) -> np.ndarray:
@@ -196,17 +202,41 @@ class Solution:
 
     # -- pictures and files
 
-    def plot(self, path: Any = None) -> Any:
-        """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given."""
+    def plot(self, path: Any = None, view: Any = None) -> Any:
+        """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given.
+
+        view   (elevation, azimuth) of the eye on the mechanism, degrees
+        """
         from symdyn.runtime.pictures import plot
 
-        return plot(self, path)
+        return plot(self, path, view)
 
-    def animate(self, path: Any = None, fps: int = 25, speed: float = 1.0) -> Any:
-        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given."""
+    def picture(self, t: Any = None, path: Any = None, view: Any = None) -> Any:
+        """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
+        it if a path is given.
+
+        view   as for `plot`, or one for each picture
+        Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
+        """
+        from symdyn.runtime.pictures import picture
+
+        return picture(self, t, path, view)
+
+    def animate(self, path: Any = None, fps: int = 25, speed: float = 1.0, view: Any = None) -> Any:
+        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`."""
         from symdyn.runtime.pictures import animate
 
-        return animate(self, path, fps, speed)
+        return animate(self, path, fps, speed, view)
+
+    def report(self, path: Any) -> Path:
+        """Write one HTML file that tells all about the run: parameters, start, curves, extremes, energy, pictures, and what
+        was generated. It opens without a network; returns its path.
+
+        Raises ArgumentError for another ending than .html, MissingExtra without matplotlib.
+        """
+        from symdyn.runtime.run_report import write_report
+
+        return write_report(self, path)
 
     def save(self, path: Any) -> Path:
         """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs, outputs and multipliers in columns).

@@ -77,8 +77,14 @@ class ArticulatedInertia:
         return cls(inertia.I, np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=object),
                    np.array([[m, 0, 0], [0, m, 0], [0, 0, m]], dtype=object))
 
-    def __add__(self, other: ArticulatedInertia) -> ArticulatedInertia:
+    def __add__(self, other: ArticulatedInertia | Inertia) -> ArticulatedInertia:
+        if isinstance(other, Inertia):
+            other = ArticulatedInertia.rigid(other)
         return ArticulatedInertia(self.A + other.A, self.H + other.H, self.M + other.M)
+
+    def momentum(self, omega: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As for Inertia."""
+        return self.H.T @ omega + self.M @ v, self.A @ omega + self.H @ v
 
     def matrix(self) -> np.ndarray:
         """(6, 6), angular part first."""
@@ -108,7 +114,13 @@ class ArticulatedInertia:
         return ArticulatedInertia(about, shifted, M)
 
 
-
 def _permutation(i: int, j: int, k: int) -> int:
     """1 for an even permutation of 0, 1, 2, -1 for an odd one."""
     return (j - i) * (k - j) * (k - i) // 2
+
+
+def total(a: Inertia | ArticulatedInertia, b: Inertia | ArticulatedInertia) -> Inertia | ArticulatedInertia:
+    """The sum of two inertias, as simple as it can be."""
+    if isinstance(a, Inertia) and isinstance(b, Inertia):
+        return a + b
+    return a + b if isinstance(a, ArticulatedInertia) else b + a  # type: ignore[operator]

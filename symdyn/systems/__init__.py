@@ -47,7 +47,12 @@ _CONSTRAINED = {
     "rolling_disc": "rolling:rolling_disc",
     "skate": "rolling:skate",
 }
-_CATALOGUE = {**_TREES, **_CONSTRAINED}
+_FLOATING = {
+    "floating_wind_turbine": "turbines:floating_wind_turbine",
+    "land_wind_turbine": "turbines:land_wind_turbine",
+    "floating_crane": "cranes:floating_crane",
+}
+_CATALOGUE = {**_TREES, **_CONSTRAINED, **_FLOATING}
 
 __all__ = [*_CATALOGUE, "get", "names"]
 
@@ -55,7 +60,8 @@ __all__ = [*_CATALOGUE, "get", "names"]
 def names(constrained: bool | None = None) -> list[str]:
     """The names of the catalogue.
 
-    constrained   True: of mechanisms with loops or constraints only; False: of trees only
+    constrained   True: of mechanisms with loops or constraints only; False: of trees only; those that float, with the loads
+                  of water and wind, are in neither
     """
     return list(_CATALOGUE if constrained is None else _CONSTRAINED if constrained else _TREES)
 

@@ -10,6 +10,7 @@ import sympy as sp
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 
 from symdyn.errors import UnsupportedExpression
+from symdyn.tape.external import Result, UserFunction
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
@@ -80,6 +81,8 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
             if e.base is sp.S.Exp1:
                 return recorder.apply("exp", take(e.exp))
             return recorder.pow(take(e.base), take(e.exp))
+        if isinstance(e, Result):
+            return recorder.call(e.kernel, [take(a) for a in e.args])[e.place]
         if isinstance(e, sp.Piecewise):
             return piecewise(e)
         if isinstance(e, sp.UnevaluatedExpr):
@@ -139,6 +142,11 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
             continue
         if node.op == "leaf":
             done[node] = symbols[node]
+        elif node.op == "call" and isinstance(node.args[0], UserFunction):
+            function, *arguments = node.args
+            done[node] = function.applied([done[a] if isinstance(a, Node) else number(a) for a in arguments])
+        elif node.op == "item":
+            done[node] = done[node.args[0]][node.args[1]]
         elif node.op == "call":
             raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
                                         "the right side instead")

@@ -17,6 +17,7 @@ from symdyn.verification import identities as holds
 from symdyn.verification import reactions
 from symdyn.verification.sample import Sample
 from symdyn.verification.states import samples as samples_of
+from symdyn.verification.user_functions import checks_of_user_functions, without_digits
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one set of equations; prints as a table."""
+    """All checks of one set of equations; prints as a table, with a note on what is known to fewer digits."""
 
     name: str
     states: int
     checks: tuple[Check, ...]
+    note: str = ""
 
     @property
     def passed(self) -> bool:
@@ -52,7 +54,7 @@ class Verification:
             verdict = {True: "ok", False: "FAIL", None: "-"}[c.passed]
             figure = "" if c.residual is None else f"{c.residual:9.1e}  (allowed {c.tolerance:.0e})"
             lines.append(f"  {verdict:5}{c.name:62}{figure}{'  ' + c.remark if c.remark else ''}".rstrip())
-        return "\n".join(lines)
+        return "\n".join([*lines, f"  {self.note}"] if self.note else lines)
 
     def __repr__(self) -> str:
         return str(self)
@@ -107,9 +109,10 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
 
     samples = samples_of(equations, states, digits, params, seed)
     checks = checks_of(equations)
-    checks.append(("NumPy module agrees with the tape, over the condition", holds.backend_agrees("numpy"), 1e-13))
-    if find_compiler() is not None:
-        checks.append(("C module agrees with the tape, over the condition", holds.backend_agrees("c"), 1e-13))
+    backends = {"numpy": "NumPy", "c": "C"} if find_compiler() is not None else {"numpy": "NumPy"}
+    for backend, called in backends.items():
+        checks.append((f"{called} module agrees with the tape, over the condition", holds.backend_agrees(backend), 1e-13))
+    checks += checks_of_user_functions(equations, backends)
     results = []
     for name, check, tolerance in checks:
         with mpmath.workdps(digits + 5):
@@ -117,4 +120,4 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
         known = [r for r in residuals if r is not None]
         remark = "" if known else ("parameters without numbers" if check is holds.positive_definite else "does not apply")
         results.append(Check(name, max(known) if known else None, tolerance, remark))
-    return Verification(f"{equations.name} ({equations.formulation})", states, tuple(results))
+    return Verification(f"{equations.name} ({equations.formulation})", states, tuple(results), without_digits(equations))

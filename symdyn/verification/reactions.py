@@ -10,6 +10,8 @@ import numpy as np
 
 from symdyn.formulation.equations import Equations
 from symdyn.model.closures import Gear
+from symdyn.model.elements import AddedMass
+from symdyn.model.joints import Modal
 from symdyn.model.loads import JointForce
 from symdyn.model.symbols import Coordinate
 from symdyn.spatial.vectors import cross
@@ -22,7 +24,8 @@ from symdyn.verification.sample import Sample, difference, moved, relative
 def move_every_body(s: Sample) -> float | None:
     """m a_G and the rate of the angular momentum about G of every body against weight, loads, and reactions of its joints.
 
-    Does not apply with joint forces, gears and constraints by expression: what these do between two bodies is no reaction.
+    Does not apply with joint forces, gears and constraints by expression: what these do between two bodies is no reaction; nor to
+    bodies that are not rigid or move water along.
     """
     owner = _owner(s.equations)
     if owner is None or owner.model.constraints or not owner.model.bodies:
@@ -43,7 +46,7 @@ def move_every_body(s: Sample) -> float | None:
                 total[body] -= felt
                 terms.append(felt)
     kept = [0, 1, 5] if s.equations.planar else list(range(6))
-    return relative(total[:, kept], np.concatenate([np.ravel(t) for t in terms]))
+    return relative(total[_rigid(owner.model)][:, kept], np.concatenate([np.ravel(t) for t in terms]))
 
 
 def do_no_work(s: Sample) -> float | None:
@@ -57,7 +60,7 @@ def do_no_work(s: Sample) -> float | None:
     powers = []
     terms = [force * s.u for force in (s["F_tilde"], s["k_tilde"], s.constraint_force())]
     for joint, parent, child, point, wrench in _joints(s, owner, bodies):
-        if not all(isinstance(q, Coordinate) for q in joint.coordinates):
+        if not all(isinstance(q, Coordinate) for q in joint.coordinates) or isinstance(joint, Modal):
             continue
         relative_twist = np.zeros(6, dtype=object)
         for body, sign in ((child, 1), (parent, -1)):
@@ -67,6 +70,14 @@ def do_no_work(s: Sample) -> float | None:
         powers.append(sum(products[[0, 1, 5]] if s.equations.planar else products))
         terms.append(products)
     return relative(np.array(powers), np.concatenate(terms)) if powers else None
+
+
+def _rigid(model: Any) -> list[int]:
+    """Places of the bodies that are rigid and move no water along."""
+    others = [load.body for load in model.loads if isinstance(load, AddedMass)]
+    others += [joint.parent for joint in model.joints if isinstance(joint, Modal)]
+    names = {getattr(body, "name", body) for body in others}
+    return [k for k, body in enumerate(model.bodies) if body.name not in names]
 
 
 def _owner(equations: Equations) -> Any:

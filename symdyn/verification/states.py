@@ -42,7 +42,7 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
             return found
         values = {"t": stream.uniform(0, 1), **parameters}
         for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
-            values.update({s.name: stream.uniform(-1, 1) for s in group})
+            values.update({s.name: symbols.reach.get(s, 1) * stream.uniform(-1, 1) for s in group})
         values.update({f"{u.name}_dot": 0.0 for u in symbols.speeds})
         independent: tuple[int, ...] = ()
         if manifold is None:

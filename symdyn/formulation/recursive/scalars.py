@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.flexible import FlexibleLink
 from symdyn.formulation.loads import Applied
 from symdyn.formulation.recursive.rates import Rates
 from symdyn.formulation.tree import Link, Pose, Tree
-from symdyn.spatial.inertia import Inertia
+from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import vector
 from symdyn.tape.node import Node
 
-RECORDS = (Tree, Link, Pose, Inertia, Applied, Rates)
+RECORDS = (Tree, Link, Pose, Inertia, ArticulatedInertia, FlexibleLink, Applied, Rates)
 
 
 def on_scalars(value: Any, number: Callable[[Any], Any]) -> Any:

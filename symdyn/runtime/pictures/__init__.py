@@ -12,7 +12,8 @@ from symdyn.errors import MissingExtra
 try:
     from symdyn.runtime.pictures.animation import animate
     from symdyn.runtime.pictures.plotting import plot
+    from symdyn.runtime.pictures.still import picture
 except ImportError as error:
     raise MissingExtra(f"pictures need matplotlib: pip install 'symdyn[plot]' ({error})") from None
 
-__all__ = ["animate", "plot"]
+__all__ = ["animate", "picture", "plot"]

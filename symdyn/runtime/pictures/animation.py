@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.animation import FuncAnimation
 
 from symdyn.errors import ArgumentError
-from symdyn.runtime.pictures.bodies import make_artists, make_axes, move, points_at
+from symdyn.runtime.pictures.bodies import ABOVE, make_artists, make_axes, move, show
 from symdyn.runtime.pictures.drawing import Drawing
 from symdyn.runtime.pictures.figure import Picture
 from symdyn.runtime.pictures.film import Film
@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 MAX_FRAMES = 3000
 
 
-def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 1.0) -> FuncAnimation:
+def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 1.0,
+            view: Any = None) -> FuncAnimation:
     """The moving bodies, with the way of the last centre of mass.
 
     fps     pictures a second; speed: seconds of motion in one second of film
+    view    elevation and azimuth of the eye, degrees, for a mechanism in space
     path    where to save the film; a GIF, which needs Pillow and nothing else
 
     Returns the animation; a notebook shows it with buttons. Raises ArgumentError if the module gives no positions, if
@@ -47,16 +49,15 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     spans = np.ptp(whole.limits(), axis=1)
     height = 5.0 if drawing.spatial else 6.0 * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.6
     figure = Picture(figsize=(6, height), layout="constrained", dpi=80)
-    axes = make_axes(figure, 111, whole)
-    trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8)[0]
+    axes = make_axes(figure, 111, whole, view)
+    trace = axes.plot(*[[]] * len(drawing.labels), color="0.5", linewidth=0.8, zorder=ABOVE)[0]
     artists = make_artists(axes, drawing)
     axes.set_title(solution.module.name, fontsize=11)
     clock = figure.text(0.02, 1 - 0.2 / height, "", family="monospace")
 
     def draw(k: int) -> list[Any]:
         move(trace, whole.centres[: _passed(t, times[k]), -1])
-        for artist, points in zip(artists, points_at(drawing, k), strict=True):
-            move(artist, points)
+        show(artists, drawing, k)
         clock.set_text(f"t = {times[k]:.2f} s")
         return [trace, *artists, clock]
 

@@ -1,4 +1,4 @@
-"""A mechanism as lines over time, in the axes that are shown."""
+"""A mechanism as lines and shapes over time, in the axes that are shown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from symdyn.runtime.pictures.jointed import carriers, jointed_skeleton, placed_joints
 from symdyn.runtime.pictures.points import points_of
-from symdyn.runtime.pictures.skeleton import Skeleton, bare_skeleton, guess_skeleton
+from symdyn.runtime.pictures.skeleton import Skeleton, bare_skeleton, connect, guess_skeleton
+from symdyn.runtime.pictures.solids import Solids
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -20,13 +21,14 @@ _LEFT_OUT = 1e-9
 
 @dataclass(frozen=True)
 class Drawing:
-    """A mechanism as lines over time, in the axes that are shown.
+    """A mechanism as lines and shapes over time, in the axes that are shown.
 
-    lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted
+    lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted, and for bodies that have shapes
     arms       from each body's first point to its centre of mass, joined in one line; rails: from slider to slider;
                rods: massless ones between two bodies
     centres    centres of mass (n_t, n_b, 2 or 3); pivots: points that hold the mechanism to the ground, (n, 2 or 3)
     sliders    the bodies that slide, and which points of their lines do; labels: of the axes
+    solids     shapes, if there are any; bare: the bodies without
     """
 
     lines: list[np.ndarray]
@@ -37,6 +39,8 @@ class Drawing:
     pivots: np.ndarray
     sliders: Mapping[int, Sequence[int]]
     labels: Sequence[str]
+    solids: Solids | None
+    bare: Sequence[int]
 
     @property
     def spatial(self) -> bool:
@@ -52,17 +56,23 @@ class Drawing:
             return None
         skeleton, kept = _skeleton(solution, centres)
         centres = centres[:, kept]
+        solids = Solids.of(solution)
+        bare = [k for k, body in enumerate(kept) if solids is None or body not in solids.bodies]
+        if solids is not None:
+            skeleton = _without(skeleton, bare)
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
-                                     skeleton.pivots])
+                                     skeleton.pivots, solids.reach() if solids is not None else np.zeros((0, 3))])
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
         shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
+        if solids is not None:
+            shown = [0, 1] if solution.module.metadata.get("planar") else [0, 1, 2]
         if not shown:
             return None
         if len(shown) == 1:
             shown = sorted({*shown, 1 if shown[0] != 1 else 0})
         arms, rails, rods, centres, pivots, *lines = [points[..., shown] for points in (
             skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, *skeleton.lines)]
-        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown])
+        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare)
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""
@@ -72,16 +82,27 @@ class Drawing:
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
         arms, rails, rods, centres, *lines = [points[a] * (1 - w) + points[b] * w for points in
                                               (self.arms, self.rails, self.rods, self.centres, *self.lines)]
-        return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels)
+        return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels,
+                       None if self.solids is None else self.solids.at(t, times), self.bare)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""
+        reach = self.solids.reach() if self.solids is not None else np.zeros((0, 3))
         points = np.concatenate([*[line.reshape(-1, len(self.labels)) for line in self.lines], self.pivots,
-                                 self.centres.reshape(-1, len(self.labels))])
+                                 self.centres.reshape(-1, len(self.labels)), reach[:, :len(self.labels)]])
         low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
         longest = (high - low).max()
         half = np.maximum((high - low) / 2, 0.15 * longest) + 0.06 * longest
         return np.column_stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _without(skeleton: Skeleton, bare: Sequence[int]) -> Skeleton:
+    """The lines of the bodies that have no shapes; others keep their place, with nothing to draw."""
+    n_t = len(skeleton.arms)
+    nothing = np.full((n_t, 1, 3), np.nan)
+    lines = [line if k in bare else nothing for k, line in enumerate(skeleton.lines)]
+    return Skeleton(lines, connect([], n_t), skeleton.rails if bare else connect([], n_t), skeleton.rods, skeleton.pivots,
+                    {k: places for k, places in skeleton.sliders.items() if k in bare})
 
 
 def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[int]]:

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
 
 
-def plot(solution: Solution, path: Any = None) -> Figure:
+def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
     """Coordinates, speeds, states, inputs, outputs and energy over time, and the path of the mechanism.
 
+    view    elevation and azimuth of the eye, degrees, for a mechanism in space
     Returns the figure; saves it (PNG, PDF, SVG by the ending) if a path is given.
     """
     panels = panels_of(solution)
@@ -43,7 +44,7 @@ def plot(solution: Solution, path: Any = None) -> Figure:
         if last:
             axes.set_xlabel("t [s]")
     if drawing:
-        draw_path(figure, grid[:, columns], drawing)
+        draw_path(figure, grid[:, columns], drawing, view)
     figure.suptitle(_title(solution), fontsize=11)
     if path is not None:
         figure.savefig(path, dpi=110)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from symdyn import systems
-from symdyn.formulation import newton_euler
 from symdyn.formulation.articulated import Articulated
+from symdyn.formulation.inertial_forces import inertial_forces
 from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
 from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
 from symdyn.formulation.recursive.numbers import NumericTree
@@ -20,8 +20,7 @@ from tests.formulation.recursive.trees import check, random_vector
 def lean(tree: Tree, tau: np.ndarray) -> np.ndarray:
     """Accelerations by the articulated bodies that generated code is made from."""
     g = tree.algebra.constants(tree.model.gravity)
-    wrenches = [newton_euler.inertial_wrench(link.effective, motion)
-                for link, motion in zip(tree.links, newton_euler.outward(tree, tree.b, -g), strict=True)]
+    wrenches, _ = inertial_forces(tree, tree.b, -g)
     return Articulated(tree, dict.fromkeys(range(len(tree.w)), "")).solve(tau, wrenches)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from symdyn import systems
 from symdyn.errors import SymdynError
-from symdyn.formulation import composite, newton_euler
+from symdyn.formulation import composite, inertial_forces, newton_euler
 from symdyn.formulation.articulated import Articulated
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.recursive.bias import bias, gravity_load
@@ -75,7 +75,7 @@ def test_lean_recursions_give_the_same(seed: int, options: dict[str, bool]) -> N
     here, u_dot = drawn(seed, options)
     tree, applied = here.tree, here.applied
     g, w_dot = tree.algebra.constants(tree.model.gravity), joint_accelerations(tree, u_dot)
-    lean = newton_euler.inverse_dynamics(tree, w_dot, -g, applied.wrenches)
+    lean = inertial_forces.inverse_dynamics(tree, w_dot, -g, applied.wrenches)
     check(generalized(tree, inverse_dynamics(tree, w_dot, wrenches=applied.wrenches).tau), generalized(tree, lean), 1e-13)
     check(composite_bodies(tree).M_w, composite.mass_matrix(tree), 1e-13)
     kinetic = Kinematics(tree)
@@ -89,10 +89,7 @@ def test_lean_articulated_bodies_give_the_same(seed: int, options: dict[str, boo
     here, _ = drawn(seed, options)
     tree, applied = here.tree, here.applied
     g = tree.algebra.constants(tree.model.gravity)
-    wrenches = []
-    for link, motion, (f, n) in zip(tree.links, newton_euler.outward(tree, tree.b, -g), applied.wrenches, strict=True):
-        f_i, n_i = newton_euler.inertial_wrench(link.effective, motion)
-        wrenches.append((f_i - f, n_i - n))
+    wrenches, _ = inertial_forces.inertial_forces(tree, tree.b, -g, applied.wrenches)
     lean = Articulated(tree, dict.fromkeys(range(len(tree.w)), "")).solve(applied.joint, wrenches)
     check(forward_dynamics(tree, applied.joint, applied.wrenches).w_dot, lean, 1e-11)
 

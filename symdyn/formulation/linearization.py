@@ -1,0 +1,141 @@
+"""What statics and linearization need of the equations: their balance at given accelerations, and exact derivatives of it.
+
+balance   [M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot], (n_u + n_c + n_z,), zero in equilibrium; the rows of velocity
+          constraints are 0
+
+Accelerations and multipliers are arguments, so that nothing is solved for and derivatives stay short. Derivatives by
+parameters are directional: the direction is an argument, too, and one short function serves any number of parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.spatial.vectors import vector
+from symdyn.tape import node as kinds
+from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.node import Node
+from symdyn.tape.tape import reachable
+
+if TYPE_CHECKING:
+    from symdyn.formulation.equations import Symbols
+    from symdyn.formulation.motion import Motion
+
+# Arguments of `variation` and `second_variation`, by what they stand for: first the state that varies, then the direction.
+FIRST, DIRECTION = "vary", "along"
+
+
+class Varied:
+    """Records the balance of a formulation and its derivatives."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+        self.algebra, self.recorder = motion.algebra, motion.algebra.recorder
+
+    def quantities(self) -> dict[str, Callable[[], Any]]:
+        """name -> function that records it."""
+        return {"balance": self.balance, "balance_x": lambda: self.by(self.balance(), self.motion.x()),
+                "balance_inputs": lambda: self.by(self.balance(), self._leaves(self.motion.inputs)),
+                "stiffness": lambda: self.by(self.forces(), self._leaves(self.motion.coordinates)),
+                "damping": lambda: self.by(self.forces(), self._leaves(self.motion.speeds)),
+                "N_dot": lambda: self.motion.rate(self.motion.N()),
+                "rates_q": lambda: self.by(vector(*self.motion.rates), self._leaves(self.motion.coordinates)),
+                "rows_q": lambda: self.by(vector(*[row.rate for row in self.motion.rows]), self._leaves(self.motion.coordinates)),
+                "outputs_x": lambda: self.by(self.outputs(), self.motion.x()),
+                "outputs_inputs": lambda: self.by(self.outputs(), self._leaves(self.motion.inputs)),
+                "variation": self.variation, "second_variation": self.second_variation}
+
+    def forces(self) -> np.ndarray:
+        """M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, (n_u,): with u_dot = 0 and lam = 0 what a rest state lacks."""
+        rows = self.motion.rows
+        tau = self.motion.inverse_dynamics()
+        if not rows:
+            return tau
+        C_r = np.array([row.jacobian for row in rows], dtype=object).reshape(len(rows), len(tau))
+        return tau + C_r.T @ vector(*self.multipliers())
+
+    def multipliers(self) -> list[Any]:
+        """Leaves of given multipliers."""
+        return self._made(multiplier_names(len(self.motion.rows)))
+
+    def balance(self) -> np.ndarray:
+        """See above."""
+        with self.algebra.section("balance of forces, constraints and rates of the extra states"):
+            return vector(*self.forces(), *[row.value for row in self.motion.rows], *self.motion.state_rates())
+
+    def by(self, values: np.ndarray, leaves: Sequence[Any]) -> np.ndarray:
+        """Derivatives (len(values), len(leaves)); column by column where numeric algorithms are called."""
+        with self.algebra.section("derivatives"):
+            calls = any(node.op == "call" for node in reachable(values.tolist()))
+            return jacobian(self.recorder, values.tolist(), leaves, "forward" if calls else "auto")
+
+    def outputs(self) -> np.ndarray:
+        """The user's outputs, one after the other."""
+        recorded = self.motion.quantities()
+        values = [np.asarray(record(), dtype=object).ravel() for name, record in recorded.items() if name.startswith("output_")]
+        return np.concatenate(values) if values else vector()
+
+    def variation(self) -> np.ndarray:
+        """Derivative of the balance along a direction of [q; u; z; inputs; p; lam], (n_u + n_c + n_z,)."""
+        return self._along(self.balance(), self._direction())
+
+    def second_variation(self) -> np.ndarray:
+        """The same derivative of the balance's linear form
+        [dbalance/dq N v + dbalance/du u' + M u_dot' + dbalance/dz z' + C_r^T lam'; C_r v; dz_dot], for v, u', u_dot', z', lam'."""
+        motion = self.motion
+        groups = {name: self._made(made) for name, made in _varied(motion, len(motion.rows)).items()}
+        speeds = self._leaves(motion.speeds)
+        with self.algebra.section("linear form of the balance"):
+            moved = forward(self.recorder, motion.rates, dict(zip(speeds, groups["v"], strict=True)))
+            seeds = {**dict(zip(self._leaves(motion.coordinates), moved, strict=True)),
+                     **dict(zip(speeds, groups["u"], strict=True)),
+                     **dict(zip(motion.speed_rates, groups["ud"], strict=True)),
+                     **dict(zip(self._leaves([z for z, _ in motion.states]), groups["z"], strict=True)),
+                     **dict(zip(self.multipliers(), groups["lam"], strict=True))}
+            linear = forward(self.recorder, self.balance().tolist(), seeds)
+        return self._along(vector(*linear), self._direction())
+
+    def _direction(self) -> dict[Any, Any]:
+        motion = self.motion
+        moving = [*motion.coordinates, *motion.speeds, *[z for z, _ in motion.states], *motion.inputs, *motion.parameters]
+        leaves = [*self._leaves(moving), *self.multipliers()]
+        return dict(zip(leaves, self._made(_along([s.name for s in moving], len(motion.rows))), strict=True))
+
+    def _along(self, values: np.ndarray, seeds: Mapping[Node, Any]) -> np.ndarray:
+        with self.algebra.section("derivative along the direction"):
+            return vector(*forward(self.recorder, values.tolist(), seeds))
+
+    def _made(self, names: Sequence[str]) -> list[Any]:
+        return [self.recorder.leaf(name, kinds.ACCELERATION) for name in names]
+
+    def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
+        return [self.algebra.leaves[s] for s in symbols]
+
+
+def multiplier_names(n_c: int) -> list[str]:
+    """Names of given multipliers."""
+    return [f"lambda_{k + 1}" for k in range(n_c)]
+
+
+def variation_names(symbols: Symbols, n_c: int, second: bool) -> list[str]:
+    """Names of what `variation`, or `second_variation`, takes in the group ud besides accelerations and multipliers."""
+    moving = [*symbols.coordinates, *symbols.speeds, *symbols.states, *symbols.inputs, *symbols.parameters]
+    varied = _named([s.name for s in symbols.speeds], [s.name for s in symbols.states], n_c) if second else {}
+    return [*[name for group in varied.values() for name in group], *_along([s.name for s in moving], n_c)]
+
+
+def _varied(motion: Motion, n_c: int) -> dict[str, list[str]]:
+    return _named([s.name for s in motion.speeds], [z.name for z, _ in motion.states], n_c)
+
+
+def _named(speeds: Sequence[str], states: Sequence[str], n_c: int) -> dict[str, list[str]]:
+    return {**{group: [f"({FIRST} {group} {u})" for u in speeds] for group in ("v", "u", "ud")},
+            "z": [f"({FIRST} z {z})" for z in states], "lam": [f"({FIRST} {name})" for name in multiplier_names(n_c)]}
+
+
+def _along(names: Sequence[str], n_c: int) -> list[str]:
+    return [f"({DIRECTION} {name})" for name in (*names, *multiplier_names(n_c))]

@@ -1,0 +1,150 @@
+"""Linear stiffness and damping of a body, 6 x 6."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from symdyn.model.elements.base import Element
+from symdyn.model.elements.checks import six
+from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.spatial.vectors import cross, dot, inner, vector
+
+ANGLES = ("auto", "ZYX", "rotation vector")
+# Tilt, in degrees, up to which a linear stiffness is meant.
+TILT = 20.0
+# (1 - x/2 cot(x/2)) / x^2 is the sum of these times x^(2k), used below x^2 = SMALL, where what is left out is below 1e-26.
+COTANGENT = (Fraction(1, 12), Fraction(1, 720), Fraction(1, 30240), Fraction(1, 1209600), Fraction(1, 47900160),
+             Fraction(691, 1307674368000), Fraction(1, 74724249600))
+SMALL = Fraction(1, 100)
+# cos^2 of the pitch angle below which its rate does not follow from the angular velocity in floats.
+LOCKED = Fraction(1, 10**12)
+
+
+class LinearStiffness(Element):
+    """Generalized force F = force - K (xi - reference) along xi = [x, y, z, phi, theta, psi]: the place of a point of the body
+    in the n-frame and the body's angles.
+
+    K           (6, 6): N/m, N, N m, N m/rad; a list of 6 stands for its diagonal
+    force       (6,) at the reference: N, N m; point: (3,) body axes, m; reference: (6,) m, rad
+    angles      "ZYX": roll, pitch, yaw of R = R_z(psi) R_y(theta) R_x(phi), along whose rates the moments act; singular at a
+                pitch of 90 degrees, where the run stops and tells so
+                "rotation vector": axis times angle, without singularity below half a turn
+                "auto": "ZYX" for a body whose joint with the ground has these angles, else the rotation vector
+    For small angles both are the same. The potential is 1/2 (xi - reference)^T K (xi - reference) - force . (xi - reference) with
+    the symmetric part of K; what is not symmetric in K has no potential and counts as a force that does work (the matrix of
+    a prestressed mooring about a fixed point is so). A linear stiffness is meant for small angles: a tilt above 20 degrees
+    gives a warning.
+    """
+
+    kind = "linear stiffness"
+
+    def __init__(self, body: Any, K: Any, force: Any = (0,) * 6, point: Any = (0, 0, 0), reference: Any = (0,) * 6,
+                 angles: str = "auto", name: str = "") -> None:
+        super().__init__(body, name)
+        where, faults = self.where, self.faults
+        self.K = faults.square(K, 6, f"{where}: K")
+        self.force = six(faults, force, f"{where}: force")
+        self.point = faults.vector(point, f"{where}: point")
+        self.reference = six(faults, reference, f"{where}: reference")
+        self.angles = angles
+        if angles not in ANGLES:
+            faults.append(f"{where}: angles is {angles!r}; pass one of {', '.join(map(repr, ANGLES))}")
+
+    @property
+    def constants(self) -> Sequence[sp.Expr]:
+        return [*self.K, *self.force, *self.point, *self.reference]
+
+    @property
+    def units(self) -> Mapping[str, Sequence[sp.Expr]]:
+        return {"N/m": list(self.K[:3, :3]), "N": [*self.K[3:, :3], *self.force[:3]], "N/rad": list(self.K[:3, 3:]),
+                "N m/rad": list(self.K[3:, 3:]), "N m": self.force[3:], "m": [*self.point, *self.reference[:3]],
+                "rad": self.reference[3:]}
+
+    def act(self, site: Site) -> Action:
+        a = site.algebra
+        turned = self.angles == "rotation vector" or (self.angles == "auto" and not site.angles_given)
+        point, force = a.constants(self.point), a.constants(self.force)
+        place = site.p + site.R @ point
+        xi = vector(*place, *(site.rotation_vector if turned else site.angles)) - a.constants(self.reference)
+        even, odd = a.matrix((self.K + self.K.T) / 2), a.matrix((self.K - self.K.T) / 2)
+        elastic, other = force - even @ xi, -(odd @ xi)
+        return Action(self._wrench(site, turned, point, elastic), self._wrench(site, turned, point, other),
+                      inner(xi, even @ xi) / 2 - inner(force, xi), (self._tilt(site),))
+
+    def _wrench(self, site: Site, turned: bool, point: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment about the origin, body axes, of generalized forces along xi."""
+        f = site.R.T @ Q[:3]
+        n = about_vector(site, Q[3:]) if turned else about_angles(site, Q[3:], self.where)
+        return f, n + cross(point, f)
+
+    def _tilt(self, site: Site) -> Watch:
+        a, R = site.algebra, site.R
+        level = a.sqrt(R[2, 0] * R[2, 0] + R[2, 1] * R[2, 1])
+        tilt = a.recorder.apply("atan2", level, R[2, 2]) * 180 / a.recorder.pi()
+        return Watch(f"tilt of {self.where}", tilt, -1.0, TILT,
+                     f"{self.where}: the body tilts by {{value}} degrees; a linear stiffness is meant for small angles, up to "
+                     f"{TILT:g} degrees")
+
+
+def about_angles(site: Site, Q: np.ndarray, where: str) -> np.ndarray:
+    """The moment, body axes, that does the work Q . [phi_dot, theta_dot, psi_dot]: its components along the axes of the three."""
+    a = site.algebra
+    phi, theta, _ = site.angles
+    c, s = a.cos(phi), a.sin(phi)
+    c_theta = a.cos(theta)
+    c_theta = a.recorder.guard(c_theta, c_theta * c_theta - LOCKED, f"{where}: gimbal lock, the pitch angle is 90 degrees, where "
+                               "moments along yaw and roll are the same; use angles='rotation vector'")
+    across = (Q[2] + a.sin(theta) * Q[0]) / c_theta
+    return vector(Q[0], c * Q[1] + s * across, c * across - s * Q[1])
+
+
+def about_vector(site: Site, Q: np.ndarray) -> np.ndarray:
+    """The moment, body axes, that does the work Q . r_dot of the rotation vector r: Q - r x Q / 2 + k r x (r x Q) with
+    k = (1 - |r|/2 cot(|r|/2)) / |r|^2, as r_dot = omega + r x omega / 2 + k r x (r x omega), body axes."""
+    a, r = site.algebra, site.rotation_vector
+    apply = a.recorder.apply
+    square = dot(r, r)
+    series: Any = 0
+    for factor in reversed(COTANGENT):
+        series = series * square + factor
+    far = apply("max", square, SMALL)  # a branch that is not taken must not divide by zero
+    half = a.sqrt(far) / 2
+    k = apply("select", apply("lt", square, SMALL), series, (1 - half * a.cos(half) / a.sin(half)) / far)
+    first = cross(r, Q)
+    return Q - first / 2 + k * cross(r, first)
+
+
+class LinearDamping(Element):
+    """F = -B [v; omega]: velocity of a point of the body and angular velocity, force and moment about the point, all in body
+    axes, in the order surge, sway, heave, roll, pitch, yaw.
+
+    B       (6, 6): N s/m, N s, N m s; a list of 6 stands for its diagonal
+    point   (3,) body axes, m
+    """
+
+    kind = "linear damping"
+
+    def __init__(self, body: Any, B: Any, point: Any = (0, 0, 0), name: str = "") -> None:
+        super().__init__(body, name)
+        self.B = self.faults.square(B, 6, f"{self.where}: B")
+        self.point = self.faults.vector(point, f"{self.where}: point")
+
+    @property
+    def constants(self) -> Sequence[sp.Expr]:
+        return [*self.B, *self.point]
+
+    @property
+    def units(self) -> Mapping[str, Sequence[sp.Expr]]:
+        return {"N s/m": list(self.B[:3, :3]), "N s": [*self.B[:3, 3:], *self.B[3:, :3]], "N m s": list(self.B[3:, 3:]),
+                "m": list(self.point)}
+
+    def act(self, site: Site) -> Action:
+        point = site.algebra.constants(self.point)
+        v = site.v + cross(site.omega, point)
+        F = -(site.algebra.matrix(self.B) @ vector(*v, *site.omega))
+        return Action(other=(F[:3], F[3:] + cross(point, F[:3])))

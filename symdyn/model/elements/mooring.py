@@ -1,0 +1,88 @@
+"""Mooring lines, at rest at each instant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sympy as sp
+
+from symdyn.model.elements.base import Element
+from symdyn.model.elements.checks import not_negative, positive
+from symdyn.model.elements.site import Action, Site
+from symdyn.spatial.vectors import cross, vector
+from symdyn.tape.catenary import NEAREST, Catenary, potential
+from symdyn.tape.node import is_zero
+
+
+class MooringLine(Element):
+    """An elastic line from a fairlead of the body to an anchor, in the shape it has at rest (quasi-static catenary).
+
+    fairlead    (3,) body axes, m; anchor: (3,) n-frame, m
+    length      unstretched, m
+    weight      in water per unstretched length, N/m
+    stiffness   EA, N
+    seabed      True: the anchor stands on a level seabed, on which part of the line may lie; False: it hangs freely
+    friction    of the line with the seabed, C_B (1 is usual, 0 none)
+
+    Without friction the line has a potential: the elastic energy of the line and that of its weight in water, with zero where all
+    of it lies on the seabed (or at the level of the anchor). With friction it has none, as friction keeps the end of the line
+    from what it would give back; its force then counts as one that does work. A line that is longer than what hangs and
+    what lies on the seabed is slack: it hangs straight down, without horizontal force.
+    The run stops, and tells why, where the fairlead is straight above or below the anchor, or not above the seabed.
+    Source: Jonkman, NREL/TP-500-41958 (2007), section 2.5.2; see symdyn.tape.catenary for the equations.
+    """
+
+    kind = "mooring line"
+
+    def __init__(self, body: Any, fairlead: Any, anchor: Any, length: Any, weight: Any, stiffness: Any, seabed: bool = True,
+                 friction: Any = 0, name: str = "") -> None:
+        super().__init__(body, name)
+        where, faults = self.where, self.faults
+        self.fairlead = faults.vector(fairlead, f"{where}: fairlead")
+        self.anchor = faults.vector(anchor, f"{where}: anchor")
+        self.length = positive(faults, length, f"{where}: length", "m")
+        self.weight = positive(faults, weight, f"{where}: weight", "N/m (in water, per length)")
+        self.stiffness = positive(faults, stiffness, f"{where}: stiffness", "N (EA)")
+        self.friction = not_negative(faults, friction, f"{where}: friction")
+        self.seabed = bool(seabed)
+        if self.friction != 0 and not seabed:
+            faults.append(f"{where}: friction is {self.friction}, but seabed is False, so that there is nothing to rub on; leave "
+                          "friction out, or pass seabed=True")
+
+    @property
+    def constants(self) -> Sequence[sp.Expr]:
+        return [*self.fairlead, *self.anchor, self.length, self.weight, self.stiffness, self.friction]
+
+    @property
+    def units(self) -> Mapping[str, Sequence[sp.Expr]]:
+        return {"m": [*self.fairlead, *self.anchor, self.length], "N/m": [self.weight], "N": [self.stiffness],
+                "1": [self.friction]}
+
+    def act(self, site: Site) -> Action:
+        a, recorder = site.algebra, site.algebra.recorder
+        length, weight, stiffness = (a.divisor(a.expression(value), 0, f"{self.where}: the {what} of the line is not above zero")
+                                     for value, what in ((self.length, "length"), (self.weight, "weight"),
+                                                         (self.stiffness, "stiffness")))
+        friction = a.expression(self.friction)
+        fairlead = a.constants(self.fairlead)
+        d = site.p + site.R @ fairlead - a.constants(self.anchor)
+        square = d[0] * d[0] + d[1] * d[1]
+        nearest = length * NEAREST
+        distance = a.sqrt(recorder.guard(square, square - nearest * nearest, f"{self.where}: the fairlead is straight above or "
+                                         "below the anchor, so that the line has no direction; move the anchor"))
+        height = d[2]
+        if self.seabed:
+            height = recorder.guard(height, height, f"{self.where}: the fairlead is not above the seabed, on which the anchor "
+                                    "stands; move it, or pass seabed=False")
+        values = [distance / length, height / length, weight * length / stiffness, friction]
+        kernel = Catenary((int(self.seabed),), f"{self.where}: no shape at rest was found; look at its length, weight, stiffness "
+                          "and friction and at the place of the fairlead: some of them is negative or not finite")
+        h, v = recorder.call(kernel, values)
+        total = weight * length
+        pull = total * h / distance
+        f = -(site.R.T @ vector(pull * d[0], pull * d[1], total * v))
+        wrench = f, cross(fairlead, f)
+        if not is_zero(friction):
+            return Action(other=wrench)
+        return Action(elastic=wrench, potential=total * length * potential(recorder, self.seabed, (h, v), values))

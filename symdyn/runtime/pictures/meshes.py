@@ -1,0 +1,161 @@
+"""Faces and edges of shapes, in the axes of their bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Color = tuple[float, float, float]
+# Corners of a round section, and of a flat one.
+_ROUND, _FLAT = 20, 10
+# Stations of a shape that bends.
+_BENDING = 13
+
+
+@dataclass(frozen=True)
+class Part:
+    """A convex piece of a shape, or a line.
+
+    vertices   (n, 3); stations: (n, 3), the point of the middle line that each goes with when its body bends
+    faces      vertices of each, counter-clockwise from outside; corners: (m, 4), four of them, which tell the plane
+    hidden     (k, 4), corners of planes where pieces touch: never drawn, but they part the pieces
+    edges      (k, 4): two vertices, two faces (-1: none); creases: (k,), drawn from every side, others as outlines alone
+    width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another
+    """
+
+    body: int
+    color: Color
+    vertices: np.ndarray
+    stations: np.ndarray
+    faces: tuple[np.ndarray, ...]
+    corners: np.ndarray
+    hidden: np.ndarray
+    edges: np.ndarray
+    creases: np.ndarray
+    width: float = 0.5
+    to: int | None = None
+
+
+def parts_of(record: Mapping[str, Any], body: int, color: Color, to: int | None = None, bends: bool = False) -> Iterator[Part]:
+    """The pieces of a shape; to: the body where a line ends; bends: with stations enough to bend."""
+    values = {name: np.array(rows, dtype=float) for name, rows in record["values"].items()}
+    if record["kind"] == "box":
+        yield from _box(body, color, values["size"][0], values["center"][0], values["hole"][0] if "hole" in values else None)
+    elif record["kind"] == "sweep":
+        points, widths = values["points"], values["widths"]
+        if bends:
+            points, widths = _finer(points), _finer(widths, points)
+        yield sweep(body, color, points, widths, values["direction"][0] if "direction" in values else None)
+    elif record["kind"] == "line":
+        points = values["points"].reshape(-1, 3)
+        if bends and to is None:
+            points = _finer(points)
+        yield line(body, color, np.vstack([points, *values.get("end", ())]), float(record["width"]), to)
+
+
+def sweep(body: int, color: Color, points: np.ndarray, widths: np.ndarray, direction: np.ndarray | None = None) -> Part:
+    """Elliptic sections along points (n, 3), widths (n, 2) across: the first along a direction."""
+    along = points[-1] - points[0]
+    along = along / np.linalg.norm(along)
+    for given in (*(() if direction is None else (direction,)), np.eye(3)[np.abs(along).argmin()]):
+        first = given / np.linalg.norm(given)
+        first = first - (first @ along) * along
+        if np.linalg.norm(first) > 1e-6:
+            break
+    first = first / np.linalg.norm(first)
+    second = np.cross(along, first)
+    sides = _ROUND if direction is None else _FLAT
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rings = (points[:, None] + widths[:, :1, None] / 2 * np.cos(angles)[None, :, None] * first
+             + widths[:, 1:, None] / 2 * np.sin(angles)[None, :, None] * second)
+    vertices, count = rings.reshape(-1, 3), len(points)
+
+    def at(k: int, j: int) -> int:
+        return k * sides + j % sides
+
+    faces = [[at(k, j), at(k, j + 1), at(k + 1, j + 1), at(k + 1, j)] for k in range(count - 1) for j in range(sides)]
+    ends = [[at(0, -j) for j in range(sides)], [at(count - 1, j) for j in range(sides)]]
+    return _part(body, color, vertices, [*faces, *ends], (), np.repeat(points, sides, axis=0), lambda face: face >= len(faces))
+
+
+def line(body: int, color: Color, points: np.ndarray, width: float, to: int | None = None) -> Part:
+    """Through points, (n, 3)."""
+    nothing = np.zeros((0, 4), dtype=int)
+    edges = np.array([[k, k + 1, -1, -1] for k in range(len(points) - 1)])
+    return Part(body, color, points, points, (), nothing, nothing, edges, np.ones(len(edges), dtype=bool), width, to)
+
+
+def _box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np.ndarray | None) -> Iterator[Part]:
+    """A box; one with an opening is four around it, without edges where they touch."""
+    reach = [[c - s / 2, c + s / 2] for c, s in zip(center, size, strict=True)]
+    if hole is not None:
+        for k in range(2):
+            reach[k][1:1] = [center[k] - hole[k] / 2, center[k] + hole[k] / 2]
+    xs, ys, zs = reach
+    vertices = np.array([[x, y, z] for x in xs for y in ys for z in zs])
+    n, m = len(xs) - 1, len(ys) - 1
+
+    def at(i: int, j: int, k: int) -> int:
+        return (i * len(ys) + j) * 2 + k
+
+    def walls(*way: tuple[int, int]) -> list[list[int]]:
+        """Upright faces along a way that has the piece on its left."""
+        return [[at(*a, 0), at(*b, 0), at(*b, 1), at(*a, 1)] for a, b in zip(way, way[1:], strict=False)]
+
+    def lids(*way: tuple[int, int]) -> list[list[int]]:
+        """Top and bottom over a way around the piece."""
+        return [[at(*p, 1) for p in way], [at(*p, 0) for p in reversed(way)]]
+
+    if hole is None:
+        around = ((0, 0), (n, 0), (n, m), (0, m))
+        yield _part(body, color, vertices, [*lids(*around), *walls(*around, (0, 0))])
+        return
+    left, right = ((0, 0), (1, 0), (1, 1), (1, 2), (1, 3), (0, 3)), ((2, 0), (3, 0), (3, 3), (2, 3), (2, 2), (2, 1))
+    yield _part(body, color, vertices, [*lids(*left), *walls(*left[4:], *left[:2]), *walls(*left[2:4])], walls((1, 0), (1, 3)),
+                rims=[(at(1, j, 0), at(1, j, 1)) for j in (1, 2)])
+    yield _part(body, color, vertices, [*lids(*right), *walls(*right[:4]), *walls(*right[4:])], walls((2, 3), (2, 0)),
+                rims=[(at(2, j, 0), at(2, j, 1)) for j in (1, 2)])
+    for piece in (((1, 0), (2, 0), (2, 1), (1, 1)), ((1, 2), (2, 2), (2, 3), (1, 3))):
+        yield _part(body, color, vertices, [*lids(*piece), *walls(*piece[:2]), *walls(*piece[2:])],
+                    [*walls(*piece[1:3]), *walls(piece[3], piece[0])])
+
+
+def _part(body: int, color: Color, vertices: np.ndarray, faces: Sequence[Sequence[int]], hidden: Sequence[Sequence[int]] = (),
+          stations: np.ndarray | None = None, crease: Callable[[int], bool] = lambda face: True,
+          rims: Sequence[tuple[int, int]] = ()) -> Part:
+    """A piece with the vertices that its faces use.
+
+    crease   whether an edge of a face is drawn from every side; rims: edges of one face alone that are drawn nevertheless
+    """
+    used = sorted({v for face in faces for v in face})
+    place = {v: k for k, v in enumerate(used)}
+    owners: dict[tuple[int, int], list[int]] = {}
+    for k, face in enumerate(faces):
+        for a, b in zip(face, [*face[1:], face[0]], strict=True):
+            owners.setdefault((min(a, b), max(a, b)), []).append(k)
+    seen = {tuple(sorted(rim)) for rim in rims}
+    edges, creases = [], []
+    for ends, both in owners.items():
+        if len(both) == 2 or ends in seen:
+            edges.append([*(place[v] for v in ends), *(both if len(both) == 2 else [*both, -1])])
+            creases.append(any(map(crease, both)))
+    own = vertices[used]
+    return Part(body, color, own, own if stations is None else stations[used],
+                tuple(np.array([place[v] for v in face]) for face in faces), _corners(faces, place), _corners(hidden, place),
+                np.array(edges), np.array(creases))
+
+
+def _corners(faces: Sequence[Sequence[int]], place: Mapping[int, int]) -> np.ndarray:
+    """Four corners of each face, all around it."""
+    return np.array([[place[face[k * len(face) // 4]] for k in range(4)] for face in faces], dtype=int).reshape(-1, 4)
+
+
+def _finer(values: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+    """Rows at more stations, equally far apart along points (default: the rows themselves)."""
+    points = values if points is None else points
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    wanted = np.unique(np.concatenate([lengths, np.linspace(0, lengths[-1], _BENDING)]))
+    return np.column_stack([np.interp(wanted, lengths, column) for column in values.T])

@@ -1,0 +1,167 @@
+"""What a report of one run tells in tables: facts, parameters, start, extremes, energy, constraints, what loads look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solution import Solution
+
+WHERE = {"c": "compiled C", "numpy": "NumPy"}
+# An energy balance worse than this is marked.
+DOUBTFUL = 1e-6
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The balance of a run, J: work of the loads (input less dissipation), change of energy, the largest difference of the two on
+    the way, and this relative to the larger of kinetic energy and range of potential energy; rows over time: work, change."""
+
+    work: float
+    change: float
+    difference: float
+    relative: float
+    rows: np.ndarray
+
+    @property
+    def doubtful(self) -> bool:
+        return not self.relative <= DOUBTFUL
+
+
+def number(value: Any) -> str:
+    """Six digits."""
+    return f"{float(value):.6g}".replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "not a number"
+
+
+def facts(solution: Solution) -> list[tuple[str, str]]:
+    """How the run was computed: pairs of title and text."""
+    rows = [("Formulation", str(solution.module.metadata.get("formulation", "unknown"))),
+            ("Computed by", f"{solution.method} on {WHERE.get(solution.backend, solution.backend)}")]
+    if len(solution.t):
+        rows.append(("Span", f"t = {number(solution.t[0])} s to {number(solution.t[-1])} s, {len(solution.t)} times"))
+    if solution.tolerances is not None:
+        rows.append(("Tolerances", f"relative {solution.tolerances[0]:.3g}, absolute {solution.tolerances[1]:.3g}"))
+    rows += [("Steps", f"{solution.n_steps}, and {solution.n_rejected} rejected"), ("Evaluations", str(solution.nfev))]
+    inside = solution.integrator_seconds
+    rows.append(("Time", _seconds(solution.seconds)
+                 + (f", of which {_seconds(inside)} inside the integrator" if inside is not None else "")))
+    sizes = solution.module.metadata["sizes"]
+    counts = [(len(solution.module.metadata.get("bodies", ())), "body", "bodies"), (sizes["q"], "coordinate", "coordinates"),
+              (sizes["u"], "speed", "speeds"), (sizes["z"], "extra state", "extra states"), (sizes["inputs"], "input", "inputs"),
+              (sizes["p"], "parameter", "parameters")]
+    return [*rows, ("Model", ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in counts if n))]
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.3g} s" if time >= 1 else f"{1e3 * time:.3g} ms"
+
+
+def unit(text: str) -> str:
+    """A unit with raised figures."""
+    return text.replace("^2", "\N{SUPERSCRIPT TWO}").replace("^3", "\N{SUPERSCRIPT THREE}")
+
+
+def parameters(solution: Solution) -> list[dict[str, Any]]:
+    """Every parameter with its value, unit, default, and whether the value differs from it."""
+    metadata = solution.module.metadata
+    rows = []
+    for name, value, default in zip(metadata["parameters"], solution.params, metadata["defaults"], strict=True):
+        given = default is not None and bool(np.isfinite(default))
+        rows.append({"name": name, "value": number(value), "unit": unit(metadata["units"].get(name, "")),
+                     "default": number(default) if given else "none", "changed": not given or float(value) != float(default)})
+    return rows
+
+
+def start(solution: Solution) -> list[dict[str, str]]:
+    """The state that the run begins with."""
+    if not len(solution.t):
+        return []
+    metadata = solution.module.metadata
+    return [{"name": name, "value": number(value), "unit": unit(metadata["units"].get(name, ""))}
+            for name, value in zip(metadata["x"], solution.x[0], strict=True)]
+
+
+def extremes(solution: Solution) -> list[dict[str, str]]:
+    """Least and largest value with their times, mean and standard deviation over time of all coordinates, speeds, states, inputs
+    and outputs."""
+    rows = []
+    for kind, name, unit, values in _curves(solution):
+        if not len(values) or not np.isfinite(values).all():
+            continue
+        low, high = int(values.argmin()), int(values.argmax())
+        mean = _mean(solution.t, values)
+        rows.append({"kind": kind, "name": name, "unit": unit, "least": number(values[low]), "t_least": number(solution.t[low]),
+                     "most": number(values[high]), "t_most": number(solution.t[high]), "mean": number(mean),
+                     "deviation": number(np.sqrt(_mean(solution.t, (values - mean)**2)))})
+    return rows
+
+
+def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
+    """Kind, name, unit and values (n_t,) of everything that is one number over time."""
+    from symdyn.runtime.pictures.points import points_of
+
+    metadata = solution.module.metadata
+    for kind, group, columns in (("coordinate", "q", solution.q), ("speed", "u", solution.u), ("state", "z", solution.z),
+                                 ("input", "inputs", solution.inputs)):
+        for name, values in zip(metadata[group], columns.T, strict=True):
+            yield kind, name, unit(metadata["units"].get(name, "")), values
+    points = points_of(solution)
+    for name, rows in solution.outputs.items():
+        if rows.ndim <= 2:
+            flat = rows.reshape(len(solution.t), -1)
+            point = points.get(name)
+            for k, values in enumerate(flat.T):
+                place = "" if flat.shape[1] == 1 else f"[{k}]" if point is None else f" {'xyz'[k]}"
+                yield "output", name + place, "" if point is None else point.unit, values
+
+
+def _mean(t: np.ndarray, values: np.ndarray) -> float:
+    """Mean over time; between the times the values go straight."""
+    if len(t) < 2:
+        return float(values.mean())
+    return float(((values[1:] + values[:-1]) / 2 * np.diff(t)).sum() / (t[-1] - t[0]))
+
+
+def energy(solution: Solution) -> Energy | None:
+    """The balance, where energy is known and the work of the loads is (a run with work=True, or loads that do none)."""
+    known = solution.has_work or solution.module.metadata["conservative"]
+    if not known or "energy" not in solution.module.functions or not len(solution.t):
+        return None
+    change = solution.energy - solution.energy[0]
+    difference = float(np.abs(change - solution.work).max())
+    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(),
+                  np.column_stack([solution.work, change]))
+
+
+def constraints(solution: Solution) -> list[dict[str, str]]:
+    """How well every constraint is kept: its largest residual, relative to the mechanism's length, and of its rate."""
+    names = solution.module.metadata.get("constraints", ())
+    if not names or not len(solution.t):
+        return []
+    off, rate = (np.abs(rows).max(axis=0) for rows in (solution.constraint_violation, solution.velocity_violation))
+    return [{"name": name, "position": f"{a:.2g}", "velocity": f"{b:.2g}"} for name, a, b in zip(names, off, rate, strict=True)]
+
+
+def watches(solution: Solution) -> list[dict[str, Any]]:
+    """What loads want to be looked at: range of each value, its limits, and what it means if it leaves them."""
+    looked_at = solution.module.metadata.get("watches", ())
+    if not looked_at or "watches" not in solution.module.functions or not len(solution.t):
+        return []
+    rows = []
+    values = solution.rows("watches").reshape(len(solution.t), -1)
+    for (label, least, most, message), column in zip(looked_at, values.T, strict=True):
+        low, high = float(np.nanmin(column)), float(np.nanmax(column))
+        worst = low if low < least else high
+        outside = low < least or high > most
+        rows.append({"label": label, "least": number(low), "most": number(high), "limits": _limits(least, most),
+                     "outside": outside, "message": message.replace("{value}", number(worst)) if outside else ""})
+    return rows
+
+
+def _limits(least: float, most: float) -> str:
+    ends = [f"from {number(least)}"] if np.isfinite(least) else []
+    return " ".join([*ends, *([f"to {number(most)}"] if np.isfinite(most) else [])]) or "none"

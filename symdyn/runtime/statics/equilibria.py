@@ -1,0 +1,190 @@
+"""Equilibria from many starts, told apart."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find
+from symdyn.runtime.statics.selection import Selection, listed, select
+from symdyn.runtime.statics.terms import Place, coordinate_names
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Equilibria this close, in m, rad and Euler parameters, are one.
+APART = 1e-6
+# Random starts differ by so much unless ranges are given: in rad, and in what is no angle.
+TURNS, LENGTHS = np.pi, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria:
+    """Different equilibria, stable ones first, then by how many starts lead there; prints as a table. An index is a number.
+
+    found        each with a name
+    counts       from how many starts each was found; iterations: of each start, in order, -1 where none was found
+    failures     (start, message) of starts that led nowhere
+    """
+
+    title: str
+    found: tuple[Equilibrium, ...]
+    counts: tuple[int, ...]
+    iterations: np.ndarray
+    failures: tuple[tuple[np.ndarray, str], ...]
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __iter__(self) -> Any:
+        return iter(self.found)
+
+    def __getitem__(self, key: int) -> Equilibrium:
+        return self.found[key]
+
+    @property
+    def stable(self) -> tuple[Equilibrium, ...]:
+        """The stable ones."""
+        return tuple(e for e in self.found if e.stable)
+
+    def __repr__(self) -> str:
+        starts = len(self.iterations)
+        lines = [f"{self.title}: {len(self.found)} equilibria from {starts} starts, at most "
+                 f"{int(self.iterations.max(initial=0))} iterations, {len(self.failures)} starts without"]
+        for equilibrium, count in zip(self.found, self.counts, strict=True):
+            lines.append(f"  {equilibrium.name}  ({count} starts)")
+        return "\n".join(lines)
+
+
+def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int = 0, start: Any = None, free: Any = None,
+               fixed: Any = None, params: Any = None, t: float = 0.0, inputs: Any = None, unknown_params: Any = None,
+               max_iterations: int = 100) -> Equilibria:
+    """Equilibria from many starts.
+
+    starts   how many random ones, or the starts themselves, each as for Module.equilibrium
+    ranges   coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`; a speed stands for
+             the motion along it (rotations in Euler parameters: about that axis). Default: half a turn, 1 m
+    The others as for Module.equilibrium. Two are the same if coordinates differ by less than 1e-6, angles of joints that turn
+    all the way by whole turns, Euler parameters by their sign. A start that leads to none is told in `failures`; raises
+    NoEquilibrium with the first message if none of them leads anywhere.
+    """
+    selection = select(module, free, fixed, unknown_params)
+    first = begin(module, selection, start, params, t, inputs)
+    if isinstance(starts, (int, np.integer)) and not isinstance(starts, bool):
+        if starts < 1:
+            raise ArgumentError(f"{module.name}: {starts} starts asked for; at least 1 is needed")
+        places = _random(first, selection, int(starts), ranges, seed)
+    else:
+        if ranges is not None:
+            raise ArgumentError(f"{module.name}: ranges are given, but so are the starts themselves; leave one of them out")
+        places = [begin(module, selection, each, params, t, inputs) for each in starts]
+    found: list[Equilibrium] = []
+    counts: list[int] = []
+    iterations: list[int] = []
+    failures: list[tuple[np.ndarray, str]] = []
+    for place in places:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore" if found else "default")  # what is watched over is told once
+                new = find(place, selection, max_iterations)
+        except NoEquilibrium as error:
+            failures.append((place.x, str(error)))
+            iterations.append(-1)
+            continue
+        iterations.append(new.iterations)
+        known = [k for k, e in enumerate(found) if same(e, new)]
+        if known:
+            counts[known[0]] += 1
+        else:
+            found.append(new)
+            counts.append(1)
+    if not found:
+        raise NoEquilibrium(f"{module.name}: none of {len(failures)} starts leads to an equilibrium; the first: {failures[0][1]}")
+    order = sorted(range(len(found)), key=lambda k: (not found[k].stable, -counts[k]))
+    named = _named([found[k] for k in order])
+    return Equilibria(module.name, tuple(named), tuple(counts[k] for k in order), np.array(iterations), tuple(failures))
+
+
+def same(a: Equilibrium, b: Equilibrium) -> bool:
+    """Whether two are one but for whole turns and the sign of Euler parameters."""
+    metadata = a.module.metadata
+    names = metadata["q"]
+    gap, there = a.q - b.q, np.ones(len(names), dtype=bool)
+    for group in metadata.get("unit_groups", ()):
+        places = [names.index(n) for n in group]
+        there[places] = False
+        if min(np.abs(a.q[places] - b.q[places]).max(), np.abs(a.q[places] + b.q[places]).max()) > APART:
+            return False
+    gap = np.array([_turned(g) if metadata["units"].get(n) == "rad" else g for g, n in zip(gap, names, strict=True)])
+    more = [a.z - b.z, [a[n] - b[n] for n in a.selection.unknown]]
+    sizes = [*a.z, *[a[n] for n in a.selection.unknown]]
+    return bool((np.abs(gap[there]) <= APART).all()
+                and all(abs(g) <= APART * max(1.0, abs(s)) for g, s in zip(np.concatenate(more), sizes, strict=True)))
+
+
+def _turned(angle: float) -> float:
+    """Between -pi and pi."""
+    return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
+
+
+def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: int) -> list[Place]:
+    """Starts around the first one."""
+    metadata = first.module.metadata
+    labels = coordinate_names(metadata)
+    spans = _spans(first, ranges)
+    stream = np.random.default_rng(seed)
+    B = selection.directions(first)
+    places = []
+    for _ in range(count):
+        v = np.array([stream.uniform(*spans[label]) for label in labels])
+        x = first.x.copy()
+        x[:len(first.q)] = first.moved(B @ (np.linalg.pinv(B) @ v))
+        places.append(first.at(x=selection.apply(x)))
+    return places
+
+
+def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
+    module = first.module
+    metadata = module.metadata
+    labels = coordinate_names(metadata)
+    spans = {label: _span(LENGTHS if metadata["units"].get(u) != "rad/s" else TURNS, label, module.name)
+             for label, u in zip(labels, metadata["u"], strict=True)}
+    if ranges is None:
+        return spans
+    if not isinstance(ranges, Mapping):
+        raise ArgumentError(f"{module.name}: ranges must be a mapping from coordinates to (least, most), found {ranges!r}")
+    names = listed(list(ranges), [*labels, *metadata["u"]], "ranges", module.name)
+    given = {labels[metadata["u"].index(n)] if n in metadata["u"] else n: _span(value, n, module.name)
+             for n, value in zip(names, ranges.values(), strict=True)}
+    return {**dict.fromkeys(labels, (0.0, 0.0)), **given}
+
+
+def _span(value: Any, name: str, owner: str) -> tuple[float, float]:
+    try:
+        pair = (-abs(float(value)), abs(float(value))) if np.ndim(value) == 0 else (float(value[0]), float(value[1]))
+    except (TypeError, ValueError, IndexError):
+        pair = (np.nan, np.nan)
+    if not (np.isfinite(pair).all() and pair[0] <= pair[1]) or (np.ndim(value) and len(value) != 2):
+        raise ArgumentError(f"{owner}: the range of {name} is {value!r}; pass (least, most), or one number r for (-r, r)")
+    return pair
+
+
+def _named(found: list[Equilibrium]) -> list[Equilibrium]:
+    """Each with its number, its stability, and the coordinates in which the equilibria differ."""
+    if not found:
+        return []
+    names = found[0].module.metadata["q"]
+    all_q = np.array([e.q for e in found])
+    spread = np.ptp(all_q, axis=0) if len(found) > 1 else np.zeros(len(names))
+    order = [k for k in np.argsort(-spread, kind="stable") if spread[k] > APART][:2]
+    result = []
+    for k, e in enumerate(found):
+        kind = {True: "stable", False: "unstable", None: "rigid"}[e.stable]
+        where = ", ".join(f"{names[i]} = {e.q[i]:.4g}" for i in sorted(order))
+        result.append(replace(e, name=f"{k + 1}: {kind}" + (f" at {where}" if where else "")))
+    return result

@@ -1,0 +1,301 @@
+"""Equilibria: states of rest, or of steady motion with given speeds, found from a start and judged by their eigenvalues."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning
+from symdyn.runtime.arguments import take
+from symdyn.runtime.consistent import normalised, number
+from symdyn.runtime.statics.linear import Reduced
+from symdyn.runtime.statics.modes import eigen, stable
+from symdyn.runtime.statics.search import Search, Trial
+from symdyn.runtime.statics.selection import Selection, select
+from symdyn.runtime.statics.terms import Place, coordinate_names, null_space, rest
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Stiffness below this part of the largest, in the metric of the mass matrix, is none.
+LOOSE = 1e-11
+# Steady motion must fulfil the constraints up to this part of its speed.
+STEADY = 1e-9
+# Residuals that a message names, at most.
+TOLD = 4
+_FORCES = {"rad/s": "N m", "m/s": "N"}
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state of rest, or of steady motion with given speeds.
+
+    place, selection   the state with all that belongs to it, and what was kept
+    residual           of forces that are left, by the speed they work along, N or N m
+    iterations         steps tried
+    name               tells it from others (see Module.equilibria)
+    """
+
+    place: Place
+    selection: Selection
+    residual: Mapping[str, float]
+    iterations: int
+    name: str = "equilibrium"
+
+    @property
+    def module(self) -> Module:
+        return self.place.module
+
+    @property
+    def t(self) -> float:
+        return self.place.t
+
+    @property
+    def x(self) -> np.ndarray:
+        """[q; u; z], (n_x,)."""
+        return self.place.x
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.place.q
+
+    @property
+    def u(self) -> np.ndarray:
+        return self.place.u
+
+    @property
+    def z(self) -> np.ndarray:
+        return self.place.z
+
+    @property
+    def lam(self) -> np.ndarray:
+        """Multipliers, (n_c,); where constraints depend on each other those of least norm after scaling."""
+        return self.place.lam
+
+    @property
+    def params(self) -> np.ndarray:
+        """Parameters in order, with those that were solved for, (n_p,)."""
+        return self.place.p
+
+    @property
+    def inputs(self) -> np.ndarray:
+        return self.place.inputs
+
+    @property
+    def residual_norm(self) -> float:
+        """Largest force or moment that is left, N or N m."""
+        return max(map(abs, self.residual.values()), default=0.0)
+
+    @property
+    def solved(self) -> dict[str, float]:
+        """Parameters and inputs that were solved for, by name."""
+        return {name: self[name] for name in self.selection.unknown}
+
+    @cached_property
+    def eigenvalues(self) -> np.ndarray:
+        """Of the linearization, what is kept left out, by size, (m,) complex, 1/s."""
+        values = eigen(Reduced(self.place, self.selection))[0]
+        return np.asarray(values[np.lexsort((values.imag, np.abs(values)))])
+
+    @cached_property
+    def stable(self) -> bool | None:
+        """Whether no small motion grows, by the eigenvalues; None if nothing can move."""
+        return stable(self.eigenvalues)
+
+    @property
+    def message(self) -> str:
+        """What was found, in a sentence."""
+        kind = {True: "stable", False: "unstable", None: "nothing can move"}[self.stable]
+        return f"{kind} equilibrium after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
+
+    def __getitem__(self, name: Any) -> float:
+        """A coordinate, speed, extra state, parameter or input by name or symbol. Raises ArgumentError for an unknown name."""
+        name = str(getattr(name, "name", name))
+        metadata = self.module.metadata
+        for names, values in ((metadata["x"], self.x), (metadata["parameters"], self.params), (metadata["inputs"], self.inputs)):
+            if name in names:
+                return float(values[names.index(name)])
+        raise ArgumentError(f"{self.module.name}: the equilibrium has no {name!r}; it has {', '.join(metadata['x'])}, parameters "
+                            "and inputs")
+
+    def describe(self) -> str:
+        """The state as a table, with what was solved for, and whether it is stable."""
+        metadata = self.module.metadata
+        shown = [*metadata["q"], *[u for u in metadata["u"] if self[u]], *metadata["z"], *self.selection.unknown]
+        width = max([4, *map(len, shown)])
+        lines = [f"{self.module.name}: {self.name}, {self.message}"]
+        for name in shown:
+            unit = metadata["units"].get(name, "")
+            note = "  solved for" if name in self.selection.unknown else "  kept" if name in self.selection.kept else ""
+            lines.append(f"  {name:<{width}} = {self[name]:>14.8g} {unit}{note}".rstrip())
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return self.describe()
+
+
+def equilibrium(module: Module, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None, t: float = 0.0,
+                inputs: Any = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibrium:
+    """See Module.equilibrium."""
+    selection = select(module, free, fixed, unknown_params)
+    place = begin(module, selection, start, params, t, inputs)
+    return find(place, selection, max_iterations)
+
+
+def begin(module: Module, selection: Selection, start: Any, params: Any, t: float, inputs: Any) -> Place:
+    """Where the search begins."""
+    metadata = module.metadata
+    time = number(t, "a finite number of seconds as t", module.name)
+    if isinstance(start, Equilibrium):
+        x = start.x.copy()
+        x[len(metadata["q"]):len(metadata["q"]) + len(metadata["u"])] = 0.0
+    else:
+        if start is not None and not isinstance(start, Mapping) and np.shape(start) == (len(metadata["q"]),):
+            start = dict(zip(metadata["q"], start, strict=True))
+        x = take(start, metadata["x"], "start",
+                 {n: 0.0 if n in metadata["u"] and n not in metadata["q"] else metadata["initial"].get(n, 0.0)
+                  for n in metadata["x"]}, module.name)
+    x = normalised(module, selection.apply(x))
+    if isinstance(params, Mapping) and selection.parameters:  # a guess need not be given
+        given = {str(getattr(k, "name", k)) for k in params}
+        known = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
+        params = {**dict.fromkeys([n for n in selection.parameters if n not in given and known[n] is None], 0.0), **params}
+    free = take(inputs if inputs is not None else {}, metadata["inputs"], "inputs", dict.fromkeys(metadata["inputs"], 0.0),
+                module.name)
+    return rest(module, time, x, module.parameters(params), free)
+
+
+def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
+    """The equilibrium from a start. Raises NoEquilibrium, EquilibriumNotUnique, ArgumentError."""
+    owner = place.module.name
+    try:
+        search = Search(place, selection)
+    except EvaluationError as error:
+        raise NoEquilibrium(f"{owner}: the search cannot begin: {error}; begin elsewhere, with start={{...}}") from error
+    if len(search.weights) < len(search.widths(search.best)):
+        raise ArgumentError(f"{owner}: {len(search.widths(search.best))} values are unknown, but there are {len(search.weights)} "
+                            "equations; fix a coordinate for each parameter that is solved for")
+    good, reason = search.run(limit)
+    trial = search.best
+    if not good:
+        _refuse(search, reason)
+    _demand_stiffness(search)
+    _demand_steady(trial)
+    _look(trial.place)
+    return Equilibrium(trial.place, selection, _left(trial), search.steps)
+
+
+def _left(trial: Trial) -> dict[str, float]:
+    """Forces that are left, by the coordinate they work along; what is kept bears anything."""
+    Q = trial.tested @ np.linalg.pinv(trial.tested)
+    labels = coordinate_names(trial.place.module.metadata)
+    return {name: float(v) for name, v in zip(labels, Q @ trial.place.forces, strict=True)}
+
+
+def _refuse(search: Search, reason: str) -> NoReturn:
+    """Raises NoEquilibrium with what is left, and where."""
+    trial, module = search.best, search.module
+    metadata = module.metadata
+    labels = coordinate_names(metadata)
+    forces = _left(trial)
+    weighed = np.abs(np.array(list(forces.values()))) * search.columns
+    order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:TOLD]
+    left = ", ".join(f"{forces[labels[k]]:.6g} {_FORCES.get(metadata['units'].get(metadata['u'][k], ''), '')}".strip()
+                     + f" along {labels[k]}" for k in order)
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["q"], trial.place.q, strict=True))
+    gaps = trial.place.C * trial.place.scale
+    names = metadata.get("constraints", ())
+    open_ = ", ".join(f"{n} by {g:.3g} m" for n, g in zip(names, gaps, strict=True) if abs(g) > 1e-9)
+    loose = [f"nothing holds {name}: it has no stiffness there, so it sinks, rises or turns away"
+             for k, name in enumerate(labels) if k in order[:1] and _slack(trial, k, search.columns)]
+    parts = [f"no equilibrium found: {reason}, after {search.steps} iterations"]
+    parts += [f"forces left are {left}"] if left else []
+    parts += [f"constraints are open: {open_}"] if open_ else []
+    parts += [*loose, f"the last state is {where}; begin elsewhere with start={{...}}, or check the loads"]
+    raise NoEquilibrium(f"{module.name}: " + "; ".join(parts))
+
+
+def _slack(trial: Trial, k: int, columns: np.ndarray) -> bool:
+    """Whether a force along speed k meets (almost) no stiffness."""
+    K = trial.place.by_v[:trial.place.sizes[1]] * np.outer(columns, columns)
+    return bool(np.abs(K[k]).max(initial=0.0) <= 1e-6 * np.abs(K).max(initial=0.0) or not K.any())
+
+
+def _demand_stiffness(search: Search) -> None:
+    """Raises EquilibriumNotUnique for a direction in which nothing holds."""
+    trial, module = search.best, search.module
+    place, columns = trial.place, search.columns
+    n_u = place.sizes[1]
+    if trial.selection.conditions:  # what is solved for takes part: as many equations as unknowns, seen by the scaled derivative
+        J = trial.derivative() * search.weights[:, None] * search.widths(trial)
+        labels = [*_direction_names(trial), *[module.metadata["z"][k] for k in trial.selection.states], *trial.selection.unknown]
+        _, values, Vt = np.linalg.svd(J)
+        loose = Vt[len(values):] if len(values) < J.shape[1] else Vt[values <= 1e-9 * values.max(initial=0.0)]
+    else:
+        rows = np.vstack([place.C_r, trial.selection.rows(place)]) * columns
+        Z = null_space(rows)
+        K = place.by_v[:n_u] * np.outer(columns, columns)
+        reduced = Z.T @ K @ Z
+        if place.sizes[2] and len(trial.selection.states):  # what extra states do at rest is stiffness, too
+            on_z, states = slice(n_u + place.sizes[3], None), trial.selection.states
+            inner, outer = place.by_z[on_z][states][:, states], place.by_v[on_z][states] * columns
+            reduced = reduced - Z.T @ (place.by_z[:n_u][:, states] * columns[:, None]) @ np.linalg.pinv(inner) @ outer @ Z
+        _, values, Vt = np.linalg.svd(reduced)
+        size = max(np.abs(K).max(initial=0.0), 1e-300)
+        loose = (Vt @ Z.T)[values <= LOOSE * size] if len(values) else Vt[:0] @ Z.T
+        labels = list(coordinate_names(module.metadata))
+    if len(loose):
+        raise EquilibriumNotUnique(
+            f"{module.name}: the equilibrium is not unique: there is no stiffness along "
+            + " and along ".join(_told(direction, labels) for direction in loose)
+            + f"; fix it, such as fixed={{{_first(loose[0], labels)!r}: ...}}, or add a load that holds it")
+
+
+def _direction_names(trial: Trial) -> list[str]:
+    labels = coordinate_names(trial.place.module.metadata)
+    return [labels[int(np.argmax(np.abs(column)))] for column in trial.directions.T]
+
+
+def _told(direction: np.ndarray, labels: list[str]) -> str:
+    """Coordinates of a direction by their shares of its square, the largest first."""
+    shares = direction**2 / np.sum(direction**2)
+    order = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= 0.05]
+    return ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in order)
+
+
+def _first(direction: np.ndarray, labels: list[str]) -> str:
+    return labels[int(np.argmax(np.abs(direction)))]
+
+
+def _demand_steady(trial: Trial) -> None:
+    """Raises NoEquilibrium if constraints do not let the given speeds stay."""
+    place = trial.place
+    if not place.sizes[3]:
+        return
+    names = place.module.metadata["constraints"]
+    speed = max(float(np.abs(place.u).max(initial=0.0)), 1e-300)
+    rates, demanded = place.evaluate("C_dot") * place.scale, place.evaluate("F_d") * place.scale
+    for what, values, size in (("move with", rates, speed), ("demand accelerations of", demanded, speed * max(speed, 1.0))):
+        k = int(np.argmax(np.abs(values)))
+        if abs(values[k]) > STEADY * max(size, 1e-3):
+            raise NoEquilibrium(f"{place.module.name}: at t = {place.t:g} s the constraints {what} {values[k]:.6g} m/s"
+                                f"{'^2' if values is demanded else ''} ({names[k]}) at the speeds that are given: there is no rest "
+                                "there; give speeds that fit them, or simulate the motion")
+
+
+def _look(place: Place) -> None:
+    """Warn of what elements watch over."""
+    watches = place.module.metadata.get("watches", ())
+    if not watches:
+        return
+    for (label, least, most, message), value in zip(watches, np.atleast_1d(place.evaluate("watches")), strict=True):
+        if not least <= value <= most:
+            bounds = " and ".join([*([f"at least {least:g}"] if np.isfinite(least) else []),
+                                   *([f"at most {most:g}"] if np.isfinite(most) else [])])
+            warnings.warn(f"{place.module.name}: in equilibrium {label} is {value:.6g}, should be {bounds}: {message}",
+                          SimulationWarning, stacklevel=4)

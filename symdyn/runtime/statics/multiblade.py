@@ -1,0 +1,223 @@
+"""Rotors with blades: multi-blade coordinates, in which a spinning rotor of three or more equal blades is constant in time.
+
+q_k = a_0 + a_c cos psi_k + a_s sin psi_k + ..., psi_k = psi + 2 pi k / N. With q = T(psi) a and psi_dot = Omega:
+    q_dot = T a_dot + Omega T' a,  q_ddot = T a_ddot + 2 Omega T' a_dot + Omega^2 T'' a,
+so the matrices in a are T^T M T, T^T (2 Omega M T' + C T), T^T (Omega^2 M T'' + Omega C T' + K T), averaged over azimuths:
+what is left of the rotation (gravity on two blades, or a rotor of unequal ones) averages out. The steady state is the a that
+balances the averaged forces, blades moving with its harmonics.
+Source: Coleman and Feingold, NACA Report 1351 (1958); Bir, Multi-blade coordinate transformation and its application to wind
+turbine analysis, AIAA 2008-1300.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+
+from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
+from symdyn.runtime.constraints import turning
+from symdyn.runtime.statics.search import LARGEST_TURN
+from symdyn.runtime.statics.selection import Selection
+from symdyn.runtime.statics.terms import Place, coordinate_names
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+ITERATIONS = 50
+SOLVED = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Rotor:
+    """A rotor of a module, by places.
+
+    speed, azimuth   among the speeds and the coordinates; free: speeds that are free
+    blades           among the speeds, set by set; coordinates: those of all of these among the coordinates
+    """
+
+    module: Module
+    speed: int
+    azimuth: int
+    blades: tuple[tuple[int, ...], ...]
+    coordinates: tuple[int, ...]
+    free: tuple[int, ...]
+
+    @property
+    def moving(self) -> list[int]:
+        """The speeds of all blades."""
+        return [k for group in self.blades for k in group]
+
+    @property
+    def rows(self) -> list[int]:
+        """Places of the blades among what is free."""
+        return [self.free.index(k) for k in self.moving]
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the free coordinates in the fixed frame."""
+        names = list(coordinate_names(self.module.metadata))
+        for group in self.blades:
+            for place, name in zip(group, _harmonics(len(group)), strict=True):
+                names[place] = f"{coordinate_names(self.module.metadata)[group[0]]} {name}"
+        return tuple(names[k] for k in self.free)
+
+    def transform(self, psi: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """T, T' and T'' by the azimuth, of the free coordinates, (n, n)."""
+        n = len(self.free)
+        T, first, second = np.eye(n), np.zeros((n, n)), np.zeros((n, n))
+        for group in self.blades:
+            count = len(group)
+            places = [self.free.index(k) for k in group]
+            angles = psi + 2 * np.pi * np.arange(count) / count
+            columns: list[tuple[np.ndarray, ...]] = [(np.ones(count), np.zeros(count), np.zeros(count))]
+            for j in range(1, (count - 1) // 2 + 1):
+                c, s = np.cos(j * angles), np.sin(j * angles)
+                columns += [(c, -j * s, -j * j * c), (s, j * c, -j * j * s)]
+            if count % 2 == 0:
+                columns.append(((-1.0) ** np.arange(count), np.zeros(count), np.zeros(count)))
+            for matrix, which in ((T, 0), (first, 1), (second, 2)):
+                matrix[np.ix_(places, places)] = np.array([column[which] for column in columns]).T
+        return T, first, second
+
+
+def _harmonics(count: int) -> list[str]:
+    names = ["collective"]
+    for j in range(1, (count - 1) // 2 + 1):
+        order = "" if j == 1 else f" {j}"
+        names += [f"cosine{order}", f"sine{order}"]
+    return names + ["alternating"] * (count % 2 == 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Averaged:
+    """M a_ddot + C a_dot + K a = 0 of a rotor in the fixed frame, averaged; see modes.Linear."""
+
+    M: np.ndarray
+    C: np.ndarray
+    K: np.ndarray
+    labels: tuple[str, ...]
+
+    state_labels: tuple[str, ...] = ()
+    second_order = True
+
+    @property
+    def Z(self) -> np.ndarray:
+        return np.eye(len(self.M))
+
+    @property
+    def inertia(self) -> np.ndarray:
+        return self.M
+
+    def state_matrices(self) -> tuple[np.ndarray, np.ndarray]:
+        """A of [a; a_dot], and no inputs."""
+        n = len(self.M)
+        inverse = scipy.linalg.inv(self.M)
+        return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.K, -inverse @ self.C]]), np.zeros((2 * n, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """A steadily turning rotor: coordinates of all but the blades, a of the free ones (blades: multi-blade coordinates)."""
+
+    rotor: Rotor
+    place: Place
+    a: np.ndarray
+    omega: float
+    azimuths: np.ndarray
+    iterations: int = 0
+
+    def at(self, psi: float) -> tuple[Place, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """The state with the rotor at an azimuth, and the transformation there."""
+        rotor, place = self.rotor, self.place
+        transform = rotor.transform(psi)
+        n_q = place.sizes[0]
+        x, ud = place.x.copy(), place.ud.copy()
+        x[list(rotor.coordinates)], x[[n_q + k for k in rotor.moving]], ud[rotor.moving] = (
+            (self.omega**order * matrix @ self.a)[rotor.rows] for order, matrix in enumerate(transform))
+        x[rotor.azimuth] = psi
+        x[n_q + rotor.speed] = self.omega
+        return place.at(x=x, ud=ud), transform
+
+    def averages(self) -> tuple[np.ndarray, Averaged]:
+        """Forces and matrices in the fixed frame."""
+        n, omega = len(self.rotor.free), self.omega
+        r, M, C, K = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+        index = np.ix_(self.rotor.free, self.rotor.free)
+        free = list(self.rotor.free)
+        for psi in self.azimuths:
+            place, (T, first, second) = self.at(float(psi))
+            m, c, k = place.M[index], place.by_u[index], place.by_v[index]
+            r += T.T @ place.forces[free]
+            M += T.T @ m @ T
+            C += T.T @ (2 * omega * m @ first + c @ T)
+            K += T.T @ (omega**2 * m @ second + omega * c @ first + k @ T)
+        count = len(self.azimuths)
+        return r / count, Averaged(M / count, C / count, K / count, self.rotor.labels)
+
+    def stepped(self, step: np.ndarray, iterations: int) -> Steady:
+        """After a change of a; coordinates other than the blades' move along their speeds."""
+        place, rotor = self.place, self.rotor
+        v = np.zeros(place.sizes[1])
+        v[list(rotor.free)] = step
+        v[rotor.moving] = 0.0
+        x = place.x.copy()
+        x[:place.sizes[0]] = place.moved(v)
+        return Steady(rotor, place.at(x=x), self.a + step, self.omega, self.azimuths, iterations)
+
+
+def steady(start: Steady) -> tuple[Steady, Averaged]:
+    """The steady state near a start, by Newton's method. Raises NoEquilibrium."""
+    name, turns = start.place.module.name, turning(start.place.module)[list(start.rotor.free)]
+    found = start
+    try:
+        for k in range(ITERATIONS):
+            r, linear = found.averages()
+            scale = 1 / np.sqrt(np.maximum(np.diag(linear.M), 1e-12 * np.diag(linear.M).max()))
+            K = linear.K * np.outer(scale, scale)
+            _, values, Vt = np.linalg.svd(K)
+            if values[-1] <= 1e-11 * values[0]:
+                shares = Vt[-1]**2
+                raise NoEquilibrium(f"{name}: there is no stiffness along {linear.labels[int(np.argmax(shares))]} "
+                                    f"({shares.max():.2f}) at {start.omega:g} rad/s: the steady state is not unique; fix it")
+            step = -scale * np.linalg.solve(K, scale * r)
+            if float(np.linalg.norm(step / scale)) <= SOLVED * max(1.0, float(np.linalg.norm(found.a / scale))):
+                return found, linear
+            largest = float(np.abs(step[turns]).max(initial=0.0))
+            found = found.stepped(step * min(1.0, LARGEST_TURN / largest) if largest else step, k + 1)
+    except EvaluationError as error:
+        raise NoEquilibrium(f"{name}: no steady state at {start.omega:g} rad/s: {error}") from error
+    raise NoEquilibrium(f"{name}: no steady state at {start.omega:g} rad/s after {ITERATIONS} iterations: the last step was "
+                        f"{np.abs(step).max():.3g} along {linear.labels[int(np.argmax(np.abs(step)))]}; begin nearer, with start")
+
+
+def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, blades: Sequence[Sequence[str]]) -> Rotor:
+    """The rotor that names tell. Raises ArgumentError for what cannot be seen from the fixed frame."""
+    metadata, owner = module.metadata, module.name
+    if metadata.get("constraints") or metadata["z"]:
+        raise ArgumentError(f"{owner}: multi-blade coordinates are for systems without constraints and extra states; derive it in "
+                            "relative coordinates, or leave blades out")
+    labels = list(coordinate_names(metadata))
+    free = tuple(k for k, (label, u) in enumerate(zip(labels, metadata["u"], strict=True))
+                 if label not in selection.kept and u not in selection.kept)
+    faults = []
+    groups = []
+    for group in blades:
+        if len(group) < 3:
+            faults.append(f"{len(group)} blades ({', '.join(group)}) are named; multi-blade coordinates need at least 3 of a rotor")
+        for name in (n for n in group if n not in metadata["q"] or n not in labels):
+            faults.append(f"{name} is no coordinate whose rate is a speed")
+        for name in (n for n in group if n in labels and labels.index(n) not in free):
+            faults.append(f"{name} is kept, but a coordinate of a blade has to be free")
+        groups.append(tuple(labels.index(n) for n in group if n in labels))
+    flat = [k for group in groups for k in group]
+    if len(set(flat)) < len(flat):
+        faults.append("a coordinate is named for two blades")
+    if faults:
+        raise ArgumentError(f"{owner}: blades: {'; '.join(faults)}")
+    coordinates = tuple(metadata["q"].index(labels[k]) for k in flat)
+    return Rotor(module, metadata["u"].index(speed), metadata["q"].index(azimuth), tuple(groups), coordinates, free)

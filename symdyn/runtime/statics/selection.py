@@ -1,0 +1,146 @@
+"""What is solved for and what is kept: coordinates, speeds, extra states, parameters and inputs by name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.arguments import take
+from symdyn.runtime.statics.terms import Place, null_space
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Names of coordinates, speeds and extra states that stay, and of parameters and inputs that are solved for.
+
+    values       of what stays at a given number
+    conditions   names among `values` whose equations hold nevertheless: one for each parameter or input solved for
+    """
+
+    module: Module
+    kept: tuple[str, ...]
+    values: Mapping[str, float]
+    parameters: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
+
+    @cached_property
+    def states(self) -> list[int]:
+        """Places of the extra states that are free."""
+        return [k for k, name in enumerate(self.module.metadata["z"]) if name not in self.kept]
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        return (*self.parameters, *self.inputs)
+
+    def rows(self, place: Place, equations: bool = False) -> np.ndarray:
+        """R with R v = 0 for what stays, (n, n_u); equations: only for those whose equations do not hold."""
+        metadata = self.module.metadata
+        n_u = len(metadata["u"])
+        given: dict[str, np.ndarray] = {}
+        for name in self.kept:
+            if name in metadata["q"]:
+                given[name] = place.N[metadata["q"].index(name)]
+            elif name in metadata["u"]:
+                given[name] = np.eye(n_u)[metadata["u"].index(name)]
+        held = [given[name] for name in self.conditions if equations and name in given]
+        rows = [row for name, row in given.items()
+                if not (equations and (name in self.conditions or any(_same(row, h) for h in held)))]
+        return np.array(rows).reshape(len(rows), n_u)
+
+    def directions(self, place: Place) -> np.ndarray:
+        """Columns: velocities that leave what stays as it is, (n_u, n)."""
+        return null_space(self.rows(place))
+
+    def tested(self, place: Place) -> np.ndarray:
+        """Columns: virtual velocities along which forces balance, (n_u, n)."""
+        return null_space(self.rows(place, equations=True)) if self.conditions else self.directions(place)
+
+    def apply(self, x: np.ndarray) -> np.ndarray:
+        """The state with given values."""
+        names = self.module.metadata["x"]
+        x = x.copy()
+        for name, value in self.values.items():
+            x[names.index(name)] = value
+        return x
+
+
+def select(module: Module, free: Any, fixed: Any, unknown: Any) -> Selection:
+    """The selection from what a user names; see Module.equilibrium. Raises ArgumentError with what does not fit."""
+    metadata, owner = module.metadata, module.name
+    owners = {**dict.fromkeys(metadata["parameters"], "parameter"), **dict.fromkeys(metadata["inputs"], "input"),
+              **dict.fromkeys(metadata["x"], "state")}
+    named = None if free is None else listed(free, owners, "free", owner)
+    more = listed(unknown, {n: k for n, k in owners.items() if k != "state"}, "unknown_params", owner)
+    values = {} if fixed is None else _numbers(fixed, metadata["x"], owner)
+    solved = list(dict.fromkeys([*(n for n in named or () if owners[n] != "state"), *more]))
+    moving = None if named is None else [n for n in named if owners[n] == "state"]
+    kept = set(values)
+    if moving:
+        wrong = [n for n in moving if n in metadata["u"] and n not in metadata["q"]]
+        if wrong:
+            raise ArgumentError(f"{owner}: free names the speeds {', '.join(wrong)}; name coordinates, and give speeds their "
+                                "values in fixed")
+        kept |= {n for n in metadata["q"] if n not in moving}
+    conditions = _conditions(module, solved, values, moving or ())
+    order = [n for n in metadata["x"] if n in kept]
+    return Selection(module, tuple(order), values, tuple(n for n in solved if owners[n] == "parameter"),
+                     tuple(n for n in solved if owners[n] == "input"), tuple(conditions))
+
+
+def _conditions(module: Module, solved: list[str], values: Mapping[str, float], free: Iterable[str]) -> list[str]:
+    if not solved:
+        both = [n for n in values if n in free]
+        if both:
+            raise ArgumentError(f"{module.name}: {', '.join(both)} is both free and fixed; leave it out of one of them, or name "
+                                "in free the parameter that makes it take its value")
+        return []
+    coordinates = [n for n in values if n in module.metadata["q"]]
+    for candidates in ([n for n in values if n in free], coordinates, list(values)):
+        if len(candidates) == len(solved):
+            return candidates
+    raise ArgumentError(f"{module.name}: {len(solved)} values are to be found ({', '.join(solved)}), which takes as many "
+                        f"conditions, but fixed gives {len(values)} ({', '.join(values) or 'none'}); give one value in fixed "
+                        "for each, or, where more have to stay, name those that are the conditions in free, too")
+
+
+def _numbers(fixed: Any, names: list[str], owner: str) -> dict[str, float]:
+    if not isinstance(fixed, Mapping):
+        raise ArgumentError(f"{owner}: fixed must be a mapping from coordinates and speeds to numbers, found {fixed!r}")
+    array = take(fixed, names, "fixed", dict.fromkeys(names, 0.0), owner)
+    given = {str(getattr(key, "name", key)) for key in fixed}
+    return {n: float(v) for n, v in zip(names, array, strict=True) if n in given}
+
+
+def listed(values: Any, known: Iterable[str], what: str, owner: str) -> list[str]:
+    """Names from names or symbols, one or several. Raises ArgumentError for unknown ones."""
+    if values is None:
+        return []
+    if isinstance(values, str) or hasattr(values, "name"):
+        values = [values]
+    if not isinstance(values, Iterable):
+        raise ArgumentError(f"{owner}: {what} must be names or symbols, found {values!r}")
+    found = [str(getattr(v, "name", v)) for v in values]
+    there = list(known)
+    faults = []
+    for name in (n for n in found if n not in there):
+        near = difflib.get_close_matches(name, there, 3, cutoff=0.5)
+        faults.append(f"there is no {name!r}" + (f", did you mean {' or '.join(near)}?" if near else
+                                                 f"; there are {', '.join(there) or 'none'}"))
+    if faults:
+        raise ArgumentError(f"{owner}: {what}: {'; '.join(faults)}")
+    return found
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two rows keep the same direction."""
+    return bool(abs(a @ b) > (1 - 1e-12) * np.linalg.norm(a) * np.linalg.norm(b) > 0)
