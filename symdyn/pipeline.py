@@ -171,6 +171,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 group = (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
             return emit(equations, backend, group, templates, standalone=False, specialize=specialize)
         needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
+        if name == "rhs" and "watches" in equations.quantities:  # looked at after every simulation
+            needed = (*needed, "watches")
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in name,
                     baumgarte="baumgarte" in name)
 

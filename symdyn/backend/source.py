@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import sys
@@ -100,8 +101,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         raise SymdynError(f"there is no backend {backend!r}; there are {', '.join(known)}; "
                           "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
     dialect = next(read_dialect(f / backend) for f in folders if (f / backend / "dialect.toml").is_file())
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment = _environment(*folders) if templates is not None else _shipped(*folders)
     content = _with_violation(content)
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
@@ -119,6 +119,15 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
         files[target.format(name=context["name"])] = text
     return Source(backend, files, program, dict(context["metadata_record"]))
+
+
+def _environment(*folders: Path) -> jinja2.Environment:
+    return jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
+                              trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+
+
+# Reading the templates takes longer than filling them in, and the shipped ones stay as they are.
+_shipped = functools.cache(_environment)
 
 
 def _with_violation(content: Content) -> Content:

@@ -105,7 +105,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
                         "baumgarte, baumgarte=GAIN (1/s) or none (default: projection; with BDF and LSODA baumgarte)")
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--gif", action="store_true", help="save an animation too")
-    parser.add_argument("--report", metavar="FILE", type=Path, help="write a report of the run, one HTML file that needs no network")
+    parser.add_argument("--report", metavar="FILE", type=Path, help="write a report of the run: one HTML file, no network needed")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(parser)
 

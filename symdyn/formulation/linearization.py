@@ -84,8 +84,7 @@ class Varied:
         return self._along(self.balance(), self._direction())
 
     def second_variation(self) -> np.ndarray:
-        """The same derivative of the balance's linear form
-        [dbalance/dq N v + dbalance/du u' + M u_dot' + dbalance/dz z' + C_r^T lam'; C_r v; dz_dot], for v, u', u_dot', z', lam'."""
+        """The same derivative of the balance's linear form, its change with v (q' = N v), u', u_dot', z' and lam'."""
         motion = self.motion
         groups = {name: self._made(made) for name, made in _varied(motion, len(motion.rows)).items()}
         speeds = self._leaves(motion.speeds)

@@ -103,7 +103,10 @@ def _arguments(name: Any, arguments: Any, results: Any, operations: Any, faults:
 
 def _texts(name: Any, c: Any, texts: Any, faults: Faults) -> dict[str, str]:
     """Backend -> text, of C and backends of the user."""
-    given = {str(backend): text for backend, text in dict(texts or {}).items()}
+    if not isinstance(texts or {}, Mapping):
+        faults.append(f"{name}: texts is {texts!r}; pass a dictionary of backends and texts")
+        texts = None
+    given = {str(backend): text for backend, text in (texts or {}).items()}
     if {"c", "numpy"} & set(given):
         faults.append(f"{name}: texts has {', '.join(sorted({'c', 'numpy'} & set(given)))}; pass python= and c= for NumPy and C")
     if c is not None:

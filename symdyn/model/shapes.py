@@ -157,7 +157,7 @@ class Line(Shape):
 
 @dataclass(frozen=True)
 class Water(Shape):
-    """The water surface z = level of the n-frame, for the ground alone; size: (2,) along x and y, m, or None: the whole picture."""
+    """The water surface z = level of the n-frame, for the ground; size: (2,) along x and y, m, or None: the whole picture."""
 
     size: Any = None
     level: Any = 0

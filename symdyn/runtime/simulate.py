@@ -18,6 +18,7 @@ from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
 from symdyn.runtime.stabilization import Projector, Stabilization, choose, chosen_gain
+from symdyn.runtime.watches import WATCHES, warn
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -95,6 +96,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         raise SimulationInterrupted(solution, outcome.message)
     if not outcome.success:
         warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
+    if metadata.get(WATCHES) and len(solution.t):
+        warn(module, solution.rows(WATCHES), "in this motion", 3)
     return solution
 
 

@@ -45,7 +45,9 @@ def add_platform(system: System, orientation: str) -> Body:
         joint = Free("floating", system.ground, platform, q, EulerAngles("ZYX"))
     else:
         q = coordinates("x y z e0 e1 e2 e3")
-        pitch = sp.asin(2 * (q[3] * q[5] - q[4] * q[6]))
+        e0, e1, e2, e3 = q[3:]
+        level = sp.sqrt(4 * (e2 * e3 + e0 * e1) ** 2 + (e0**2 - e1**2 - e2**2 + e3**2) ** 2)
+        pitch = sp.atan2(2 * (e0 * e2 - e1 * e3), level)  # from the last row of the rotation matrix
         joint = Free("floating", system.ground, platform, q, EulerParameters(), velocity="body",
                      speeds=speeds("v_x v_y v_z omega_x omega_y omega_z"))
     system.add_joint(joint)

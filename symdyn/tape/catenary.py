@@ -54,7 +54,7 @@ class Catenary(Kernel):
 
     @property
     def operations(self) -> int:
-        return 8 * 60
+        return 5 * 70
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
         stacked = np.stack(np.broadcast_arrays(*[np.asarray(v, dtype=float) for v in values]), axis=-1)

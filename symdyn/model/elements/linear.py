@@ -35,10 +35,11 @@ class LinearStiffness(Element):
                 pitch of 90 degrees, where the run stops and tells so
                 "rotation vector": axis times angle, without singularity below half a turn
                 "auto": "ZYX" for a body whose joint with the ground has these angles, else the rotation vector
-    For small angles both are the same. The potential is 1/2 (xi - reference)^T K (xi - reference) - force . (xi - reference) with
-    the symmetric part of K; what is not symmetric in K has no potential and counts as a force that does work (the matrix of
-    a prestressed mooring about a fixed point is so). A linear stiffness is meant for small angles: a tilt above 20 degrees
-    gives a warning.
+    Where the moments vanish with the angles, both are the same for small angles; a prestress (`force`) turns with the axes of
+    its kind. The potential is 1/2 (xi - reference)^T K (xi - reference) - force . (xi - reference) with the symmetric part of K;
+    what is not symmetric in K has no potential and counts as a force that does work (a matrix of moments about fixed axes, of
+    a prestressed mooring for example, is not quite symmetric). A linear stiffness is meant for small angles: a tilt above 20
+    degrees gives a warning.
     """
 
     kind = "linear stiffness"

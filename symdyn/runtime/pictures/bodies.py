@@ -93,8 +93,8 @@ def _view(view: Any, drawing: Drawing) -> tuple[float, float]:
     except (TypeError, ValueError):
         elevation = azimuth = np.nan
     if not (np.isfinite(azimuth) and abs(elevation) <= 90):
-        raise ArgumentError(f"view is {view!r}; pass (elevation, azimuth) of the eye in degrees, such as (20, -60), the elevation "
-                            "between -90 and 90")
+        raise ArgumentError(f"view is {view!r}; pass (elevation, azimuth) of the eye in degrees, such as (20, -60); the "
+                            "elevation is between -90 and 90")
     return elevation, azimuth
 
 

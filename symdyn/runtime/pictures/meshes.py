@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,7 @@ def _box(body: int, color: Color, size: np.ndarray, center: np.ndarray, hole: np
 
     def walls(*way: tuple[int, int]) -> list[list[int]]:
         """Upright faces along a way that has the piece on its left."""
-        return [[at(*a, 0), at(*b, 0), at(*b, 1), at(*a, 1)] for a, b in zip(way, way[1:], strict=False)]
+        return [[at(*a, 0), at(*b, 0), at(*b, 1), at(*a, 1)] for a, b in pairwise(way)]
 
     def lids(*way: tuple[int, int]) -> list[list[int]]:
         """Top and bottom over a way around the piece."""

@@ -284,8 +284,8 @@ def _demand_steady(trial: Trial) -> None:
         k = int(np.argmax(np.abs(values)))
         if abs(values[k]) > STEADY * max(size, 1e-3):
             raise NoEquilibrium(f"{place.module.name}: at t = {place.t:g} s the constraints {what} {values[k]:.6g} m/s"
-                                f"{'^2' if values is demanded else ''} ({names[k]}) at the speeds that are given: there is no rest "
-                                "there; give speeds that fit them, or simulate the motion")
+                                f"{'^2' if values is demanded else ''} ({names[k]}) at the speeds that are given: there is no "
+                                "rest there; give speeds that fit them, or simulate the motion")
 
 
 def _look(place: Place) -> None:

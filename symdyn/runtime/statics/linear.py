@@ -42,7 +42,7 @@ class Reduced:
         self.K = inner @ place.by_v[:n_u] @ Z
         self.K_z = inner @ place.by_z[:n_u][:, self.states]
         self.F_in = -inner @ place.balance_inputs[:n_u]
-        self.G = np.linalg.lstsq(Z, place.turning_of_speeds @ Z, rcond=None)[0]
+        self.G = (place.turning_of_speeds @ Z)[self.independent]
         self.z_v, self.z_u = place.by_v[on_z][self.states] @ Z, place.by_u[on_z][self.states] @ Z
         self.z_z, self.z_in = place.by_z[on_z][self.states][:, self.states], place.balance_inputs[on_z][self.states]
 
@@ -84,9 +84,9 @@ class Reduced:
         T[:n_q, :self.n] = place.N @ self.Z
         T[n_q:n_q + n_u, self.n:2 * self.n] = self.Z
         if n_c and place.u.any():
-            # Speeds change with positions so that C_dot stays zero.
-            change = (place.evaluate("rows_q") * place.scale[:, None]) @ place.N @ self.Z
-            T[n_q:n_q + n_u, :self.n] = -np.linalg.pinv(place.C_r) @ change
+            # Dependent speeds change with positions, too, so that C_dot stays zero.
+            change = -np.linalg.pinv(place.C_r) @ (place.evaluate("rows_q") * place.scale[:, None]) @ place.N @ self.Z
+            T[n_q:n_q + n_u, :self.n] = change - self.Z @ change[self.independent]
         for k, state in enumerate(self.states):
             T[n_q + n_u + state, 2 * self.n + k] = 1.0
         return T
@@ -103,14 +103,17 @@ class Reduced:
         return A, np.vstack([np.zeros((n, self.F_in.shape[1])), inverse(self.F_in), self.z_in])
 
     def _along_a_motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """From the derivative of x_dot, seen in a frame of the manifold that is carried along without turning in it."""
-        place = self.place
+        """From the derivative of x_dot: the independent changes are coordinates of the manifold of the constraints."""
+        place, n = self.place, self.n
+        n_q, n_u, n_z, _ = place.sizes
         if self.selection.kept:
             raise ArgumentError(f"{place.module.name}: {', '.join(self.selection.kept)} cannot be fixed in a linearization along "
                                 "a motion under constraints; fix it by a constraint of the model")
-        T = self.tangent()
-        back = np.linalg.pinv(T)
-        return back @ place.evaluate("jacobian_x") @ T, back @ place.evaluate("jacobian_inputs")
+        rows = [*[n_q + k for k in self.independent], *[n_q + n_u + k for k in range(n_z)]]
+        top = np.hstack([-self.G, np.eye(n), np.zeros((n, n_z))])
+        A = np.vstack([top, (place.evaluate("jacobian_x") @ self.tangent())[rows]])
+        by_inputs = place.evaluate("jacobian_inputs")[rows]
+        return A, np.vstack([np.zeros((n, by_inputs.shape[1])), by_inputs])
 
 
 def _factorized(M: np.ndarray, name: str) -> Any:

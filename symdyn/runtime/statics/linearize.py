@@ -42,7 +42,7 @@ class Linearization:
 
     coordinates   names of the independent changes: of coordinates, of speeds that are no rates (turning about that axis)
     states        names of x'; outputs: names of y', entries of vectors by number
-    Along a motion under constraints A and B hold in a frame that is carried along with the manifold, M, C, K at the instant.
+    Along a motion under constraints A and B hold the change of the constraints, too; M, C, K do not.
     """
 
     def __init__(self, reduced: Reduced, equilibrium: Equilibrium | None) -> None:
@@ -190,7 +190,7 @@ def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: 
         raise ArgumentError(f"{module.name}: at a solution pass the time t alone; parameters and inputs are those of the motion")
     time = number(t, "a finite number of seconds as t", module.name)
     if not len(at.t) or not at.t[0] <= time <= at.t[-1]:
-        raise ArgumentError(f"{module.name}: t = {time:g} s is not in the solution, which goes from {at.t[0]:g} to {at.t[-1]:g} s")
+        raise ArgumentError(f"{module.name}: t = {time:g} s is not in the solution, from {at.t[0]:g} to {at.t[-1]:g} s")
     k = int(np.argmin(np.abs(at.t - time)))
     return rest(module, float(at.t[k]), at.x[k].copy(), module.parameters(at.params), np.asarray(at.inputs[k], dtype=float))
 

@@ -199,8 +199,8 @@ def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, bla
     """The rotor that names tell. Raises ArgumentError for what cannot be seen from the fixed frame."""
     metadata, owner = module.metadata, module.name
     if metadata.get("constraints") or metadata["z"]:
-        raise ArgumentError(f"{owner}: multi-blade coordinates are for systems without constraints and extra states; derive it in "
-                            "relative coordinates, or leave blades out")
+        raise ArgumentError(f"{owner}: multi-blade coordinates are for systems without constraints and extra states; derive "
+                            "it in relative coordinates, or leave blades out")
     labels = list(coordinate_names(metadata))
     free = tuple(k for k, (label, u) in enumerate(zip(labels, metadata["u"], strict=True))
                  if label not in selection.kept and u not in selection.kept)
@@ -208,7 +208,7 @@ def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, bla
     groups = []
     for group in blades:
         if len(group) < 3:
-            faults.append(f"{len(group)} blades ({', '.join(group)}) are named; multi-blade coordinates need at least 3 of a rotor")
+            faults.append(f"{len(group)} blades ({', '.join(group)}) are named; multi-blade coordinates need at least 3")
         for name in (n for n in group if n not in metadata["q"] or n not in labels):
             faults.append(f"{name} is no coordinate whose rate is a speed")
         for name in (n for n in group if n in labels and labels.index(n) not in free):
