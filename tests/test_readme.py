@@ -28,6 +28,13 @@ def test_closed_loop_prints_what_is_shown(tmp_path):
     assert run.stdout == block("loop printed")
 
 
+def test_pontoon_prints_what_is_shown(tmp_path):
+    run = subprocess.run([sys.executable, "-c", block("floating")], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert "Warning" not in run.stderr
+    assert run.stdout == block("floating printed")
+
+
 def test_all_snippets_run_one_after_the_other(tmp_path):
     code = "\n".join(re.findall(r"```python\n(.*?)```", README, re.DOTALL))
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)

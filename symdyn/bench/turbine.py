@@ -93,7 +93,7 @@ class Poses:
 
 
 def difference(found: np.ndarray, wanted: np.ndarray) -> float:
-    """Largest difference over the states, relative to the largest acceleration at each; linear and angular ones for themselves."""
+    """Largest difference over the states, relative to the largest acceleration at each, linear and angular by themselves."""
     worst = 0.0
     for part in (slice(0, 3), slice(3, 6)):
         a, b = found[:, :, part], wanted[:, :, part]

@@ -1,7 +1,8 @@
 """The eight mooring lines of the ITI Energy barge: two from each corner, 150 m of water, anchors 423 m from the middle.
 
-Source: OpenFAST regression test 5MW_ITIBarge_DLL_WTurb_WavesIrr, input of MAP++ (places, length, mass, diameter, EA, C_B = 1);
-J. Jonkman, NREL/TP-500-41958 (2007), section 3.2, describes the same mooring.
+Source: input and summary of MAP++ in OpenFAST's regression test 5MW_ITIBarge_DLL_WTurb_WavesIrr: places, length, mass, diameter,
+EA, C_B, and the weight in water of 1227.15 N/m, from which g follows. The anchors of the two lines of a corner are not quite
+mirrored there, 386.92 m and 386.95 m, which gives the whole mooring a moment about the vertical of 4.8 kN m at rest.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ tensions of both ends of what hangs and e = w L / EA, the fairlead is at
 from the anchor. A line over a seabed has b = max(v - 1, 0), s = max(1 - v, 0), of which friction C_B leaves the length
 r = min(s, h / C_B) under tension; any other has b = v - 1, s = 0. A line over a seabed that is longer than what hangs and
 what lies is slack: h = 0, and v is the weight of what hangs.
-Source: Jonkman, Dynamics Modeling and Loads Analysis of an Offshore Floating Wind Turbine, NREL/TP-500-41958 (2007), section
-2.5.2, its two cases put into one; Irvine, Cable Structures (1981).
+Source: Jonkman, Dynamics Modeling and Loads Analysis of an Offshore Floating Wind Turbine, NREL/TP-500-41958 (2007), quasi-static
+mooring lines, its two cases put into one; Irvine, Cable Structures (1981).
 """
 
 from __future__ import annotations
@@ -49,6 +49,10 @@ class Catenary(Kernel):
     name = "symdyn_catenary"
 
     @property
+    def letters(self) -> tuple[str, ...]:
+        return ("h", "v")
+
+    @property
     def n_out(self) -> int:
         return 2
 
@@ -64,11 +68,10 @@ class Catenary(Kernel):
         return list(_solved(context, context.eps, self.sizes[0], *values))
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
-        leaves, entries = _linearized(bool(self.sizes[0]), not is_zero(values[3]) or not is_zero(changes[3]))
+        leaves, steps, entries = _linearized(bool(self.sizes[0]), not is_zero(values[3]) or not is_zero(changes[3]))
         new: dict[Node, Any] = dict(zip(leaves, [*results, *values, *changes], strict=True))
-        for node in reachable(entries):
-            if node not in new:
-                new[node] = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
+        for node in steps:
+            new[node] = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
         return [new[e] for e in entries]
 
 
@@ -102,8 +105,8 @@ def _tensions(recorder: Recorder, seabed: bool, h: Any, v: Any) -> tuple[Any, An
 
 
 @functools.cache
-def _linearized(seabed: bool, rough: bool) -> tuple[list[Node], list[Any]]:
-    """The changes of h and v, recorded, and what they are made of: h, v, the four values and their changes.
+def _linearized(seabed: bool, rough: bool) -> tuple[list[Node], list[Node], list[Any]]:
+    """What the changes of h and v are made of (h, v, the four values and their changes), the steps, and the changes.
 
     By the implicit function theorem; rough: there is friction.
     """
@@ -127,7 +130,7 @@ def _linearized(seabed: bool, rough: bool) -> tuple[list[Node], list[Any]]:
         taut = r.apply("gt", h, 0)
         dh = r.apply("select", taut, dh, 0)
         dv = r.apply("select", taut, dv, (dz - v * v / 2 * de) / (1 + e * v))
-    return leaves, [dh, dv]
+    return leaves, [node for node in reachable([dh, dv]) if node.op != "leaf"], [dh, dv]
 
 
 def _solved(context: Any, eps: Any, seabed: int, x: Any, z: Any, e: Any, friction: Any) -> tuple[Any, Any]:

@@ -41,6 +41,14 @@ class Cube(Kernel):
         return list(combinations_with_replacement(range(4), self.sizes[0] + 1))
 
     @property
+    def letters(self) -> tuple[str, ...]:
+        """V and S_x, S_y, S_z: volume and first moments; A of the cut, B its derivatives, with the axes of each."""
+        axes = ["".join("_xyz"[k] for k in index if k) for index in self.indices]
+        letter = "VAB"[self.sizes[0]]
+        return tuple("V" if not self.sizes[0] and not a else f"S_{a}" if not self.sizes[0] else f"{letter}_{a or 0}"
+                     for a in axes)
+
+    @property
     def n_out(self) -> int:
         return len(self.indices)
 

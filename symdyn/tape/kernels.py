@@ -27,12 +27,17 @@ class Kernel:
 
     name     in generated code; sizes: what it is called with
     reason   what it means if it fails
+    letters  what its results are called in print; none where there is no function to read
     """
 
     sizes: tuple[int, ...]
     reason: str
 
     name = ""
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        return ()
 
     @property
     def n_out(self) -> int:

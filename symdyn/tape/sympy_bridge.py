@@ -145,6 +145,10 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
         elif node.op == "call" and isinstance(node.args[0], UserFunction):
             function, *arguments = node.args
             done[node] = function.applied([done[a] if isinstance(a, Node) else number(a) for a in arguments])
+        elif node.op == "call" and node.args[0].letters:
+            kernel, *arguments = node.args
+            given = [done[a] if isinstance(a, Node) else number(a) for a in arguments]
+            done[node] = [sp.Function(letter)(*given) for letter in kernel.letters]
         elif node.op == "item":
             done[node] = done[node.args[0]][node.args[1]]
         elif node.op == "call":

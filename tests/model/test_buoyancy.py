@@ -317,3 +317,14 @@ def test_that_the_crossed_moment_is_about_the_origin() -> None:
     f, n = sd.Buoyancy("hull", [sd.Box((2, 2, 2), (100, -50, 0))], RHO).act(site).elastic
     found = evaluate_rows(site.tape(f=f, n=n), {**dict.fromkeys(POSE, 0.0), "z": -1.0}, 1)
     np.testing.assert_allclose(found["n"][0], np.cross([100, -50, 0], found["f"][0]), rtol=1e-14, atol=1e-6)
+
+
+def test_forces_print_volume_and_moments_as_functions() -> None:
+    z = sd.coordinates("z")
+    m, L, rho, g = sd.parameters("m L rho g", positive=True)
+    system = sd.System("raft", gravity=[0, 0, -g])
+    raft = system.add_body("raft", mass=m)
+    system.add_joint(sd.Prismatic("heave", system.ground, raft, axis=[0, 0, 1], coordinate=z))
+    system.add_load(sd.Buoyancy(raft, [sd.Box([L, L, L])], rho))
+    V = sp.Function("V")
+    assert sp.expand(system.embedding().F_tilde[0] - (rho * g * L**3 * V(-z, 0, 0, -L) - m * g)) == 0

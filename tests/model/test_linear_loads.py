@@ -226,7 +226,7 @@ def test_zyx_angles_stop_at_a_pitch_of_90_degrees() -> None:
 
 
 def test_the_energy_that_is_lost_is_the_work_of_the_damper() -> None:
-    with pytest.warns(sd.SimulationWarning, match=r"spring: the body tilts by 40\.5\d* degrees; .* small angles, up to 20 degrees"):
+    with pytest.warns(sd.SimulationWarning, match=r"spring: the body tilts by 40\.5\d* degrees; .* up to 20 degrees"):
         sol = module("rotation vector", False).simulate(t=(0, 20), q=[0.5, 0, 0, 0.5, 0.6, -0.4], rtol=1e-10, work=True)
     assert sol.success
     assert sol.energy_error() < 1e-8

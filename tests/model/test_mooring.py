@@ -29,14 +29,20 @@ def line(**given: Any) -> sd.MooringLine:
 
 # -- published values
 
-def test_forces_at_rest_are_those_of_map() -> None:
-    """H, V of the first line as the output of MAP++ for the barge tells them, with g = 9.80665 m/s^2 and C_B = 1."""
-    found = evaluate_rows(tape_of(line(friction=1)), AT_REST, 1)
-    H, V = np.hypot(*found["f"][0, :2]), -found["f"][0, 2]
-    np.testing.assert_allclose([H, V], [95259.486, 257299.002], rtol=2e-8)
-    away = np.array(PLACES[1][:2]) - PLACES[0][:2]
-    assert found["f"][0, :2] / H == pytest.approx(away / np.linalg.norm(away), rel=1e-12)  # to the anchor
-    np.testing.assert_allclose(found["n"][0], np.cross(PLACES[0], found["f"][0]), rtol=1e-14)
+# What MAP++ 1.20.10 tells of lines 1 and 2 of the barge (MAP.sum of OpenFAST's regression test 5MW_ITIBarge_DLL_WTurb_WavesIrr),
+# with w = 1227.15 N/m, which is g = 9.80665 m/s^2, and C_B = 1: the force that holds the fairlead, N, and H and V.
+HELD = ((-88008.141, -36454.587, 257299.002), (-36491.731, -88105.016, 257371.155))
+PULLED = ((95259.486, 257299.002), (95363.202, 257371.155))
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_forces_at_rest_are_those_of_map(k: int) -> None:
+    assert line_weight() == pytest.approx(1227.15, abs=0.005)
+    found = evaluate_rows(tape_of(barge_mooring("barge")[k]), AT_REST, 1)
+    f = found["f"][0]
+    np.testing.assert_allclose(f, -np.array(HELD[k]), rtol=0, atol=6e-4)
+    np.testing.assert_allclose([np.hypot(f[0], f[1]), -f[2]], PULLED[k], rtol=0, atol=6e-4)
+    np.testing.assert_allclose(found["n"][0], np.cross(PLACES[0], f), rtol=1e-14)
 
 
 def test_what_friction_is_worth() -> None:

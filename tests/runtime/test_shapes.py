@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError
+from symdyn.model.faults import Faults
+from symdyn.model.shapes import drawn
 from symdyn.runtime.module import Module
 from symdyn.runtime.solution import Solution
 
@@ -71,8 +73,7 @@ def solution(module: Module) -> Solution:
 
 def parts(shape: Any) -> list[Part]:
     """The pieces of a shape on body 0."""
-    record = sd.model.shapes.drawn([], "b", [shape], None, False)[0].record  # type: ignore[arg-type]
-    return list(parts_of(record, 0, (1.0, 0.0, 0.0)))
+    return list(parts_of(drawn(Faults(), "b", [shape], None, False)[0].record, 0, (1.0, 0.0, 0.0)))
 
 
 def volume(pieces: list[Part]) -> float:
@@ -100,7 +101,8 @@ def test_faces_close_around_the_volume_of_the_shape() -> None:
     assert volume(parts(S.Blade([0, 0, 1], [0, 0, 7], [2, 2, 2], thickness=0.5))) == pytest.approx(flat * 4 * 6)
 
 
-@pytest.mark.parametrize("shape", [S.Box([4, 3, 2], [1, 2, 3]), S.Box([4, 3, 2], hole=[1, 2]), S.Cylinder([1, 2, 3], [4, 0, 5], 2.0, 1.0)])
+@pytest.mark.parametrize("shape", [S.Box([4, 3, 2], [1, 2, 3]), S.Box([4, 3, 2], hole=[1, 2]),
+                                   S.Cylinder([1, 2, 3], [4, 0, 5], 2.0, 1.0)])
 def test_pieces_are_convex_and_their_planes_face_outward(shape: Any) -> None:
     for part in parts(shape):
         normals, offsets = planes(part.vertices, np.concatenate([part.corners, part.hidden]))
@@ -169,15 +171,15 @@ def test_flexible_bodies_bend_by_their_mode_shapes(solution: Solution) -> None:
     z = np.linspace(0, 2, 9)
     record = {"body": "mast", "stations": np.column_stack([0 * z, 0 * z, z]).tolist(), "coordinates": ["a"],
               "shapes": np.stack([z**2, 0 * z, 0 * z], axis=1)[:, :, None].tolist()}
-    for drawn in (solution.module.metadata["drawn"], []):
-        module = Module({**solution.module.metadata, "drawn": drawn, "flexible": [record]}, solution.module.unit, "numpy")
+    for shown in (solution.module.metadata["drawn"], []):
+        module = Module({**solution.module.metadata, "drawn": shown, "flexible": [record]}, solution.module.unit, "numpy")
         bent = module.simulate((0.0, 1.0), u=[0.3, 0.1, 0.0, 0.5, 0.4, 0.8, 2.0], rtol=1e-6)
         solids = Solids.of(bent)
         assert solids is not None
         pose = bent.frames.reshape(len(bent.t), -1, 12)[700, 1]
         tip = pose[:3] + pose[3:].reshape(3, 3) @ [4 * bent["a"][700], 0, 2]
         (places,) = [p for p, part in zip(solids.vertices(700), solids.parts, strict=True) if part.body == 1]
-        assert np.abs((places[-20:].mean(axis=0) if drawn else places[-1]) - tip).max() < 1e-9
+        assert np.abs((places[-20:].mean(axis=0) if shown else places[-1]) - tip).max() < 1e-9
 
 
 # -- what hides what
@@ -193,35 +195,41 @@ def hit(part: Part, places: np.ndarray, eye: np.ndarray, way: np.ndarray) -> flo
     return float(enters) if enters < leaves and (ahead[speed == 0] >= 0).all() else np.inf
 
 
+def parted(a: tuple[Part, np.ndarray], b: tuple[Part, np.ndarray]) -> bool:
+    """Whether a face of one piece has the other on its outer side."""
+    return any(((n := planes(v, part.corners))[0] @ w.T - n[1][:, None]).min(axis=1).max() > 0.05
+               for (part, v), (_, w) in ((a, b), (b, a)))
+
+
 def test_what_is_drawn_later_is_what_a_ray_from_the_eye_meets_first() -> None:
-    """Rays through scenes of convex pieces that do not touch, seen from all sides."""
+    """Rays through scenes of plates and cones that do not touch, seen from all sides."""
     rng = np.random.default_rng(5)
     axes: Any = Figure().add_subplot(projection="3d")
     axes.set(xlim=(-9, 9), ylim=(-9, 9), zlim=(-9, 9))
-    compared = 0
-    for _ in range(25):
-        pieces, places, centers = [], [], []
-        while len(pieces) < 6:
-            size = rng.uniform(0.5, 6, 3)
-            center = rng.uniform(-7, 7, 3)
-            if all(np.linalg.norm(center - c) > (np.linalg.norm(size) + d) / 2 for c, d in centers):
-                part = parts(S.Box(size.tolist()))[0] if rng.random() < 0.6 else parts(
-                    S.Cylinder([0, 0, -size[2] / 2], [0, 0, size[2] / 2], size[:2].min() / 2, size[:2].min() / 4))[0]
-                centers.append((center, np.linalg.norm(size)))
-                pieces.append(part)
-                places.append(center + part.vertices @ Rotation.random(rng=rng).as_matrix().T)
+    compared = against = 0
+    for _ in range(10):
+        pieces: list[tuple[Part, np.ndarray]] = []
+        while len(pieces) < 7:
+            x, y, z = rng.uniform(0.3, 1.5), rng.uniform(3, 12), rng.uniform(3, 14)
+            shape = S.Box([x, y, z]) if rng.random() < 0.5 else S.Cylinder([0, 0, -z / 8], [0, 0, z / 8], x, x / 2)
+            (part,) = parts(shape)
+            place = rng.uniform(-5, 5, 3) + part.vertices @ Rotation.from_rotvec(rng.normal(0, 2, 3)).as_matrix().T
+            if all(parted((part, place), other) for other in pieces):
+                pieces.append((part, place))
         axes.view_init(rng.uniform(-80, 80), rng.uniform(-180, 180))
         camera = Camera.of(axes.get_proj())
         eye = camera.eye[:3]
-        rank = {k: r for r, k in enumerate(order(pieces, places, camera))}
-        for _ in range(150):
-            way = np.concatenate(places)[rng.integers(sum(map(len, places)))] + rng.normal(0, 0.5, 3) - eye
-            met = {k: hit(part, v, eye, way) for k, (part, v) in enumerate(zip(pieces, places, strict=True))}
-            met = {k: s for k, s in met.items() if np.isfinite(s)}
+        rank = {k: r for r, k in enumerate(order([p for p, _ in pieces], [v for _, v in pieces], camera))}
+        for _ in range(200):
+            way = pieces[rng.integers(7)][1].mean(axis=0) + rng.normal(0, 1.5, 3) - eye
+            met = {k: s for k, (part, v) in enumerate(pieces) if np.isfinite(s := hit(part, v, eye, way))}
             if len(met) > 1:
                 compared += 1
-                assert max(met, key=lambda k: rank[k]) == min(met, key=lambda k: met[k])
-    assert compared > 200
+                first = min(met, key=met.__getitem__)
+                against += first != min(met, key=lambda k: np.linalg.norm(pieces[k][1].mean(axis=0) - eye))
+                assert max(met, key=rank.__getitem__) == first
+    # Mean distances alone would have put some of them the wrong way round.
+    assert compared > 150 and against > 5
 
 
 def test_the_eye_is_where_the_axes_say() -> None:
@@ -229,10 +237,9 @@ def test_the_eye_is_where_the_axes_say() -> None:
     axes.view_init(30, -60)
     for projection in ("persp", "ortho"):
         axes.set_proj_type(projection)
-        toward = Camera.of(axes.get_proj()).toward(np.array([0.5, 0.5, 0.5]))
-        wanted = np.array([np.cos(np.pi / 6) / 2, -np.cos(np.pi / 6) * np.sqrt(3) / 2, 0.5])
-        stretched = wanted / np.array([4, 4, 3])  # the axes' box is 4 : 4 : 3 for limits of equal length
-        assert np.abs(toward - stretched / np.linalg.norm(stretched) if False else np.sign(toward) - np.sign(wanted)).max() == 0
+        toward = Camera.of(axes.get_proj()).toward(np.array([0.5, 0.5, 0.5])) * [4, 4, 3]  # the axes' box is 4 : 4 : 3
+        wanted = [np.cos(np.pi / 6) / 2, -np.cos(np.pi / 6) * np.sqrt(3) / 2, 0.5]
+        assert np.abs(toward / np.linalg.norm(toward) - wanted).max() < 1e-12
 
 
 def test_polygons_are_cut_at_the_water() -> None:
@@ -257,12 +264,12 @@ def test_what_is_under_water_is_drawn_before_the_water(solution: Solution, eleva
     assert (alphas < 1).sum() == 1 and 10 < water < len(alphas) - 10
     heights = np.concatenate(drawing.solids.vertices(300))
     lowest, highest = heights[heights[:, 2].argmin()], heights[heights[:, 2].argmax()]
-    drawn = [path.vertices for path in scene.get_paths()]
+    polygons = [path.vertices for path in scene.get_paths()]
 
-    def shows(polygons: list[np.ndarray], point: np.ndarray) -> bool:
-        return min(np.abs(p - camera.project(point[None])).sum(axis=1).min() for p in polygons) < 1e-9
+    def shows(some: list[np.ndarray], point: np.ndarray) -> bool:
+        return min(np.abs(p - camera.project(point[None])).sum(axis=1).min() for p in some) < 1e-9
 
-    before, after = drawn[:water], drawn[water + 1:]
+    before, after = polygons[:water], polygons[water + 1:]
     wet, dry = (before, after) if elevation > 0 else (after, before)
     assert shows(wet, lowest) and shows(dry, highest) and not shows(wet, highest)
 
@@ -391,9 +398,9 @@ def test_other_faults_of_drawing_are_told() -> None:
     system.move_ground([sd.t, 0, 0])
     with pytest.raises(ModelError) as caught:
         system.check()
-    for told in ("Box of 'keel' is 'keel', which is no body", "the colour of 'keel' is '#12'", "draw was given no shape for 'hull'",
-                 "the colour of 'hull' is [2.0, 0, 0]", "size has 3 components; pass 2", "center has 1 components; pass 2",
-                 "Box of 'ground': shapes are not drawn on a ground that moves"):
+    for told in ("Box of 'keel' is 'keel', which is no body", "the colour of 'keel' is '#12'",
+                 "draw was given no shape for 'hull'", "the colour of 'hull' is [2.0, 0.0, 0.0]", "size has 3 components; pass 2",
+                 "center has 1 components; pass 2", "Box of 'ground': shapes are not drawn on a ground that moves"):
         assert told in str(caught.value), (told, str(caught.value))
     plane = sd.systems.pendulum()
     plane.draw(plane.ground, S.Water())

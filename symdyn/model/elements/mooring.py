@@ -25,12 +25,12 @@ class MooringLine(Element):
     seabed      True: the anchor stands on a level seabed, on which part of the line may lie; False: it hangs freely
     friction    of the line with the seabed, C_B (1 is usual, 0 none)
 
-    Without friction the line has a potential: the elastic energy of the line and that of its weight in water, with zero where all
-    of it lies on the seabed (or at the level of the anchor). With friction it has none, as friction keeps the end of the line
-    from what it would give back; its force then counts as one that does work. A line that is longer than what hangs and
-    what lies on the seabed is slack: it hangs straight down, without horizontal force.
+    Without friction the line has a potential: the elastic energy of the line and that of its weight in water, zero at the
+    level of the anchor. With friction the force still follows from the place alone, but is no gradient (dH/dz and dV/dx differ,
+    by 2.5e-4 for the lines of a barge), so that it counts as one that does work. A line that is longer than what hangs
+    and what lies on the seabed is slack: it hangs straight down, without horizontal force.
     The run stops, and tells why, where the fairlead is straight above or below the anchor, or not above the seabed.
-    Source: Jonkman, NREL/TP-500-41958 (2007), section 2.5.2; see symdyn.tape.catenary for the equations.
+    Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.tape.catenary for the equations.
     """
 
     kind = "mooring line"

@@ -39,7 +39,7 @@ class Scene(PolyCollection):
     def do_3d_projection(self) -> float:
         """Make the polygons; axes of space call it before they draw."""
         axes: Any = self.axes
-        self._paint(Camera.of(axes.M) if self._spatial else _FROM_ABOVE)
+        self._paint(Camera.of(axes.get_proj()) if self._spatial else _FROM_ABOVE)
         return 0.0
 
     def draw(self, renderer: Any) -> None:

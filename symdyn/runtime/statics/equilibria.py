@@ -11,6 +11,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find
+from symdyn.runtime.statics.linear import natural_length
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.terms import Place, coordinate_names
 
@@ -178,9 +179,10 @@ def _named(found: list[Equilibrium]) -> list[Equilibrium]:
     """Each with its number, its stability, and the coordinates in which the equilibria differ."""
     if not found:
         return []
-    names = found[0].module.metadata["q"]
-    all_q = np.array([e.q for e in found])
-    spread = np.ptp(all_q, axis=0) if len(found) > 1 else np.zeros(len(names))
+    metadata = found[0].module.metadata
+    names = metadata["q"]
+    lengths = np.array([metadata["units"].get(n) == "m" for n in names], dtype=bool)
+    spread = np.ptp([e.q for e in found], axis=0) / np.where(lengths, natural_length(found[0].place), 1.0)
     order = [k for k in np.argsort(-spread, kind="stable") if spread[k] > APART][:2]
     result = []
     for k, e in enumerate(found):

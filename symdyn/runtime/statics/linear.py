@@ -130,7 +130,7 @@ def _basis(place: Place, rows: np.ndarray, independent: Sequence[int] | None) ->
 
     Unless given they are taken so that Z stays as small as can be, in the metric of the mass matrix (QR with pivoting).
     """
-    scales = 1 / np.where(turning(place.module), _length(place), 1.0)  # so that ranks do not depend on units
+    scales = 1 / np.where(turning(place.module), natural_length(place), 1.0)  # so that ranks do not depend on units
     Z = scales[:, None] * null_space(rows * scales)
     if (np.count_nonzero(Z, axis=0) == 1).all() and (np.count_nonzero(Z, axis=1) <= 1).all():
         chosen = [int(np.flatnonzero(column)[0]) for column in Z.T]
@@ -151,7 +151,7 @@ def _basis(place: Place, rows: np.ndarray, independent: Sequence[int] | None) ->
     return (Z @ np.linalg.inv(block) if Z.shape[1] else Z), list(independent)
 
 
-def _length(place: Place) -> float:
+def natural_length(place: Place) -> float:
     """What makes velocities of angular ones: the largest radius of inertia, m; 1 without lengths."""
     turns = turning(place.module)
     masses = np.diag(place.M)

@@ -33,6 +33,8 @@ FLOOR, CONSTRAINED_FLOOR = 1e-9, 1e-3
 CUT = 1e-15
 # A coordinate that is further than this many times the largest length or radius of inertia of the start has run away.
 FAR = 1e6
+# After every step at most so many more bring the state onto the constraints, to this part of a metre.
+CLOSING, CLOSED = 6, 1e-14
 RUNAWAY = "a coordinate runs away"
 
 
@@ -111,8 +113,9 @@ class Search:
         lengthy = masses[~self.turning] if (~self.turning).any() else masses
         reference = float(lengthy.max(initial=0.0)) or 1.0
         columns = np.sqrt(reference / np.where(masses > 1e-12 * masses.max(initial=0.0), masses, reference))
-        trial = trial.with_multipliers(np.sqrt(np.sum((trial.tested * columns[:, None])**2, axis=0)))
         self.columns = columns
+        trial = self._closed(trial)
+        trial = trial.with_multipliers(np.sqrt(np.sum((trial.tested * columns[:, None])**2, axis=0)))
         J = np.abs(trial.derivative() * self.widths(trial))
         largest = J.max(axis=1, initial=0.0)
         n_e, n_c = trial.tested.shape[1], place.sizes[3]
@@ -124,6 +127,7 @@ class Search:
         self.weights = 1 / np.maximum(largest, floor)
         self.n_e = n_e
         self.best = trial.with_multipliers(self.weights[:n_e])
+        self.best.residual()  # where it cannot be evaluated that is told now
         self.far = FAR * max(1.0, float(np.abs(place.q).max(initial=0.0)))
 
     def widths(self, trial: Trial) -> np.ndarray:
@@ -191,6 +195,22 @@ class Search:
                 return False, "forces are left that no step reduces"
         return False, f"{limit} iterations were not enough"
 
+    def _closed(self, trial: Trial) -> Trial:
+        """The state moved onto the constraints as far as a few steps get: only there dependent ones are seen to be."""
+        for _ in range(CLOSING if trial.place.sizes[3] else 0):
+            place = trial.place
+            gaps = place.C * place.scale
+            if np.abs(gaps).max() <= CLOSED:
+                break
+            B = trial.directions
+            widths = 1 / np.sqrt(np.sum((B / self.columns[:, None])**2, axis=0))
+            change = -(B * widths) @ (np.linalg.pinv(place.C_r @ B * widths, rcond=1e-6) @ gaps)
+            turns = np.abs(change[self.turning]).max(initial=0.0)
+            x = place.x.copy()
+            x[:len(place.q)] = place.moved(change * min(1.0, LARGEST_TURN / turns) if turns else change)
+            trial = Trial(place.at(x=self.selection.apply(x)), self.selection)
+        return trial
+
     @staticmethod
     def _rounding(F: np.ndarray, new: np.ndarray, newton: float) -> bool:
         """Whether only rounding is left: steps are taken then though they may not reduce the residual."""
@@ -221,8 +241,7 @@ class Search:
         n_z = len(selection.states)
         x = place.x.copy()
         x[:len(place.q)] = place.moved(trial.directions @ step[:n])
-        for name, value in selection.values.items():
-            x[names["x"].index(name)] = value
+        x = selection.apply(x)
         start = len(x) - place.sizes[2]
         for k, change in zip(selection.states, step[n:n + n_z], strict=True):
             x[start + k] += change
@@ -233,8 +252,8 @@ class Search:
             inputs[names["inputs"].index(name)] += step[n + n_z + len(selection.parameters) + k]
         new = Trial(place.at(x=x, p=p, inputs=inputs), selection)
         try:
-            new = new.with_multipliers(self.weights[:self.n_e])
-            new.derivative()
+            new = self._closed(new).with_multipliers(self.weights[:self.n_e])
+            new.residual(), new.derivative()
         except EvaluationError:
             return None
         return new

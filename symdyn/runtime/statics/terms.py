@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 # Singular values below this part of the largest count as zero where ranks of constraints are asked for.
-RANK = 1e-10
+RANK = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
