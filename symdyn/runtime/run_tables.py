@@ -88,9 +88,11 @@ def start(solution: Solution) -> list[dict[str, str]]:
 def extremes(solution: Solution) -> list[dict[str, str]]:
     """Least and largest value with their times, mean and standard deviation over time of all coordinates, speeds, states, inputs
     and outputs."""
-    rows = []
+    rows: list[dict[str, str]] = []
+    if not len(solution.t):
+        return rows
     for kind, name, unit, values in _curves(solution):
-        if not len(values) or not np.isfinite(values).all():
+        if not np.isfinite(values).all():
             continue
         low, high = int(values.argmin()), int(values.argmax())
         mean = _mean(solution.t, values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from symdyn.errors import ModelError
+from symdyn.model import shapes
 from symdyn.model.bodies import Body, position
 from symdyn.model.elements import Box, Buoyancy
 from symdyn.model.joints import Fixed, Free, Universal
@@ -25,6 +26,7 @@ _TIP = {"x_t": 0.0, "y_t": -32.5, "z_t": 60.0}
 _LOADS: dict[str, dict[str, float]] = {
     "hook": {"m_c": _CARGO, "l_r": 40.0}, "deck": {"m_c": _CARGO, "x_d": 0.0, "y_d": 0.0, "z_d": 14.0}, "ashore": {}}
 
+_CARGO_SIZE = (14.0, 10.0, 6.0)  # m, in pictures only
 # Where it floats in equilibrium: z (m), with the cargo on the hook phi and alpha (rad).
 _EQUILIBRIUM = {"hook": (-7.438481972227937, 0.12816896295396327, -0.12816896295396327), "deck": (-_DRAFT,),
                 "ashore": (-_DRAFT + _CARGO / (_WATER * _LENGTH * _BREADTH),)}
@@ -70,6 +72,8 @@ def floating_crane(cargo: str = "hook") -> System:
     _add_cargo(system, hull, cargo)
     L, B, D = _given(system, _HULL)
     system.add_load(Buoyancy(hull, boxes=[Box((L, B, D), (0, 0, D / 2))], density=rho, name="buoyancy"))
+    system.draw(hull, shapes.Box((L, B, D), (0, 0, D / 2)), color="#4a6a8a")
+    system.draw(system.ground, shapes.Water((180, 140)))
     z, theta, phi = q[2], q[4], q[5]
     system.add_output("draft", -z / (sp.cos(theta) * sp.cos(phi)))
     system.add_output("heel_deg", phi * 180 / sp.pi)
@@ -88,12 +92,17 @@ def _given(system: System, numbers: dict[str, float]) -> list[sp.Symbol]:
 
 def _add_cargo(system: System, hull: Body, cargo: str) -> None:
     tip = _given(system, _TIP)
+    system.draw(hull, shapes.Cylinder((0, 0, _HULL["D"]), (0, 0, 25), 6, 4), shapes.Cylinder((0, 0, 18), tip, 1.5, 0.8), color="#d8a03a")
     system.add_output("tip", position(hull, tuple(tip)))
     numbers = _given(system, _LOADS[cargo])
     if cargo == "hook":
         mass, rope = numbers
         load = system.add_body("cargo", mass=mass, com=[0, 0, -rope])
+        system.draw(load, shapes.Line([(0, 0, 0), (0, 0, -rope)], 1.0), color="0.2")
+        system.draw(load, shapes.Box(_CARGO_SIZE, (0, 0, -rope)), color="#7a4b8a")
         system.add_joint(Universal("rope", hull, load, coordinates("alpha beta"), axes=([1, 0, 0], [0, 1, 0]), parent_point=tip))
     elif cargo == "deck":
         mass, *place = numbers
-        system.add_joint(Fixed("lashing", hull, system.add_body("cargo", mass=mass), parent_point=place))
+        load = system.add_body("cargo", mass=mass)
+        system.draw(load, shapes.Box(_CARGO_SIZE), color="#7a4b8a")
+        system.add_joint(Fixed("lashing", hull, load, parent_point=place))

@@ -30,6 +30,7 @@ PLATFORM_INERTIA = (726.9e6, 726.9e6, 1453.9e6)  # kg m^2 about the centre of ma
 # 6000 m^3 that it then displaces, (1600 - 100) m^2 times 4 m, and a drag plate of the area of 1600 m^2.
 HULL = (40.0, 40.0, 10.0)
 MOONPOOL = (10.0, 10.0, 10.0)
+BALLAST_WAY = 30.0  # m, assumed: between the middles of tanks at opposite sides of the hull
 HULL_CENTER = 1.0  # m, height of the hull's middle above O: from -4 m to 6 m
 
 # -- tower: the land-based one of [1], 87.6 m high, on the barge. Its foot is at O, in the water plane [3: TowerBsHt = 0], so that
@@ -92,6 +93,12 @@ MOORING_STIFFNESS = (
     (208_463.386, 51.1, 0.0, 2390.2, 26_263_843.691, 0.0),
     (0.0, 0.0, -102.2, 0.0, 0.0, 24_751_525.960),
 )
+
+# -- pictures only, assumed; with the tower's diameters of [1] and chords (m) as of its blade
+
+TOWER_RADII = (3.0, 3.87 / 2)
+NACELLE_SIZE, NACELLE_MIDDLE = (14.0, 5.0, 4.5), (3.0, 0.0, 2.0)
+CHORDS = (3.5, 3.9, 4.6, 4.2, 3.7, 3.3, 2.9, 2.5, 2.1, 1.4)
 
 # -- water: added mass and damping of the barge
 

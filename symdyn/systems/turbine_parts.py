@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.flexible.beam import Beam
 from symdyn.flexible.shape import Shape
+from symdyn.model import shapes
 from symdyn.model.bodies import Body, acceleration, position, velocity
 from symdyn.model.joints import Fixed, Free, Joint, Revolute
 from symdyn.model.orientation import EulerAngles, EulerParameters
@@ -33,11 +34,17 @@ def given(system: System, **numbers: float) -> list[sp.Symbol]:
     return symbols
 
 
-def add_platform(system: System, orientation: str) -> Body:
-    """The barge, free to move."""
+def add_platform(system: System, orientation: str, ballast: bool) -> Body:
+    """The barge, free to move, with its water."""
     m, z, *I = given(system, m_P=nrel.PLATFORM_MASS, z_P=nrel.PLATFORM_COM, I_P_x=nrel.PLATFORM_INERTIA[0],
                      I_P_y=nrel.PLATFORM_INERTIA[1], I_P_z=nrel.PLATFORM_INERTIA[2])
-    platform = system.add_body("platform", mass=m, com=[0, 0, z], inertia=I)
+    com: list[Any] = [0, 0, z]
+    if ballast:
+        m_x, m_y, l_x = given(system, m_x=0.0, m_y=0.0, l_b=nrel.BALLAST_WAY)
+        com = [m_x * l_x / m, m_y * l_x / m, z]
+    platform = system.add_body("platform", mass=m, com=com, inertia=I)
+    system.draw(platform, shapes.Box(nrel.HULL, (0, 0, nrel.HULL_CENTER), nrel.MOONPOOL[:2]), color="#c8553d")
+    system.draw(system.ground, shapes.Water((160, 160)))
     joint: Joint
     if orientation == "angles":
         q = coordinates("x y z psi theta phi")
@@ -66,6 +73,7 @@ def add_tower(system: System, below: Body, flexible: bool) -> tuple[Body, Body, 
         m, z, I, h = given(system, m_T=nrel.TOWER_MASS, z_T=nrel.TOWER_COM, I_T=nrel.TOWER_INERTIA, h_T=nrel.TOWER_HEIGHT)
         foot = top = system.add_body("tower", mass=m, com=[0, 0, z], inertia=[I, I, 0])
         at = (0, 0, h)
+    system.draw(foot, shapes.Cylinder((0, 0, 0), (0, 0, nrel.TOWER_HEIGHT), *nrel.TOWER_RADII), color="0.85")
     system.add_joint(Fixed("foot", below, foot))
     system.add_output("tower_top", position(top, at))
     system.add_output("tower_top_acceleration", acceleration(top, at))
@@ -78,11 +86,13 @@ def add_machine(system: System, top: Body, at: Any, rotor: str, blades: str, fle
         system, m_N=nrel.NACELLE_MASS, x_N=nrel.NACELLE_COM[0], z_N=nrel.NACELLE_COM[1], I_N=nrel.NACELLE_YAW_INERTIA,
         h_S=nrel.SHAFT_HEIGHT, l_S=nrel.OVERHANG, tilt=nrel.TILT)
     nacelle = system.add_body("nacelle", mass=m, com=[x, 0, z], inertia=[0, 0, I])
+    system.draw(nacelle, shapes.Box(nrel.NACELLE_SIZE, nrel.NACELLE_MIDDLE), color="0.75")
     system.add_joint(Revolute("yaw", top, nacelle, coordinates("yaw"), parent_point=at))
     system.add_output("nacelle_velocity", velocity(nacelle, (x, 0, z)))
     hub = _add_lumped_rotor(system) if blades == "lumped" else _add_rotor(system, flexible)
     shaft: dict[str, Any] = {"parent_point": [l_S * sp.cos(tilt), 0, h_S + l_S * sp.sin(tilt)],
                              "parent_rotation": sp.rot_ccw_axis2(-tilt)}
+    system.draw(hub, shapes.Cylinder((-1.5, 0, 0), (2, 0, 0), 0.8, nrel.HUB_RADIUS), color="0.6")
     if rotor == "fixed":
         system.add_joint(Fixed("shaft", nacelle, hub, **shaft))
     elif rotor == "prescribed":
@@ -105,6 +115,7 @@ def _add_rotor(system: System, flexible: bool) -> Body:
         else:
             m_B, z_B, I_B = _blade(system)
             blade = system.add_body(f"blade{k + 1}", mass=m_B, com=[0, 0, z_B], inertia=[I_B, I_B, 0])
+        system.draw(blade, shapes.Blade((0, 0, 0), (0, 0, nrel.ROTOR_RADIUS - nrel.HUB_RADIUS), nrel.CHORDS), color="0.95")
         turned = sp.rot_ccw_axis1(2 * sp.pi * k / 3) * sp.rot_ccw_axis2(cone)
         system.add_joint(Fixed(f"root{k + 1}", hub, blade, parent_point=r_R * turned[:, 2], parent_rotation=turned))
     return hub
@@ -120,10 +131,16 @@ def _add_lumped_rotor(system: System) -> Body:
     m_B, z_B, I_B = _blade(system)
     away, c, s = r_R + z_B, sp.cos(cone), sp.sin(cone)
     mass = m_H + 3 * m_B
+    spans = [[float(e) for e in sp.rot_ccw_axis1(2 * sp.pi * k / 3) * sp.rot_ccw_axis2(nrel.CONE)[:, 2]] for k in range(3)]
     x = 3 * m_B * away * s / mass
     about_apex = 3 * (I_B + m_B * away**2)  # of the blades, if all were across one axis
     across = about_apex * (1 - c**2 / 2) - mass * x**2
-    return system.add_body("rotor", mass=mass, com=[x, 0, 0], inertia=[I_H + about_apex * c**2, across, across])
+    rotor = system.add_body("rotor", mass=mass, com=[x, 0, 0], inertia=[I_H + about_apex * c**2, across, across])
+    for span in spans:
+        root, tip = ([r * e for e in span] for r in (nrel.HUB_RADIUS, nrel.ROTOR_RADIUS))
+        chord = (0, -span[2], span[1])  # about along the rotor's plane
+        system.draw(rotor, shapes.Blade(root, tip, nrel.CHORDS, chord), color="0.95")
+    return rotor
 
 
 def tower_beam() -> Beam:

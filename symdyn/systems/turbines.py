@@ -17,7 +17,8 @@ _ON_OFF = (True, False)
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "rotor": ("free", "fixed", "prescribed"), "blades": ("three", "lumped"), "orientation": ("angles", "parameters"),
     "hydrostatics": ("box", "linear", None), "mooring": ("catenary", "linear", None), "added_mass": _ON_OFF, "damping": _ON_OFF,
-    "wind": _ON_OFF, "waves": (False, True), "drives": _ON_OFF, "flexible": (False, True, "tower", "blades"),
+    "wind": _ON_OFF, "waves": (False, True), "drives": _ON_OFF, "ballast": (False, True),
+    "flexible": (False, True, "tower", "blades"),
 }
 # Where the rigid turbine floats in equilibrium without wind, in the order x, y, z, psi, theta, phi (m, rad).
 _EQUILIBRIUM: dict[tuple[str | None, str | None], tuple[float, ...]] = {
@@ -37,7 +38,7 @@ _EQUILIBRIUM: dict[tuple[str | None, str | None], tuple[float, ...]] = {
 def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientation: str = "angles",
                           hydrostatics: str | None = "box", mooring: str | None = "catenary", added_mass: bool = True,
                           damping: bool = True, wind: bool = True, waves: bool = False, drives: bool = True,
-                          flexible: bool | str = False) -> System:
+                          ballast: bool = False, flexible: bool | str = False) -> System:
     """The NREL 5-MW turbine on the ITI Energy barge: platform, tower, nacelle, hub and three blades.
 
     The n-frame has z upward and its origin in the still water plane, x downwind. Body frames, with origin O, and G the centre of
@@ -64,6 +65,8 @@ def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientatio
     waves         force of a regular wave along x, of 1 m and 10 s, that grows within T_0 (s)
     drives        a yaw drive, spring K_y and damper B_y on the way to the input yaw_c (rad); inputs tau_a (N m), torque of the
                   wind on the hub, and tau_g (N m), torque of the generator between hub and nacelle, which brakes
+    ballast       water that is moved in the hull: m_x (kg) by l_b (m) along x and m_y along y move its G to
+                  (m_x l_b/m_P, m_y l_b/m_P, z_P); none at first
     flexible      "tower": it bends in four modes, tower_fa1, tower_fa2 along x, tower_ss1, tower_ss2 along y (m at the top);
                   "blades": each bends in its three lowest modes, blade1_flap1, blade1_edge1, blade1_flap2, ... ; True: both.
                   Stiffness and damping are multiplied by s_T, d_T and s_B, d_B
@@ -77,9 +80,10 @@ def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientatio
     Sources of the numbers, and what is assumed: symdyn/systems/nrel_5mw.py. Bodies, joints, coordinates: lecture, chapter 6.
     """
     options = {"rotor": rotor, "blades": blades, "orientation": orientation, "hydrostatics": hydrostatics, "mooring": mooring,
-               "added_mass": added_mass, "damping": damping, "wind": wind, "waves": waves, "drives": drives, "flexible": flexible}
+               "added_mass": added_mass, "damping": damping, "wind": wind, "waves": waves, "drives": drives, "ballast": ballast,
+               "flexible": flexible}
     system = _system("floating_wind_turbine", options)
-    platform = add_platform(system, orientation)
+    platform = add_platform(system, orientation, ballast)
     tower, top, at = add_tower(system, platform, flexible in (True, "tower"))
     nacelle, hub = add_machine(system, top, at, rotor, blades, flexible in (True, "blades"))
     if drives:

@@ -16,6 +16,10 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
 
 
+# A call with more values than this is differentiated along directions only: its derivatives one by one would be many.
+MANY = 32
+
+
 def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any]) -> list[Any]:
     """The directional derivative of each entry along the seeds (node -> its derivative)."""
     tangent: dict[Any, Any] = {}
@@ -55,7 +59,7 @@ def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
     if not isinstance(entry, Node):
         return [0] * len(by)
     order = reachable([entry])
-    if any(node.op == "call" for node in order):
+    if any(node.op == "call" and len(node.args) > MANY for node in order):
         return [forward(recorder, [entry], {node: 1})[0] for node in by]
     wanted = set(by)
     active: set[Node] = set()
@@ -65,8 +69,15 @@ def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
     adjoint: dict[Node, Any] = {entry: 1}
     for node in reversed(order):
         bar = adjoint.get(node, 0)
-        if is_zero(bar) or node not in active or node.op == "leaf":
+        if node not in active or node.op == "leaf":
             continue
+        if node.op == "call":
+            _back_through(recorder, node, active, adjoint)
+            continue
+        if is_zero(bar):
+            continue
+        if node.op == "item":
+            continue  # its call looks for it
         rule = OPERATIONS[node.op].partials
         if rule is None:
             continue
@@ -74,6 +85,19 @@ def reverse(recorder: Recorder, entry: Any, by: Sequence[Node]) -> list[Any]:
             if isinstance(a, Node) and a in active:
                 adjoint[a] = adjoint.get(a, 0) + bar * partial
     return [adjoint.get(node, 0) for node in by]
+
+
+def _back_through(recorder: Recorder, node: Node, active: set[Node], adjoint: dict[Node, Any]) -> None:
+    """From the adjoints of a call's results to those of its values, by its derivatives one value at a time."""
+    kernel, *values = node.args
+    results = [recorder.item(node, k) for k in range(kernel.n_out)]
+    bars = [adjoint.get(result, 0) for result in results]
+    if all(map(is_zero, bars)):
+        return
+    for a in dict.fromkeys(v for v in values if isinstance(v, Node) and v in active):
+        changes = [int(v is a) for v in values]
+        for bar, slope in zip(bars, kernel.tangents(recorder, values, results, changes), strict=True):
+            adjoint[a] = adjoint.get(a, 0) + bar * slope
 
 
 def jacobian(recorder: Recorder, entries: Sequence[Any], by: Sequence[Node], mode: str = "auto") -> np.ndarray:

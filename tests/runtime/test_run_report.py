@@ -16,14 +16,14 @@ import pytest
 import symdyn as sd
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime import run_tables
+from symdyn.runtime import run_report, run_tables
 from symdyn.runtime.module import Module
 from symdyn.runtime.solution import Solution
 
 pytest.importorskip("matplotlib")
 
-from symdyn.runtime.pictures import embedded  # noqa: E402
-from symdyn.runtime.pictures.panels import Panel  # noqa: E402
+from symdyn.runtime.pictures import embedded
+from symdyn.runtime.pictures.panels import Panel
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -53,6 +53,13 @@ def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path
     return solution.report(tmp_path_factory.mktemp("report") / "new" / "run.html")
 
 
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of text alone, which take less time."""
+    for name in ("mechanism", "curves", "balance"):
+        monkeypatch.setattr(embedded, name, lambda *arguments: [])
+
+
 def rows(text: str, section: str) -> list[list[str]]:
     """Cells of the tables of a section."""
     part = text[text.index(f'<section id="{section}">'):]
@@ -73,7 +80,7 @@ def test_one_file_holds_everything(report: Path, solution: Solution) -> None:
     assert len(text) < 2_000_000
     for told in ("<h1>cart_pole", "Reached the end", "DOP853 on NumPy", "relative 1e-07, absolute 1e-07", "embedding",
                  f"{solution.n_steps}, and {solution.n_rejected} rejected", "t = 0 s to 2 s, 1001 times", "1 input,",
-                 "farthest from the start", str(solution.module.report()).splitlines()[-1].strip()):
+                 str(solution.module.report()).splitlines()[-1].strip()):
         assert told in unescape(text), told
 
 
@@ -126,6 +133,7 @@ def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Soluti
     assert told is not None and told.doubtful and told.difference == pytest.approx(1e-3, rel=0.2)
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_run_that_stopped_early_is_told_and_text_is_escaped(module: Module, tmp_path: Path) -> None:
     with pytest.warns(SimulationWarning):
         stopped = module.simulate((0.0, 1.0), max_steps=2)
@@ -139,12 +147,29 @@ def test_a_run_that_stopped_early_is_told_and_text_is_escaped(module: Module, tm
     assert "<h1>cart_pole" in stopped.report(tmp_path / "empty.html").read_text(encoding="utf-8")
 
 
+def test_without_anything_to_show_there_are_no_pictures(module: Module) -> None:
+    empty = module.simulate((0.0, 0.01), rtol=1e-2)
+    empty.t, empty.x = empty.t[:0], empty.x[:0]
+    assert embedded.mechanism(empty, []) == embedded.curves(empty) == []
+
+
+def test_the_mechanism_is_shown_where_it_is_farthest_from_the_start() -> None:
+    """A pendulum that is let go: after half a period it is as far as it gets, after a whole one back."""
+    module = sd.systems.pendulum().embedding().compile("numpy")
+    solution = module.simulate((0.0, 8.0), q=[0.0], u=[0.0])
+    shown = run_report._times(solution)
+    assert [title for title, _ in shown] == ["start", "farthest from the start", "end"]
+    q = solution["q1"][np.searchsorted(solution.t, shown[1][1])]
+    assert q == pytest.approx(-np.pi, abs=1e-3) and abs(solution["q1"][-1] + np.pi) > 0.1
+
+
+@pytest.mark.usefixtures("no_pictures")
 def test_equations_by_hand_and_constraints_have_reports(tmp_path: Path) -> None:
     x, y = sd.coordinates("x y")
     m, g = sd.parameters("m g")
     by_hand = sd.embedding([x], [x], [m], [-m * g], defaults={m: 1}).compile("numpy").simulate((0, 1), params={g: 9.81})
     text = by_hand.report(tmp_path / "hand.html").read_text(encoding="utf-8")
-    assert "do not tell the energy" in text and '<section id="mechanism">' not in text
+    assert "do not tell the energy" in text
     assert [row for row in rows(text, "given") if len(row) == 4][-1] == ["g", "9.81", "", "none"]
     system = sd.System("bead", gravity=[0, -9.81])
     body = system.add_body("bead", mass=1)
@@ -159,7 +184,8 @@ def test_equations_by_hand_and_constraints_have_reports(tmp_path: Path) -> None:
 
 
 def test_what_loads_look_at_is_told() -> None:
-    looked_at = [["draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"], ["tilt", -np.inf, 0.3, "too steep: {value}"]]
+    looked_at = [["draft", 1.0, 9.0, "the box leaves the water at a draft of {value} m"],
+                 ["tilt", -np.inf, 0.3, "too steep: {value}"]]
     values = np.column_stack([np.linspace(0.5, 4, 11), np.linspace(-1, 0.2, 11)])
     run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values,
                                module=SimpleNamespace(metadata={"watches": looked_at}, functions=("watches",)))
@@ -186,6 +212,7 @@ def test_files_that_cannot_be_written_are_refused(solution: Solution, tmp_path: 
         solution.report(tmp_path / "taken" / "run.html")
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_the_command_line_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = tmp_path / "run.html"
     arguments = ["simulate", "pendulum", "--t", "1", "--backend", "numpy", "--no-picture", "--output", str(tmp_path)]

@@ -63,13 +63,13 @@ def test_tower_has_the_moments_of_its_table() -> None:
 
 def test_rotor_inertia_and_hub_height_are_the_published_ones() -> None:
     equations = turbine(**BARE).embedding()
-    found = values(equations, States(np.zeros((1, 8)), np.zeros((1, 8))), "M_tilde", "frames")
+    found = values(equations, States(np.array([[0.0] * 7 + [np.pi]]), np.zeros((1, 8))), "M_tilde", "frames")
     assert found["M_tilde"][0, 7, 7] == pytest.approx(ROTOR_INERTIA, rel=1e-8)
     hub = found["frames"][0, 3]
     assert hub[2] == pytest.approx(HUB_HEIGHT, abs=2e-3) and hub[0] < -4.9  # upwind of the tower
     shaft, blade = hub[3:].reshape(3, 3)[:, 0], found["frames"][0, 4, 3:].reshape(3, 3)[:, 2]
     assert shaft == pytest.approx([np.cos(nrel.TILT), 0, np.sin(nrel.TILT)], rel=1e-14)
-    assert np.degrees(np.arctan2(-blade[0], blade[2])) == pytest.approx(7.5)  # cone and tilt keep the tips off the tower
+    assert np.degrees(np.arctan2(-blade[0], -blade[2])) == pytest.approx(7.5)  # the lowest blade is kept off the tower by both
 
 
 def test_wave_force_is_the_pressure_on_the_hull() -> None:
@@ -85,7 +85,7 @@ def test_wave_force_is_the_pressure_on_the_hull() -> None:
         bottom = pressure(along, -draft, turn) * side * side / 2 * w
         ends = (pressure(-side / 2, down, turn) - pressure(side / 2, down, turn)) * side * draft / 2 * w
         wanted = [ends.sum(), bottom.sum(), (down * ends).sum() - (along * bottom).sum()]
-        assert [F[j] * np.cos(turn + phase[j]) for j in (0, 2, 4)] == pytest.approx(wanted, rel=1e-12)
+        assert [F[j] * np.cos(turn + phase[j]) for j in (0, 2, 4)] == pytest.approx(wanted, rel=1e-12, abs=1e-6)
 
 
 # -- variants
@@ -128,14 +128,14 @@ def test_flexible_turbine_that_does_not_bend_is_the_rigid_one() -> None:
         beams = {f"m_{letter}": beam.m, f"z_{letter}": z, f"I_{letter}": beam.I0[0, 0] - beam.m * z**2}
         rigid.symbols.defaults.update({p: beams[p.name] for p in rigid.symbols.parameters if p.name in beams})
     states = random_states(5, 3)
-    names = [q.name for q in flexible.symbols.coordinates]
-    places = [names.index(q.name) for q in rigid.symbols.coordinates]
-    q, u = np.zeros((5, len(names))), np.zeros((5, len(names)))
+    columns = [q.name for q in flexible.symbols.coordinates]
+    places = [columns.index(q.name) for q in rigid.symbols.coordinates]
+    q, u = np.zeros((5, len(columns))), np.zeros((5, len(columns)))
     q[:, places], u[:, places] = states
-    wanted, found = values(rigid, states, "M_tilde", "k_tilde", "F_tilde"), values(flexible, States(q, u), "M_tilde", "k_tilde",
-                                                                                   "F_tilde")
-    assert np.abs(found["M_tilde"][:, places][:, :, places] / wanted["M_tilde"].max() - wanted["M_tilde"] / wanted["M_tilde"].max()
-                  ).max() < 1e-13
+    names = ("M_tilde", "k_tilde", "F_tilde")
+    wanted, found = values(rigid, states, *names), values(flexible, States(q, u), *names)
+    inertia = found["M_tilde"][:, places][:, :, places] - wanted["M_tilde"]
+    assert np.abs(inertia).max() < 1e-13 * wanted["M_tilde"].max()
     for name in ("k_tilde", "F_tilde"):
         assert np.abs(found[name][:, places] - wanted[name]).max() < 1e-12 * np.abs(wanted[name]).max()
 

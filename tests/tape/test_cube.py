@@ -16,7 +16,7 @@ from symdyn.runtime.compiler import find_compiler
 from symdyn.runtime.unit import CUnit, PythonUnit
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.cube import Cube
-from symdyn.tape.differentiate import forward
+from symdyn.tape.differentiate import forward, reverse
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT
@@ -245,3 +245,16 @@ def test_what_does_not_change_the_depth_has_no_derivative() -> None:
     a, b = recorder.leaf("a", INPUT), recorder.leaf("b", INPUT)
     values = recorder.call(Cube((0,), ""), [a, 0, 0, -1])
     assert forward(recorder, values, {b: 1}) == [0, 0, 0, 0]
+
+
+def test_derivatives_backwards_are_those_forwards() -> None:
+    """A product of several results of two calls, one value given twice."""
+    recorder = Recorder()
+    e = [recorder.leaf(f"e{k}", INPUT) for k in range(4)]
+    first, second = (recorder.call(Cube((0,), "a cube"), values) for values in (e, [e[0], e[1] * e[2], e[2], e[2]]))
+    value = first[0] * second[3] + first[1] * first[2]
+    tape = Tape.of(recorder, backwards=np.array(reverse(recorder, value, e), dtype=object),
+                   forwards=np.array([forward(recorder, [value], {leaf: 1})[0] for leaf in e], dtype=object))
+    found = evaluate(tape, {"e0": 0.1, "e1": 0.3, "e2": -0.4, "e3": 0.7})
+    assert all(abs(v) > 1e-4 for v in found["forwards"])
+    assert np.abs(found["backwards"] - found["forwards"]).max() < 1e-28

@@ -146,8 +146,8 @@ def _basis(place: Place, rows: np.ndarray, independent: Sequence[int] | None) ->
                             f"named: {', '.join(names) or 'none'}")
     block = Z[list(independent)]
     if Z.shape[1] and np.linalg.cond(block / scales[list(independent)][:, None]) > 1e8:
-        raise ArgumentError(f"{place.module.name}: {', '.join(names)} are not independent here: the others do not follow from "
-                            "them; name others, or leave the choice open")
+        raise ArgumentError(f"{place.module.name}: the other velocities do not follow from {', '.join(names)} here; name others, "
+                            "or leave the choice open")
     return (Z @ np.linalg.inv(block) if Z.shape[1] else Z), list(independent)
 
 
