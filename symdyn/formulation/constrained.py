@@ -117,25 +117,29 @@ class Constrained(Motion):
                                 smoothed)
         kept = list(range(len(self.rows)) if self.independent is None else self.independent)
         C_r, names = self.C_r()[kept], [self.rows[k].name for k in kept]
-        least = [self._least(k) for k in kept]
         if self.pivots is not None:
             pivots = [(kept.index(row), column) for row, column in self.pivots]
+            mixed = len(set(self.angular)) > 1
+            columns = self._columns() if mixed else [1] * len(self.speeds)
             solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds,
-                                                   least)
+                                                   [self._least(k, mixed) for k in kept], columns)
         else:
-            solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, least)
+            solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, [self._least(k) for k in kept])
         return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))
 
     def _right(self) -> np.ndarray:
         """F_d from the recursion that the equations need anyway; `F_d` itself is to be read."""
         return vector(*[-r.remaining for r in self.rows])
 
-    def _least(self, k: int) -> Any:
-        """Square of a size of row k so small that it is no constraint any more: positions where it vanishes as a whole."""
+    def _least(self, k: int, scaled: bool = False) -> Any:
+        """Square of a size of row k so small that it is no constraint any more: positions where it vanishes as a whole.
+
+        scaled   columns of angular speeds are divided by the length
+        """
         row = self.rows[k]
         if row.unit not in POWERS:
             return 0
-        turning = all(is_zero(e) or turns for e, turns in zip(row.jacobian, self.angular, strict=True))
+        turning = not scaled and all(is_zero(e) or turns for e, turns in zip(row.jacobian, self.angular, strict=True))
         natural = self.length ** POWERS[row.unit] / (1 if turning else self.length)
         return VANISHING**2 * (natural * natural)
 

@@ -29,12 +29,14 @@ class NullSpaceSolver:
 
     pivots   (row, column) of C in the order of elimination; names: of the rows
     least    squares of what the rows are compared with where they are small as a whole, (m,); default 0
+    columns  factors by which columns in other units compare, (n,); default 1
     """
 
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],
-                 speeds: Sequence[Any], least: Sequence[Any] = ()) -> None:
+                 speeds: Sequence[Any], least: Sequence[Any] = (), columns: Sequence[Any] = ()) -> None:
         self.algebra, self.M, self.C = algebra, M, C
         self.least = least or [0] * len(C)
+        self.columns = vector(*(columns or [1] * C.shape[1]))
         self.rows, self.d = [r for r, _ in pivots], [c for _, c in pivots]
         self.i = [k for k in range(C.shape[1]) if k not in self.d]
         with algebra.section("dependent speeds: C_r u_dot = F_d solved for them"):
@@ -81,7 +83,8 @@ class NullSpaceSolver:
         for b in self.blocks:
             k, after = list(b), list(range(b.stop, n))
             rows = [self.rows[p] for p in b]
-            sizes = [inner(self.C[row], self.C[row]) + self.least[row] for row in rows]
+            scaled = [self.C[row] * self.columns for row in rows]
+            sizes = [inner(row, row) + self.least[place] for row, place in zip(scaled, rows, strict=True)]
             label = " and ".join(names[self.rows[p]] for p in b)
             self.inverse.append(self._inverse(A[np.ix_(k, k)], sizes, label, b.start))
             if after:
@@ -90,15 +93,18 @@ class NullSpaceSolver:
         self.LU = A
 
     def _inverse(self, A: np.ndarray, sizes: Sequence[Any], label: str, place: int) -> np.ndarray:
-        """Of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from."""
+        """Of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from, scaled."""
         a = self.algebra
         determinant = A[0, 0] if len(A) == 1 else A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
         if isinstance(determinant, Node):
             least: Any = SMALLEST_PIVOT**2
             for size in sizes:
                 least = least * size
+            scaled = determinant
+            for column in self.d[place:place + len(A)]:
+                scaled = scaled * self.columns[column]
             reason = f"the dependent speeds do not follow from {label} here"
-            determinant = a.recorder.guard(determinant, determinant * determinant - least, reason)
+            determinant = a.recorder.guard(determinant, scaled * scaled - least, reason)
         over = a.name(f"iC{place + 1}", a.recorder.div(1, determinant))
         if len(A) == 1:
             return np.array([[over]], dtype=object)

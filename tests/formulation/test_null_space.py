@@ -144,3 +144,20 @@ def test_rows_that_are_kept_stay_far_from_losing_rank() -> None:
     samples = scaled(ConstraintStates(eq.otherwise, eq.symbols.defaults), motion.q)
     kept = np.linalg.svd(samples[:, list(found.independent)], compute_uv=False)[:, -1]
     assert (kept / np.linalg.svd(samples, compute_uv=False)[:, 3]).min() > 0.3
+
+
+def test_units_do_not_decide_what_is_a_pivot() -> None:
+    """Speeds in other units have longer columns: with their factors the statements hold as before."""
+    M, C, f, d = problem(6, 3, 5)
+    stretch = np.array([1, 1, 1, 1e4, 1e4, 1e4])  # dependent speeds are the first three
+    order, names, speeds = [(0, 0), (1, 1), (2, 2)], ["a", "b", "c"], list("uvwxyz")
+    wanted = np.linalg.solve(np.block([[M, (C * stretch).T], [C * stretch, np.zeros((3, 3))]]), np.concatenate([f, d]))
+    found = []
+    for columns in ((), list(1 / stretch)):
+        recorder, numbers = Recorder(), {}
+        Ms, Cs, fs, ds = (leaves(recorder, name, a, numbers) for name, a in (("M", M), ("C", C * stretch), ("f", f), ("d", d)))
+        solver = NullSpaceSolver(TapeAlgebra(recorder, {}), Ms, Cs, order, names, speeds, columns=columns)
+        x, lam = solver.solve(fs, ds)
+        found.append(evaluate(Tape.of(recorder, x=vector(*x, *lam)), numbers)["x"].astype(float))
+    assert np.isnan(found[0]).all()
+    assert np.abs(found[1] - wanted).max() < 1e-10 * np.abs(wanted).max()
