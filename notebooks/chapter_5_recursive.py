@@ -23,6 +23,7 @@ from IPython.display import Math, display
 from sympy import latex
 
 import symdyn as sd
+from symdyn.lecture import cases
 
 
 def show(name, value):
@@ -148,7 +149,11 @@ assert sp.simplify(acceleration - rate - omega_x_v).is_zero_matrix
 # %%
 angular = sd.compare("spatial-angular-acceleration")
 wrong, error = angular.errata[0]
-too_much = sp.Matrix([e.printed - e.right for e in wrong.entries]).applyfunc(sp.simplify)
+typed = next(f for case in cases() if case.name == angular.name for f in case.taken() if f.name == wrong.name)
+letters = {str(letter): meaning for letter, meaning in typed.renamed.items()}
+in_letters = sp.Matrix([e.printed for e in wrong.entries])
+as_meant = in_letters.xreplace({s: letters[s.name] for s in in_letters.free_symbols if s.name in letters})
+too_much = (as_meant - sp.Matrix([e.right for e in wrong.entries])).applyfunc(sp.simplify)
 show(r"\Delta {}^{b_2}\dot{\boldsymbol\omega}_{b_2/n}", too_much)
 print(f"line {wrong.slide.line}: {error.why}")
 print(error.evidence)

@@ -28,9 +28,11 @@ _HOME = {
     "symdyn.flexible.beam": ("Beam",),
     "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
+    "symdyn.urdf.read": ("read_urdf",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
-    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EvaluationError", "GimbalLock",
-                      "MissingExtra", "ModelError", "ModelWarning", "NotARotation", "NotNormalized", "RotationError",
+    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EquilibriumNotUnique",
+                      "EvaluationError", "GimbalLock", "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium",
+                      "NotARotation", "NotNormalized", "RotationError",
                       "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase", "UnsupportedExpression",
                       "ZeroAxis"),
 }

@@ -198,7 +198,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
     metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
                 "reactions": [name for name, *_ in equations.joints], "bodies": list(equations.bodies),
-                "drawn": list(equations.drawn), "planar": equations.planar,
+                "drawn": list(equations.drawn), "flexible": list(equations.flexible), "planar": equations.planar,
                 "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],

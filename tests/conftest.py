@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+GC_THRESHOLD = (200_000, 20, 50)  # equations are many small objects that stay; looking for garbage took a sixth of the time
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="rewrite the files under generated/reference")
@@ -20,21 +22,53 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes more than ten seconds")
-    gc.set_threshold(200_000, 20, 50)  # equations are many small objects that stay; looking for garbage took a sixth of the time
+    gc.set_threshold(*GC_THRESHOLD)
     if not hasattr(config, "workerinput"):  # the workers of pytest-xdist inherit the environment
         folder = tempfile.mkdtemp(prefix="symdyn-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ["SYMDYN_CACHE_DIR"] = folder
         compile_quickly()
+        prepare_notebooks(Path(folder, "ipython"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest first, so that no worker is left with one of them at the end; the lecture before its notebooks."""
+    def place(item: pytest.Item) -> int:
+        if item.get_closest_marker("slow"):
+            return 0
+        return 1 if item.path.parent.name == "lecture" else 2 if item.path.suffix == ".ipynb" else 3
+
+    items.sort(key=place)
 
 
 def compile_quickly() -> None:
-    """Have C compiled with -O1, in a third of the time: without fused operations the results keep every bit of -O3's."""
+    """Have C compiled with -O0, in a fifth of the time: without fused operations the results keep every bit of -O3's."""
     from symdyn.runtime.compiler import find_compiler
 
     compiler = None if "SYMDYN_CC" in os.environ or os.name != "posix" else find_compiler()
     if compiler is not None and compiler.kind in ("gcc", "clang"):
-        os.environ["SYMDYN_CC"] = shlex.join([*compiler.command, "-O1"])
+        os.environ["SYMDYN_CC"] = shlex.join([*compiler.command, "-O0"])
+
+
+NOTEBOOK_STARTUP = """import gc
+import sys
+
+gc.set_threshold(*{threshold})
+sys.path.append({folder!r})
+from compared import share_with_notebooks
+
+sys.path.pop()
+share_with_notebooks()
+"""
+
+
+def prepare_notebooks(folder: Path) -> None:
+    """What notebooks begin with: as here, garbage is looked for seldom, and cases of the lecture are compared once in a run."""
+    startup = folder / "profile_default" / "startup"
+    startup.mkdir(parents=True)
+    text = NOTEBOOK_STARTUP.format(threshold=GC_THRESHOLD, folder=str(Path(__file__).parent / "lecture"))
+    startup.joinpath("run.py").write_text(text, encoding="utf-8")
+    os.environ["IPYTHONDIR"] = str(folder)
 
 
 @pytest.fixture

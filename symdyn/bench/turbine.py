@@ -14,6 +14,7 @@ from symdyn.bench.kernel import evaluation_time
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.pipeline import emit
+from symdyn.systems.turbine_parts import blade_beam, tower_beam
 from symdyn.tape.floats import evaluate_rows
 
 Figure = tuple[str, float, str, str]
@@ -133,10 +134,10 @@ def tumbling(module: Any, rtol: float = 1e-11) -> tuple[float, float]:
     pitch = solution["platform_pitch_deg"]
     if pitch[0] > 10 or pitch[-1] > 10:
         raise AssertionError(f"the turbine does not turn over: its pitch goes from {pitch[0]} to {pitch[-1]} degrees")
-    return solution.energy_error(), 90.0 - float(pitch[400])
+    return solution.energy_error(), abs(90.0 - float(pitch[400]))
 
 
-def series(module: Any, rtol: float = 1e-9) -> dict[str, Any]:
+def series(module: Any, rtol: float = 1e-11) -> dict[str, Any]:
     """Time series of the moored turbine, with the work of its loads; module: of `turbine()`."""
     rest = {name: module.metadata["initial"].get(name, 0.0) for name in module.metadata["q"]}
     rated = 12.1 * np.pi / 30
@@ -180,7 +181,7 @@ def derivation() -> Iterator[Figure]:
         emit(equations, "c", ("rhs",), standalone=False)
         best = min(best, clock.perf_counter() - begun)
     yield "describe, derive and emit, embedded, 8 coordinates", best, "s", "< 1.5"
-    yield "one compiled evaluation, embedded", evaluation_time(equations) * 1e6, "us", "< 0.2"
+    yield "one compiled evaluation, embedded", evaluation_time(equations, repeats=150) * 1e6, "us", "< 0.2"
     for name, options in (("recursive", {}), ("recursive, quasi-velocities", {"orientation": "parameters"})):
         yield f"one compiled evaluation, {name}", evaluation_time(turbine(**BARE | options).recursive()) * 1e6, "us", ""
     lumped = turbine(**BARE | {"blades": "lumped"}).embedding()
@@ -226,11 +227,48 @@ def statics() -> Iterator[Figure]:
         yield f"period of {mode.name}: free decay differs by", off, "", "< 0.005"
 
 
+def flexible() -> Iterator[Figure]:
+    """Tower and blades that bend: equilibrium, energy, the limit of great stiffness, and the tower on land."""
+    module = turbine(rotor="fixed", flexible=True).embedding().compile()
+    rest = module.equilibrium()
+    yield "flexible: iterations to equilibrium", rest.iterations, "", "<= 25"
+    yield "flexible: the tower's top bends by", rest["tower_fa1"] + rest["tower_fa2"], "m", ""
+    start = {**dict(zip(module.metadata["q"], rest.q, strict=True)), "theta": 0.08}
+    decay = module.simulate(t=(0, 120), q=start, work=True, rtol=1e-11)
+    yield "flexible: energy balance of free decay in pitch", decay.energy_error(), "", "< 1e-8"
+    yield "flexible: 2 minutes of it", decay.integrator_seconds, "s", ""
+    rigid = turbine(rotor="fixed").embedding().compile()
+    same = beam_numbers()
+    wanted = platform_frequencies(rigid, same)
+    for factor, bound in ((1e2, ""), (1e4, ""), (1e6, "< 1e-5")):
+        found = platform_frequencies(module, {"s_T": factor, "s_B": factor})
+        off = float(np.abs(found / wanted - 1).max())
+        yield f"flexible, {factor:g} times as stiff: platform frequencies off rigid ones", off, "", bound
+    tower = sd.systems.land_wind_turbine(rotor="fixed", flexible="tower").embedding().compile()
+    for mode in tower.linearize(tower.equilibrium()).modes():
+        if leading(mode) in ("tower_fa1", "tower_ss1"):
+            yield f"on land, rigid blades: {leading(mode)}", mode.frequency, "Hz", ""
+
+
+def beam_numbers() -> dict[str, float]:
+    """Parameters of the rigid turbine with mass and inertia of the flexible one's beams."""
+    found: dict[str, float] = {}
+    for letter, beam in (("T", tower_beam().modal), ("B", blade_beam().modal)):
+        z = beam.h0[2] / beam.m
+        found |= {f"m_{letter}": beam.m, f"z_{letter}": z, f"I_{letter}": beam.I0[0, 0] - beam.m * z**2}
+    return found
+
+
+def platform_frequencies(module: Any, params: dict[str, float]) -> np.ndarray:
+    """Of the six slowest modes at rest, Hz, (6,)."""
+    return np.asarray(module.linearize(module.equilibrium(params=params)).modes().frequencies[:6])
+
+
 def main() -> int:
     """Print every figure; returns the number of those that miss their bound."""
     from symdyn.bench.__main__ import missed
 
-    groups: list[Callable[[], Iterator[Figure]]] = [derivation, agreement, motion, statics]
+    groups: list[Callable[[], Iterator[Figure]]] = [derivation, agreement, motion, statics, flexible]
     count = 0
     for group in groups:
         for name, value, unit, wanted in group():

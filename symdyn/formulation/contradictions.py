@@ -17,6 +17,8 @@ STATES = 12
 # Sets of numbers for parameters that a contradiction must outlast.
 TRIALS = 16
 TOLERANCE = 1e-9
+# Part of the largest inertia up to which there is nothing but rounding.
+NO_MASS = 1e-13
 
 
 @dataclass(frozen=True)
@@ -177,13 +179,17 @@ def _loose(draw: _Draw) -> set[int] | None:
     """Speeds that take part in a motion without mass that the constraints leave at every state; None if there is none."""
     common: set[int] | None = None
     for M, C_r in zip(draw.M, draw.C_r, strict=True):
-        Vt = np.linalg.svd(C_r)[2]
-        sizes = np.linalg.svd(C_r, compute_uv=False)
+        # A lamp on a ship is no motion without mass: speeds count in units in which their inertia is 1.
+        inertia = np.abs(np.diag(M))
+        largest = max(inertia.max(), 1e-300)
+        unit = np.sqrt(np.where(inertia > NO_MASS * largest, inertia, largest))
+        Vt = np.linalg.svd(C_r / unit)[2]
+        sizes = np.linalg.svd(C_r / unit, compute_uv=False)
         free = Vt[int((sizes > TOLERANCE * sizes.max(initial=0.0)).sum()):].T
         if not free.shape[1]:
             return None
-        values, vectors = np.linalg.eigh(free.T @ M @ free)
-        null = np.abs(values) <= TOLERANCE * max(np.abs(M).max(), 1e-300)
+        values, vectors = np.linalg.eigh(free.T @ (M / np.outer(unit, unit)) @ free)
+        null = np.abs(values) <= NO_MASS
         if not null.any():
             return None
         entries = np.abs(free @ vectors[:, null]).max(axis=1)

@@ -55,6 +55,7 @@ class Equations:
     joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
+    flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
@@ -79,6 +80,7 @@ class Equations:
     joints: tuple[tuple[str, str, str, str], ...] = ()
     otherwise: Equations | None = None
     drawn: tuple[Mapping[str, Any], ...] = ()
+    flexible: tuple[Mapping[str, Any], ...] = ()
     watched: Callable[[], Sequence[Any]] = tuple
     identification: Any = None
     provenance: Any = None

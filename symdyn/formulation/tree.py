@@ -293,8 +293,10 @@ class _Builder:
         part, outer = self.parts[k], self.parts[self.parts[k].parent]
         if part.axis is None or outer.axis is None:
             return 0
+        # A cosine of 1 in floats says nothing: it may belong to a tilt of 1e-9, which its sines show.
+        tilt = [part.R0[k, part.axis] for k in range(3) if k != outer.axis]
         along = part.R0[outer.axis, part.axis]
-        return 0 if isinstance(along, Node) or abs(along) != 1 else int(along)
+        return 0 if isinstance(along, Node) or abs(along) != 1 or not all(is_zero(e) for e in tilt) else int(along)
 
     def _total_angle(self, k: int) -> Any:
         """Angle of link k about its axis against the axes that its parent is worked in."""

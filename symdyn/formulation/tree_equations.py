@@ -64,6 +64,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   provenance=OfBodies(quantities), watched=quantities.loads.watches,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
+                  flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),
                   **more)
 
 

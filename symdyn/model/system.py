@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import sympy as sp
@@ -312,6 +313,22 @@ class System:
     def compile(self, backend: str | None = None, tune: bool = False, **options: Any) -> Any:
         """A numeric module of `equations(tune)`; see symdyn.pipeline.compile_equations for the backend and the options."""
         return self.equations(tune).compile(backend, **options)
+
+    def to_urdf(self, path: str | Path) -> Path:
+        """Write a tree of fixed, revolute and prismatic joints as a URDF file, with the parameters' default numbers.
+
+        Numbers read back to the last bit (angles of a frame: to rounding), with the same names; what `sd.read_urdf` made is read
+        back equal. Links have their frames at their joints, as the format has it; the root link is the one body that a Fixed
+        joint holds at the ground's frame, else a link "world". Joints without limits are written as continuous, dependent
+        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity, drives by inputs, outputs and shapes have no
+        place in it. Returns the path.
+
+        Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a
+        file that cannot be written.
+        """
+        from symdyn.urdf.write import write_urdf
+
+        return write_urdf(self.check(), path)
 
     def _declared(self, given: Any) -> tuple[sp.Symbol, ...]:
         listed = list(given) if hasattr(given, "__iter__") and not isinstance(given, str) else [given]

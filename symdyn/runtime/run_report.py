@@ -15,6 +15,9 @@ from symdyn.runtime import run_tables
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
 
+# What moves by less, relative to the mechanism, is not seen in a picture.
+_SEEN = 1e-3
+
 
 def write_report(solution: Solution, path: Any) -> Path:
     """Write the report; returns its path, see Solution.report.
@@ -56,7 +59,8 @@ def _told(energy: run_tables.Energy | None) -> dict[str, Any] | None:
     if energy is None:
         return None
     return {"work": run_tables.number(energy.work), "change": run_tables.number(energy.change),
-            "difference": f"{energy.difference:.3g}", "relative": f"{energy.relative:.2g}", "doubtful": energy.doubtful}
+            "difference": f"{energy.difference:.3g}", "relative": f"{energy.relative:.2g}", "doubtful": energy.doubtful,
+            "of": "its energy: it rests" if energy.rests else "the larger of kinetic energy and range of potential energy"}
 
 
 def _why_no_energy(solution: Solution) -> str:
@@ -75,8 +79,9 @@ def _times(solution: Solution) -> list[tuple[str, float]]:
         centres = solution.rows("positions").reshape(len(t), -1, 3) if "positions" in solution.module.functions else None
         if centres is not None and centres.shape[1] and np.isfinite(centres).all():
             middle = centres.mean(axis=1)
-            far = int(np.linalg.norm(middle - middle[0], axis=1).argmax())
-            if 0 < far < len(t) - 1:
+            moved = np.linalg.norm(middle - middle[0], axis=1)
+            far = int(moved.argmax())
+            if 0 < far < len(t) - 1 and moved[far] > _SEEN * np.ptp(centres, axis=(0, 1)).max():
                 found.append(("farthest from the start", float(t[far])))
         found.append(("end", float(t[-1])))
     return found

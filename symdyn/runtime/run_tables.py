@@ -8,23 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.watches import WATCHES, watched
+
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
 
 WHERE = {"c": "compiled C", "numpy": "NumPy"}
 # An energy balance worse than this is marked.
 DOUBTFUL = 1e-6
+# With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
+_REST = 1e-10
 
 
 @dataclass(frozen=True)
 class Energy:
     """The balance of a run, J: work of the loads (input less dissipation), change of energy, the largest difference of the two on
-    the way, and this relative to the larger of kinetic energy and range of potential energy; rows over time: work, change."""
+    the way, and this relative to the larger of kinetic energy and range of potential energy, of a mechanism at rest to its
+    energy; rows over time: work, change."""
 
     work: float
     change: float
     difference: float
     relative: float
+    rests: bool
     rows: np.ndarray
 
     @property
@@ -135,7 +141,10 @@ def energy(solution: Solution) -> Energy | None:
         return None
     change = solution.energy - solution.energy[0]
     difference = float(np.abs(change - solution.work).max())
-    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(),
+    kinetic, potential = solution.energies.T
+    rests = max(kinetic.max(), np.ptp(potential)) < _REST * np.abs(potential).max()
+    relative = difference / float(np.abs(solution.energy).max()) if rests else solution.energy_error()
+    return Energy(float(solution.work[-1]), float(change[-1]), difference, relative, bool(rests),
                   np.column_stack([solution.work, change]))
 
 
@@ -150,18 +159,12 @@ def constraints(solution: Solution) -> list[dict[str, str]]:
 
 def watches(solution: Solution) -> list[dict[str, Any]]:
     """What loads want to be looked at: range of each value, its limits, and what it means if it leaves them."""
-    looked_at = solution.module.metadata.get("watches", ())
-    if not looked_at or "watches" not in solution.module.functions or not len(solution.t):
+    module = solution.module
+    if not module.metadata.get(WATCHES) or not len(solution.t):
         return []
-    rows = []
-    values = solution.rows("watches").reshape(len(solution.t), -1)
-    for (label, least, most, message), column in zip(looked_at, values.T, strict=True):
-        low, high = float(np.nanmin(column)), float(np.nanmax(column))
-        worst = low if low < least else high
-        outside = low < least or high > most
-        rows.append({"label": label, "least": number(low), "most": number(high), "limits": _limits(least, most),
-                     "outside": outside, "message": message.replace("{value}", number(worst)) if outside else ""})
-    return rows
+    return [{"label": value.label, "least": number(value.low), "most": number(value.high),
+             "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}
+            for value in watched(module, solution.rows(WATCHES))]
 
 
 def _limits(least: float, most: float) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.spatial.vectors import zeros
-from symdyn.tape.node import Node
+from symdyn.tape.node import Node, is_zero
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,8 @@ def _turn(R: np.ndarray) -> _Turn | None:
                 continue
             i, j = (row for row in range(3) if row != a)
             k, l = (column for column in range(3) if column != b)
+            if not all(is_zero(e) for e in (R[a, k], R[a, l], R[i, b], R[j, b])):
+                return None  # a tilt of 1e-9 has a cosine of 1 in floats
             c, s = R[i, k], R[j, k]
             if not isinstance(c, Node) or not isinstance(s, Node):
                 return None

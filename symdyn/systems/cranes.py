@@ -92,7 +92,8 @@ def _given(system: System, numbers: dict[str, float]) -> list[sp.Symbol]:
 
 def _add_cargo(system: System, hull: Body, cargo: str) -> None:
     tip = _given(system, _TIP)
-    system.draw(hull, shapes.Cylinder((0, 0, _HULL["D"]), (0, 0, 25), 6, 4), shapes.Cylinder((0, 0, 18), tip, 1.5, 0.8), color="#d8a03a")
+    system.draw(hull, shapes.Cylinder((0, 0, _HULL["D"]), (0, 0, 25), 6, 4), shapes.Cylinder((0, 0, 18), tip, 1.5, 0.8),
+                color="#d8a03a")
     system.add_output("tip", position(hull, tuple(tip)))
     numbers = _given(system, _LOADS[cargo])
     if cargo == "hook":

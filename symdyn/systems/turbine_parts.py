@@ -89,7 +89,7 @@ def add_machine(system: System, top: Body, at: Any, rotor: str, blades: str, fle
     system.draw(nacelle, shapes.Box(nrel.NACELLE_SIZE, nrel.NACELLE_MIDDLE), color="0.75")
     system.add_joint(Revolute("yaw", top, nacelle, coordinates("yaw"), parent_point=at))
     system.add_output("nacelle_velocity", velocity(nacelle, (x, 0, z)))
-    hub = _add_lumped_rotor(system) if blades == "lumped" else _add_rotor(system, flexible)
+    hub = _add_lumped_rotor(system) if blades == "lumped" else _add_hub(system)
     shaft: dict[str, Any] = {"parent_point": [l_S * sp.cos(tilt), 0, h_S + l_S * sp.sin(tilt)],
                              "parent_rotation": sp.rot_ccw_axis2(-tilt)}
     system.draw(hub, shapes.Cylinder((-1.5, 0, 0), (2, 0, 0), 0.8, nrel.HUB_RADIUS), color="0.6")
@@ -100,12 +100,22 @@ def add_machine(system: System, top: Body, at: Any, rotor: str, blades: str, fle
         system.add_joint(Revolute("shaft", nacelle, hub, Omega * time, axis=[1, 0, 0], **shaft))
     else:
         system.add_joint(Revolute("shaft", nacelle, hub, coordinates("azimuth"), axis=[1, 0, 0], **shaft))
+    if blades == "three":
+        _add_blades(system, hub, flexible)
     return nacelle, hub
 
 
-def _add_rotor(system: System, flexible: bool) -> Body:
-    m_H, I_H, r_R, cone = given(system, m_H=nrel.HUB_MASS, I_H=nrel.HUB_INERTIA, r_R=nrel.HUB_RADIUS, cone=nrel.CONE)
-    hub = system.add_body("hub", mass=m_H, inertia=[I_H, 0, 0])
+def _hub(system: System) -> list[sp.Symbol]:
+    return given(system, m_H=nrel.HUB_MASS, I_H=nrel.HUB_INERTIA, r_R=nrel.HUB_RADIUS, cone=nrel.CONE)
+
+
+def _add_hub(system: System) -> Body:
+    m_H, I_H, *_ = _hub(system)
+    return system.add_body("hub", mass=m_H, inertia=[I_H, 0, 0])
+
+
+def _add_blades(system: System, hub: Body, flexible: bool) -> None:
+    *_, r_R, cone = _hub(system)
     beam = blade_beam() if flexible else None
     for k in range(3):
         if beam is not None:
@@ -118,7 +128,6 @@ def _add_rotor(system: System, flexible: bool) -> Body:
         system.draw(blade, shapes.Blade((0, 0, 0), (0, 0, nrel.ROTOR_RADIUS - nrel.HUB_RADIUS), nrel.CHORDS), color="0.95")
         turned = sp.rot_ccw_axis1(2 * sp.pi * k / 3) * sp.rot_ccw_axis2(cone)
         system.add_joint(Fixed(f"root{k + 1}", hub, blade, parent_point=r_R * turned[:, 2], parent_rotation=turned))
-    return hub
 
 
 def _blade(system: System) -> list[sp.Symbol]:
@@ -127,8 +136,7 @@ def _blade(system: System) -> list[sp.Symbol]:
 
 def _add_lumped_rotor(system: System) -> Body:
     """Hub and three blades as one body, with its origin at the apex; alike about all axes across the shaft."""
-    m_H, I_H, r_R, cone = given(system, m_H=nrel.HUB_MASS, I_H=nrel.HUB_INERTIA, r_R=nrel.HUB_RADIUS, cone=nrel.CONE)
-    m_B, z_B, I_B = _blade(system)
+    (m_H, I_H, r_R, cone), (m_B, z_B, I_B) = _hub(system), _blade(system)
     away, c, s = r_R + z_B, sp.cos(cone), sp.sin(cone)
     mass = m_H + 3 * m_B
     spans = [[float(e) for e in sp.rot_ccw_axis1(2 * sp.pi * k / 3) * sp.rot_ccw_axis2(nrel.CONE)[:, 2]] for k in range(3)]

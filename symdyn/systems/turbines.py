@@ -69,7 +69,8 @@ def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientatio
                   (m_x l_b/m_P, m_y l_b/m_P, z_P); none at first
     flexible      "tower": it bends in four modes, tower_fa1, tower_fa2 along x, tower_ss1, tower_ss2 along y (m at the top);
                   "blades": each bends in its three lowest modes, blade1_flap1, blade1_edge1, blade1_flap2, ... ; True: both.
-                  Stiffness and damping are multiplied by s_T, d_T and s_B, d_B
+                  Stiffness and damping are multiplied by s_T, d_T and s_B, d_B. In q those of the tower stand before yaw, those
+                  of the blades are the last
 
     It starts at rest in equilibrium without wind, rigid. Outputs: tower_top (m), nacelle_velocity (m/s), tower_top_acceleration
     (m/s^2) (n-frame), platform_pitch_deg (its Euler angle theta, degrees).
@@ -110,7 +111,7 @@ def land_wind_turbine(rotor: str = "free", blades: str = "three", wind: bool = T
     """The NREL 5-MW turbine on land: tower, nacelle, hub and three blades of `floating_wind_turbine`, the foot on the ground.
 
     The n-frame has z upward and its origin at the foot of the tower, x downwind. q = [the elastic coordinates of the tower, yaw,
-    azimuth, the elastic coordinates of the blades], as far as there are such. Options, inputs, outputs, parameters and sources
+    azimuth, the elastic coordinates of the blades], as far as it has them. Options, inputs, outputs, parameters and sources
     as there. It starts at rest, straight.
     """
     options = {"rotor": rotor, "blades": blades, "wind": wind, "drives": drives, "flexible": flexible}

@@ -96,7 +96,7 @@ def test_modules_agree(compiled: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("name", ["kitchen_sink", "bricard"])
 def test_every_bit_is_that_of_the_tests(name: str, derived: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The tests let C be compiled with -O1; with what users get, results and whole motions are the same to the last bit."""
+    """The tests let C be compiled with -O0; with what users get, results and whole motions are the same to the last bit."""
     compiler = find_compiler()
     if compiler is None or compiler.kind not in ("gcc", "clang"):
         pytest.skip("no gcc or clang here")

@@ -1,13 +1,14 @@
-"""Comparisons of the lecture's cases that tests share, from process to process."""
+"""Comparisons of the lecture's cases that tests and notebooks share, from process to process."""
 
 from __future__ import annotations
 
 import os
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import symdyn as sd
-from symdyn.comparison import Case, Comparison, Formula, Verdict
+from symdyn.comparison import Case, Comparison, Formula, Verdict, run
 from symdyn.lecture import cases
 
 
@@ -23,12 +24,28 @@ def verdicts(changed: Formula) -> list[Verdict]:
 
 def compared(name: str) -> Comparison:
     """What sd.compare(name) gives; computed once in a run."""
+    return once(name, lambda: sd.compare(name))
+
+
+def once(name: str, compare: Callable[[], Comparison]) -> Comparison:
+    """The comparison of a case of the lecture, computed unless this or another process of the run did."""
     path = Path(os.environ["SYMDYN_CACHE_DIR"]) / "lecture" / f"{name}.pickle"
     if path.is_file():
         return pickle.loads(path.read_bytes())
-    found = sd.compare(name)
+    found = compare()
     path.parent.mkdir(exist_ok=True)
     part = path.with_suffix(f".{os.getpid()}")
     part.write_bytes(pickle.dumps(found))
     part.replace(path)
     return found
+
+
+def share_with_notebooks() -> None:
+    """In a notebook's process: sd.compare takes cases of the lecture from those compared before, and keeps the others."""
+    compute = run._compared
+
+    def compare(case: Case) -> Comparison:
+        of_lecture = any(case is known for known in cases())
+        return once(case.name, lambda: compute(case)) if of_lecture else compute(case)
+
+    run._compared = compare

@@ -14,13 +14,15 @@ from typing import Any
 import pytest
 
 import symdyn.runtime
+import symdyn.runtime.statics
 from symdyn.pipeline import emit, write_source
 from symdyn.runtime.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
 SYMBOLIC = {"sympy", "mpmath", "jinja2"}
 HEAVY = SYMBOLIC | {"numpy", "scipy", "matplotlib", "tqdm"}
-RUNTIME = [f"symdyn.runtime.{m.name}" for m in pkgutil.iter_modules(symdyn.runtime.__path__)]
+RUNTIME = [f"{package.__name__}.{m.name}" for package in (symdyn.runtime, symdyn.runtime.statics)
+           for m in pkgutil.iter_modules(package.__path__)]
 
 
 def imported(program: str, folder: Path) -> set[str]:

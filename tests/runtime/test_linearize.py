@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.util
 import re
 from typing import Any
 
@@ -15,6 +16,7 @@ from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError
+from symdyn.pipeline import FORCES, STATICS, emit, write_source
 from tests.mechanisms import kitchen_sink
 
 
@@ -47,13 +49,14 @@ def top() -> Any:
     """A free rigid body in Euler parameters, on springs to nothing: it turns freely."""
     s = sd.System("top")
     body = s.add_body("body", mass=1, inertia=[1, 2, 3])
-    s.add_joint(sd.Free("free", s.ground, body, coordinates=sd.coordinates("x y z p0 p1 p2 p3"), orientation=sd.EulerParameters()))
+    s.add_joint(sd.Free("free", s.ground, body, sd.coordinates("x y z p0 p1 p2 p3"), orientation=sd.EulerParameters()))
     return s.embedding().compile(backend="numpy")
 
 
 def test_chain_has_the_matrices_of_the_textbook() -> None:
     lin = chain().linearize(chain().equilibrium())
-    assert np.allclose(lin.M, [[6, 4], [4, 4]]) and np.allclose(lin.K, np.diag([50, 150])) and np.allclose(lin.C, np.diag([0.3, 0.6]))
+    assert np.allclose(lin.M, [[6, 4], [4, 4]]) and np.allclose(lin.K, np.diag([50, 150]))
+    assert np.allclose(lin.C, np.diag([0.3, 0.6]))
     assert np.allclose(lin.F_in, [[1], [1]]) and not lin.G.any() and lin.coordinates == ("q1", "q2")
     inverse = np.linalg.inv(lin.M)
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ lin.K, -inverse @ lin.C]])
@@ -214,3 +217,35 @@ def test_both_backends_and_the_parts_by_themselves(compiled: Any) -> None:
     name = c.metadata["parameters"][1]
     assert np.isclose(c.linearize(c.equilibrium()).derivative(0, name).eigenvalue,
                       numpy.linearize(numpy.equilibrium()).derivative(0, name).eigenvalue, rtol=1e-12)
+
+
+def test_written_functions_keep_their_reference_vectors(tmp_path: Any) -> None:
+    """Of the balance and all its derivatives, against the tape at 30 digits; names of directions are no identifiers."""
+    x, theta = sd.coordinates("x theta")
+    k = sd.parameters("k", positive=True)
+    s = sd.System("written_crab", gravity=[0, -9.81, 0])
+    crab, load = s.add_body("crab", mass=2), s.add_body("load", mass=1, com=[0, -0.5, 0])
+    slide = s.add_joint(sd.Prismatic("slide", s.ground, crab, x, axis=[1, 0, 0]))
+    s.add_joint(sd.Revolute("hinge", crab, load, theta, axis=[0, 0, 1]))
+    s.add_joint_force(slide, -k * x**3)
+    s.add_constraint(x - sp.sin(theta), "cam")
+    s.add_output("place", x**2)
+    s.defaults, s.initial = {k: 40.0}, {x: sp.sin(0.4), theta: 0.4}
+    equations = s.augmented()
+    for number, functions in enumerate(([*STATICS, *FORCES], ["variation"], ["second_variation"])):
+        source = emit(equations, "numpy", functions)
+        write_source(source, tmp_path / str(number))
+        spec = importlib.util.spec_from_file_location(f"written_{number}", tmp_path / str(number) / "written_crab.py")
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        assert module.selftest() == 0
+
+
+def test_numbers_bound_in_the_code_are_no_parameters() -> None:
+    module = systems.double_pendulum().embedding().compile(backend="numpy", specialize={"g": 9.81})
+    whole = systems.double_pendulum().embedding().compile(backend="numpy")
+    found = [m.linearize(m.equilibrium(start={"q1": -1.4})).derivative(1, "m2").eigenvalue for m in (module, whole)]
+    assert np.isclose(*found, rtol=1e-12)
+    with pytest.raises(ArgumentError, match="parameter: there is no 'g'"):
+        module.linearize().derivative(0, "g")

@@ -1,4 +1,4 @@
-"""Modes against closed forms and SciPy on matrices made by hand; derivatives of eigenvalues against closed forms and differences."""
+"""Modes against closed forms and SciPy on matrices made by hand; derivatives of eigenvalues against formulas and differences."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_row_of_masses() -> None:
         assert np.allclose(mode.shape / mode.shape[1 if abs(shape[1]) > 0.1 else 0],
                            shape / shape[1 if abs(shape[1]) > 0.1 else 0], atol=1e-12)
         assert np.isclose(mode.shares.sum(), 1) and np.isclose(np.abs(mode.shape).max(), 1)
-    assert modes[0].name == "q3, q2, q4" and modes["q3, q2, q4"] is modes[0]
+    assert modes[0].name == "q3, q2, q4 (1)" and modes["q3, q2, q4 (1)"] is modes[0] and modes["q1, q3, q5"] is modes[2]
     assert "f [Hz]" in repr(modes) and len(repr(modes).splitlines()) == 7 and "q3, q2, q4" in repr(modes[0])
 
 
@@ -101,7 +101,7 @@ def test_damping_ratio_and_what_creeps() -> None:
     assert np.isclose(light.damping, 3 / (2 * np.sqrt(600 * 2)), rtol=1e-13) and np.isclose(light.omega, np.sqrt(300), rtol=1e-13)
     assert np.isclose(light.damped_frequency, np.sqrt(300 * (1 - light.damping**2)) / (2 * np.pi), rtol=1e-13)
     heavy = module.linearize(params={"d": 100.0}).modes()
-    assert [m.kind for m in heavy] == ["real", "real"] and np.allclose(sorted(m.eigenvalue for m in heavy),
+    assert [m.kind for m in heavy] == ["real", "real"] and np.allclose(sorted(m.eigenvalue.real for m in heavy),
                                                                          np.sort(np.roots([2, 100, 600])))
 
 
@@ -175,8 +175,6 @@ def test_derivatives_with_the_shift_of_the_equilibrium() -> None:
         assert abs(found.eigenvalue - exact) <= 1e-12 * max(abs(exact), 1)
         assert np.isclose(found.frequency, (eigenvalue.conjugate() * exact).real / size / (2 * np.pi), rtol=1e-11, atol=1e-13)
         assert np.isclose(found.damped_frequency, exact.imag / (2 * np.pi), rtol=1e-11, atol=1e-13)
-        damping = (-value.diff(p) / sp.Abs(1) + 0).subs(numbers)
-        assert damping is not None
     fixed_state = loaded().linearize(e.x)
     assert abs(fixed_state.derivative(0, "g").eigenvalue - complex(value.diff(g).subs(numbers))) < 1e-12
 
@@ -186,7 +184,7 @@ def richardson(function: Any, at: float, h: float) -> Any:
     return (8 * (function(at + h) - function(at - h)) - function(at + 2 * h) + function(at - 2 * h)) / (12 * h)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "double_wishbone"])
+@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank"])
 def test_derivatives_under_constraints(name: str) -> None:
     """Lengths move the equilibrium, the null space and the multipliers."""
     module = getattr(systems, name)().augmented().compile(backend="numpy")
@@ -194,7 +192,7 @@ def test_derivatives_under_constraints(name: str) -> None:
     lin = module.linearize(e)
     defaults = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
     checked = 0
-    for parameter in list(defaults)[:9]:
+    for parameter in list(defaults)[:6]:
         def eigenvalue(value: float, parameter: str = parameter) -> complex:
             near = module.equilibrium(params={**defaults, parameter: value}, start=e)
             return module.linearize(near).modes()[0].eigenvalue
@@ -262,8 +260,8 @@ def test_double_eigenvalues_have_no_derivative() -> None:
 
 @pytest.mark.parametrize(("mode", "parameter", "message"), [
     (9, "k", "mode 9 asked for; there are 5, numbered from 0"),
-    ("q9", "k", "0 modes are named 'q9'; there are 0: q3, q2, q4; 1: "),
-    (0, "w", "parameter: there is no 'w'; there are k, m"),
+    ("q9", "k", "0 modes are named 'q9'; there are 0: q3, q2, q4 (1); 1: "),
+    (0, "w", "parameter: there is no 'w'; there are m, k"),
 ])
 def test_bad_arguments(mode: Any, parameter: str, message: str) -> None:
     with pytest.raises(ArgumentError, match=re.escape(message)):

@@ -28,7 +28,7 @@ from symdyn.runtime.pictures.drawing import Drawing  # noqa: E402
 from symdyn.runtime.pictures.meshes import Part, parts_of  # noqa: E402
 from symdyn.runtime.pictures.painter import Camera, cut, order, planes  # noqa: E402
 from symdyn.runtime.pictures.scene import Scene  # noqa: E402
-from symdyn.runtime.pictures.solids import Solids  # noqa: E402
+from symdyn.runtime.pictures.solids import Solids, part_way  # noqa: E402
 
 S = sd.shapes
 
@@ -165,21 +165,45 @@ def test_between_two_times_bodies_turn_and_do_not_shrink() -> None:
         assert np.abs(between.vertices(k)[0] - turned).max() < 1e-7
 
 
-def test_flexible_bodies_bend_by_their_mode_shapes(solution: Solution) -> None:
-    """A mode made up for the hinge's angle, whose shape is the square of the height: shapes on the body follow it, and a body
-    without shapes is a bent line."""
-    z = np.linspace(0, 2, 9)
-    record = {"body": "mast", "stations": np.column_stack([0 * z, 0 * z, z]).tolist(), "coordinates": ["a"],
-              "shapes": np.stack([z**2, 0 * z, 0 * z], axis=1)[:, :, None].tolist()}
-    for shown in (solution.module.metadata["drawn"], []):
-        module = Module({**solution.module.metadata, "drawn": shown, "flexible": [record]}, solution.module.unit, "numpy")
-        bent = module.simulate((0.0, 1.0), u=[0.3, 0.1, 0.0, 0.5, 0.4, 0.8, 2.0], rtol=1e-6)
-        solids = Solids.of(bent)
-        assert solids is not None
-        pose = bent.frames.reshape(len(bent.t), -1, 12)[700, 1]
-        tip = pose[:3] + pose[3:].reshape(3, 3) @ [4 * bent["a"][700], 0, 2]
-        (places,) = [p for p, part in zip(solids.vertices(700), solids.parts, strict=True) if part.body == 1]
-        assert np.abs((places[-20:].mean(axis=0) if shown else places[-1]) - tip).max() < 1e-9
+def test_part_of_a_turn_is_about_its_axis_by_part_of_its_angle() -> None:
+    rng = np.random.default_rng(3)
+    angles = np.array([0.0, 1e-9, 1e-3, 1.0, 2.6, 3.0, 3.14159, np.pi - 1e-9])
+    axes = rng.normal(size=(200, 1, 3))
+    vectors = axes / np.linalg.norm(axes, axis=-1, keepdims=True) * angles[:, None]
+    A = Rotation.random(1600, rng=rng).as_matrix().reshape(200, 8, 3, 3)
+
+    def turned(share: float) -> np.ndarray:
+        return np.asarray(A @ Rotation.from_rotvec(share * vectors.reshape(-1, 3)).as_matrix().reshape(200, 8, 3, 3))
+
+    for share in (0.0, 0.3, 1.0):
+        assert np.abs(part_way(A, turned(1.0), np.full((200, 1, 1), share)) - turned(share)).max() < 2e-8
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_flexible_bodies_bend_and_end_at_their_tips(shown: bool) -> None:
+    """A beam that sways: its shape, or without one its line, ends where the frame at its free end is."""
+    beam = sd.Beam([0, 10], [2, 2], [400, 400], [
+        sd.Shape("x", [1], name="bend"), sd.Shape("y", [1], name="side")])
+    system = sd.System("swaying", gravity=[0, 0, -9.81])
+    mast = system.add_flexible_body("mast", beam)
+    head = system.add_body("head", mass=3, inertia=[0.1, 0.1, 0.1])
+    system.add_joint(sd.Revolute("foot", system.ground, mast.root, sd.coordinates("a"), axis=[1, 0, 0]))
+    system.add_joint(sd.Fixed("top", mast.tip, head))
+    system.draw(head, S.Box([0.5, 0.5, 0.5]))
+    if shown:
+        system.draw(mast.root, S.Cylinder([0, 0, 0], [0, 0, 10], 0.2, 0.1))
+    module = system.embedding().compile("numpy")
+    eta = [str(q) for q in mast.coordinates]
+    solution = module.simulate((0.0, 0.5), q={eta[0]: 2.5, eta[1]: -1.0, "a": 0.3}, rtol=1e-5)
+    solids = Solids.of(solution)
+    assert solids is not None
+    for index in (0, 600):
+        (places,) = [p for p, part in zip(solids.vertices(index), solids.parts, strict=True) if part.body == 0]
+        end = places[-20:].mean(axis=0) if shown else places[-1]
+        head_at = solution.frames.reshape(len(solution.t), -1, 12)[index, module.metadata["bodies"].index("head"), :3]
+        assert np.abs(end - head_at).max() < 1e-9 and np.linalg.norm(end) < 9.9
+    drawing = Drawing.of(solution)
+    assert drawing is not None and not drawing.bare
 
 
 # -- what hides what

@@ -11,6 +11,7 @@ import symdyn as sd
 from symdyn.bench.turbine import (
     BARE,
     States,
+    beam_numbers,
     decay_period,
     formulations,
     leading,
@@ -22,7 +23,7 @@ from symdyn.bench.turbine import (
 )
 from symdyn.systems import nrel_5mw as nrel
 from symdyn.systems import nrel_5mw_tower
-from symdyn.systems.turbine_parts import blade_beam, tower_beam
+from symdyn.systems.turbine_parts import BLADE_MODES, TOWER_MODES
 
 RIGID = {"drives": False, "mooring": None, "wind": False}
 # Published: total mass of barge and turbine, mass of the rotor and its inertia about the shaft (OpenFAST's summary), hub height.
@@ -35,8 +36,8 @@ def numbers(system: sd.System) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def moored() -> Any:
-    """All loads, all parameters at their numbers."""
-    return turbine().embedding().compile()
+    """All loads, and ballast that is not moved."""
+    return turbine(ballast=True).embedding().compile()
 
 
 # -- numbers
@@ -123,10 +124,8 @@ def test_a_rotor_without_freedom_is_a_free_one_that_is_held(rotor: str) -> None:
 def test_flexible_turbine_that_does_not_bend_is_the_rigid_one() -> None:
     """Inertia, gyroscopic forces and loads along the rigid motions, with the mass and inertia of the beams' tables."""
     rigid, flexible = turbine(**RIGID).embedding(), turbine(**RIGID, flexible=True).embedding()
-    for letter, beam in (("T", tower_beam().modal), ("B", blade_beam().modal)):
-        z = beam.h0[2] / beam.m
-        beams = {f"m_{letter}": beam.m, f"z_{letter}": z, f"I_{letter}": beam.I0[0, 0] - beam.m * z**2}
-        rigid.symbols.defaults.update({p: beams[p.name] for p in rigid.symbols.parameters if p.name in beams})
+    beams = beam_numbers()
+    rigid.symbols.defaults.update({p: beams[p.name] for p in rigid.symbols.parameters if p.name in beams})
     states = random_states(5, 3)
     columns = [q.name for q in flexible.symbols.coordinates]
     places = [columns.index(q.name) for q in rigid.symbols.coordinates]
@@ -138,6 +137,17 @@ def test_flexible_turbine_that_does_not_bend_is_the_rigid_one() -> None:
     assert np.abs(inertia).max() < 1e-13 * wanted["M_tilde"].max()
     for name in ("k_tilde", "F_tilde"):
         assert np.abs(found[name][:, places] - wanted[name]).max() < 1e-12 * np.abs(wanted[name]).max()
+
+
+def test_order_of_coordinates() -> None:
+    def names(system: sd.System) -> list[str]:
+        return [q.name for q in system.check().coordinates]
+
+    tower, blades = [f"tower_{mode}" for mode in TOWER_MODES], [f"blade{k}_{mode}" for k in (1, 2, 3) for mode in BLADE_MODES]
+    platform = ["x", "y", "z", "psi", "theta", "phi"]
+    assert names(turbine(waves=True)) == [*platform, "yaw", "azimuth"]
+    assert names(turbine(flexible="tower", rotor="prescribed")) == [*platform, *tower, "yaw"]
+    assert names(sd.systems.land_wind_turbine()) == [*tower, "yaw", "azimuth", *blades]
 
 
 @pytest.mark.parametrize(("make", "options", "message"), [
@@ -192,3 +202,17 @@ def test_the_moored_barge_floats_where_weight_and_mooring_are_carried(moored: An
     pitch = next(mode for mode in moored.linearize(rest).modes() if leading(mode) == "theta")
     assert pitch.period == pytest.approx(12.12, abs=0.01)
     assert decay_period(moored, rest.x, pitch) == pytest.approx(pitch.period, rel=1e-3)
+
+
+def test_ballast_that_keeps_it_upright_in_the_wind(moored: Any) -> None:
+    """The moment of the ballast is what keeps the pitch at zero, beside the moments of wind and mooring about y."""
+    found = moored.equilibrium(free=["x", "y", "z", "psi", "theta", "phi", "yaw", "m_x"], fixed={"theta": 0.0, "azimuth": 0.0},
+                               inputs={"v_w": 8.0})
+    assert found.stable and list(found.solved) == ["m_x"] and found.solved["m_x"] < -5e4  # upwind
+    leaning = moored.equilibrium(fixed={"azimuth": 0.0}, inputs={"v_w": 8.0})
+    assert leaning["theta"] > 0.01
+    moved = {"m_x": found.solved["m_x"]}
+    upright = moored.F_tilde(found.q, np.zeros(8), moved, inputs=[0.0, 0.0, 0.0, 8.0])
+    assert np.abs(upright[[0, 2, 4]]).max() < 1e-3
+    without = moored.F_tilde(found.q, np.zeros(8), inputs=[0.0, 0.0, 0.0, 8.0])
+    assert without[4] - upright[4] == pytest.approx(-found.solved["m_x"] * nrel.BALLAST_WAY * nrel.GRAVITY, rel=1e-6)

@@ -54,6 +54,15 @@ class Modal(Joint):
     def constants(self) -> list[sp.Expr]:
         return [*super().constants, self.stiffness, self.damping]
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """What pictures need, as plain data: names of the bodies at its ends and of the coordinates, and of the stations of
+        the beam the places (k, 3), displacements by the modes (k, 3, n), and their second derivatives (k, 3, n, n)."""
+        beam = self.beam
+        second = -beam.S[:, None] * beam.e[:, None, None]
+        return {"body": _name(self.parent), "tip": _name(self.child), "coordinates": [str(q) for q in self.coordinates],
+                "stations": np.outer(beam.X, beam.e).tolist(), "shapes": beam.Psi.tolist(), "second": second.tolist()}
+
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
         n = self.beam.n
         if not self.carries:
@@ -83,3 +92,6 @@ def exactly(values: np.ndarray) -> np.ndarray:
     """Floats as the numbers they are, so that zeros fold."""
     return vector(*[exact(float(v)) for v in values.ravel()]).reshape(values.shape)
 
+
+def _name(body: Any) -> str:
+    return str(getattr(body, "name", body))

@@ -15,19 +15,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bending:
-    """Displacements shapes @ eta in body axes: shapes (n, 3, n_eta) of points, (n, 3); eta (n_t, n_eta)."""
+    """Displacements in body axes of points (n, 3), to second order in eta (n_t, n_eta).
+
+    shapes   (n, 3, n_eta), first derivatives by eta; second: (n, 3, n_eta, n_eta), second ones, the foreshortening
+    """
 
     points: np.ndarray
     shapes: np.ndarray
+    second: np.ndarray
     eta: np.ndarray
 
     def of(self, part: Part) -> Bending:
         """The displacements of a part's vertices: those of the beam's points beside them."""
         axis = int(np.ptp(self.points, axis=0).argmax())
         order = np.argsort(self.points[:, axis])
-        along, flat = self.points[order, axis], self.shapes[order].reshape(len(order), -1)
-        shapes = np.column_stack([np.interp(part.stations[:, axis], along, column) for column in flat.T])
-        return Bending(part.stations, shapes.reshape(len(part.stations), 3, -1), self.eta)
+        along = self.points[order, axis]
+
+        def beside(values: np.ndarray) -> np.ndarray:
+            columns = values[order].reshape(len(order), -1).T
+            found = np.column_stack([np.interp(part.stations[:, axis], along, column) for column in columns])
+            return found.reshape(len(part.stations), *values.shape[1:])
+
+        return Bending(part.stations, beside(self.shapes), beside(self.second), self.eta)
 
     def between(self, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> Bending:
         """At other times: a share w (n, 1) of the way from the times a to the times b."""
@@ -35,19 +44,21 @@ class Bending:
 
     def displacements(self, index: int) -> np.ndarray:
         """At one of the times, (n, 3)."""
-        return np.asarray(self.shapes @ self.eta[index])
+        eta = self.eta[index]
+        return np.asarray(self.shapes @ eta + self.second @ eta @ eta / 2)
 
 
 def bendings(solution: Solution) -> dict[int, Bending]:
     """The flexible bodies of a motion, by their place among the bodies.
 
-    metadata["flexible"] lists them: `body`, its name; `stations` (n, 3), points of the undeformed beam in body axes;
-    `shapes` (n, 3, n_eta), their displacements by each of `coordinates`, the names of the elastic coordinates.
+    metadata["flexible"] lists them: `body` and `tip`, the names of the bodies at its ends; `stations` (n, 3), points of the
+    undeformed beam in the axes of `body`; `shapes` (n, 3, n_eta), their displacements by each of `coordinates`, the names of the
+    elastic coordinates, and `second` (n, 3, n_eta, n_eta), the second derivatives.
     """
     metadata = solution.module.metadata
     found = {}
     for record in metadata.get("flexible", ()):
         eta = np.column_stack([solution[name] for name in record["coordinates"]])
-        points, shapes = np.array(record["stations"], dtype=float), np.array(record["shapes"], dtype=float)
-        found[metadata["bodies"].index(record["body"])] = Bending(points, shapes.reshape(len(points), 3, -1), eta)
+        points, shapes, second = (np.array(record[name], dtype=float) for name in ("stations", "shapes", "second"))
+        found[metadata["bodies"].index(record["body"])] = Bending(points, shapes, second, eta)
     return found

@@ -17,7 +17,7 @@ from symdyn.runtime.pictures.style import MANY, colors_of
 # Elevation and azimuth of the eye, degrees; on shapes it looks more from the side.
 VIEW = (22.0, -55.0)
 VIEW_OF_SOLIDS = (14.0, -58.0)
-# Of the axes' box in a picture without shapes.
+# Of the axes' box before it is fitted.
 ZOOM = 0.79
 # What is drawn over all shapes.
 ABOVE = 1e6
@@ -40,13 +40,11 @@ def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
         axes.set_zlabel(f"{drawing.labels[2]} [m]")
         axes.set_box_aspect(np.ptp(limits, axis=1), zoom=ZOOM)
         axes.view_init(elev=elevation, azim=azimuth)
-        axes.locator_params(nbins=5)
         axes.tick_params(labelsize=8, pad=0)
-        axes.zaxis.labelpad = -2
-        if drawing.solids is not None:
-            axes.tick_params(axis="z", pad=3)
-            axes.zaxis.labelpad = 9
-            _fill(axes, limits)
+        axes.tick_params(axis="z", pad=3)
+        axes.zaxis.labelpad = 4
+        axes.xaxis.labelpad = axes.yaxis.labelpad = 8
+        _fill(axes, limits)
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.pane.set_facecolor("0.98")
             axis.line.set_color("0.5")
@@ -66,7 +64,7 @@ def _fill(axes: Any, limits: np.ndarray) -> None:
     for _ in range(2):  # a nearer box is seen in a stronger perspective
         view = axes.viewLim
         spans = 2 * np.abs(flat(axes, corners) - (view.min + view.max) / 2).max(axis=0) / view.size
-        zoom *= float(min(0.74 / spans[0], 0.78 / spans[1]))
+        zoom *= float(min(0.7 / spans[0], 0.78 / spans[1]))
         axes.set_box_aspect(np.ptp(limits, axis=1), zoom=zoom)
     middle, halves = limits.mean(axis=1), np.diag(np.ptp(limits, axis=1) / 2)
     lengths = [float(np.linalg.norm(np.diff(flat(axes, np.array([middle - half, middle + half])), axis=0))) for half in halves]
@@ -76,6 +74,20 @@ def _fill(axes: Any, limits: np.ndarray) -> None:
             axis.set_label_text("")
         else:
             axis.set_major_locator(MaxNLocator(max(3, round(5 * length / max(lengths))), steps=[1, 2, 2.5, 5, 10]))
+
+
+def height_of(axes: Any) -> tuple[float, float]:
+    """Where the box of axes of space begins and ends from below, in parts of their height."""
+    limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
+    heights = flat(axes, np.array([[x, y, z] for x in limits[0] for y in limits[1] for z in limits[2]]))[:, 1]
+    view = axes.viewLim
+    return float((heights.min() - view.y0) / view.height), float((heights.max() - view.y0) / view.height)
+
+
+def title(axes: Any, text: str, size: float) -> None:
+    """A title close above what is drawn."""
+    above = min(height_of(axes)[1] + 0.06, 0.97) if hasattr(axes, "zaxis") else None
+    axes.set_title(text, fontsize=size, y=above)
 
 
 def flat(axes: Any, points: np.ndarray) -> np.ndarray:
@@ -108,7 +120,7 @@ def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
     for index, alpha in ((0, 0.3), (-1, 1.0)):
         show(make_artists(axes, drawing, alpha), drawing, index)
     which = "centre" if n_b == 1 else "last centre" if n_b > 3 else "centres"
-    axes.set_title(f"start (pale), end, way of the {which} of mass", fontsize=9, y=0.97 if drawing.spatial else None)
+    title(axes, f"start (pale), end, way of the {which} of mass", 9)
 
 
 def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:

@@ -14,9 +14,12 @@ from symdyn.runtime.pictures.style import colors_of
 if TYPE_CHECKING:
     from symdyn.runtime.statics.campbell import Campbell
 
+# The axis of damping ratios shows at least this much, %: less is rounding.
+LEAST_DAMPING = 0.1
 
-def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3, 6)) -> Figure:
-    """Frequencies and damping ratios of all modes; saved (PNG, PDF, SVG by the ending) if a path is given."""
+
+def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Figure:
+    """Frequencies, up to `highest` (Hz), and damping ratios; saved (PNG, PDF, SVG by the ending) if a path is given."""
     figure = Picture(figsize=(8.4, 6.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     mark = "o" if len(diagram.values) < 12 else None
@@ -24,14 +27,16 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
     for color, k in zip(colors_of(len(order)), order, strict=True):
         upper.plot(diagram.values, diagram.frequencies[:, k], color=color, marker=mark, markersize=3, label=diagram.names[k])
         lower.plot(diagram.values, 100 * diagram.damping[:, k], color=color, marker=mark, markersize=3)
-    highest = 1.08 * float(np.nanmax(diagram.frequencies, initial=0.0)) or 1.0
+    highest = highest or 1.08 * float(np.nanmax(diagram.frequencies, initial=0.0)) or 1.0
     ends = np.array([min(0.0, diagram.values.min()), diagram.values.max()])
     for multiple in harmonics:
         line = multiple * np.abs(ends) / (2 * np.pi)
         upper.plot(ends, line, color="0.65", linewidth=0.8, linestyle="--", zorder=0)
         if line[1] > 0:
-            at = min(1.0, 0.96 * highest / line[1])
+            at = min(0.97, 0.96 * highest / line[1])
             upper.annotate(f"{multiple:g}P", (at * ends[1], at * line[1]), color="0.4", fontsize=8, ha="right", va="bottom")
+    least, most = lower.get_ylim()
+    lower.set_ylim(min(least, -LEAST_DAMPING), max(most, LEAST_DAMPING))
     upper.set_ylim(0, highest)
     upper.set_xlim(*ends)
     upper.set_ylabel("damped frequency [Hz]")
@@ -41,7 +46,7 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
     for axes in (upper, lower):
         axes.grid(alpha=0.3)
     figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False)
-    figure.suptitle(f"{diagram.title}: Campbell diagram", fontsize=11)
+    upper.set_title(f"{diagram.title}: Campbell diagram", fontsize=11)
     if path is not None:
         figure.savefig(path, dpi=110)
     return figure

@@ -57,7 +57,9 @@ class Drawing:
         skeleton, kept = _skeleton(solution, centres)
         centres = centres[:, kept]
         solids = Solids.of(solution)
-        bare = [k for k, body in enumerate(kept) if solids is None or body not in solids.bodies]
+        tips = {record["tip"] for record in solution.module.metadata.get("flexible", ())}
+        bare = [k for k, body in enumerate(kept) if solids is None or (
+            body not in solids.bodies and solution.module.metadata["bodies"][body] not in tips)]
         if solids is not None:
             skeleton = _without(skeleton, bare)
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),

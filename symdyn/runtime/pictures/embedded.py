@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 # Points of all curves of a panel from which on it is stored as pixels.
 _MANY = 200_000
-# A curve this many times as large as the next smaller one flattens it.
-_FLATTENS = 10.0
+# A curve this many times as large as the next smaller one flattens it; such a small part of the largest is nothing.
+_FLATTENS, _NOTHING = 15.0, 1e-7
 
 
 def mechanism(solution: Solution, times: Sequence[tuple[str, float]]) -> list[dict[str, str]]:
@@ -55,13 +55,13 @@ def curves(solution: Solution) -> list[dict[str, str]]:
 def _apart(panel: Panel) -> list[Panel]:
     """Curves that would flatten the others, such as the angle of a rotor, get axes of their own."""
     sizes = np.abs(panel.values).max(axis=0)
-    rising = np.sort(sizes[sizes > 0])
-    bounds = rising[1:][rising[1:] > _FLATTENS * rising[:-1]]
-    if panel.title == "energy" or not len(bounds):
+    rising = np.sort(sizes[sizes > _NOTHING * sizes.max()])
+    gaps = rising[1:] / rising[:-1]
+    if panel.title == "energy" or not gaps.max(initial=0.0) > _FLATTENS:
         return [panel]
-    groups = np.searchsorted(bounds, sizes, "right")
-    return [replace(panel, names=[name for name, there in zip(panel.names, groups == k, strict=True) if there],
-                    values=panel.values[:, groups == k]) for k in range(len(bounds) + 1)]
+    large = sizes >= rising[1:][gaps.argmax()]
+    return [replace(panel, names=[name for name, there in zip(panel.names, mask, strict=True) if there],
+                    values=panel.values[:, mask]) for mask in (~large, large)]
 
 
 def balance(solution: Solution, rows: np.ndarray) -> list[dict[str, str]]:
@@ -84,7 +84,7 @@ def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> dict[str, str]:
 def _square(drawing: Drawing) -> Figure:
     """A figure for the mechanism, as high as it needs."""
     if drawing.spatial:
-        figure = Picture(figsize=(4.2, 4.2))
+        figure = Picture(figsize=(4.8, 4.8))
         figure.subplots_adjust(0, 0, 1, 1)
         return figure
     spans = np.ptp(drawing.limits(), axis=1)

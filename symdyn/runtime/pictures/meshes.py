@@ -36,7 +36,7 @@ class Part:
     hidden: np.ndarray
     edges: np.ndarray
     creases: np.ndarray
-    width: float = 0.5
+    width: float = 0.4
     to: int | None = None
 
 

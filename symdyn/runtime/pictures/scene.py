@@ -14,7 +14,7 @@ from symdyn.runtime.pictures.solids import Solids, Water
 _FROM_ABOVE = Camera(np.eye(4), np.array([0.0, 0.0, 1.0, 0.0]))
 _WATER_ALPHA = 0.38
 # Of a colour: what is left in the shade, and along edges.
-_SHADE, _EDGE = 0.45, 0.45
+_SHADE, _EDGE = 0.5, 0.6
 
 
 class Scene(PolyCollection):

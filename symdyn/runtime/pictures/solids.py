@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
-from scipy.spatial.transform import Rotation
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.pictures.bending import Bending, bendings
@@ -87,9 +86,7 @@ class Solids:
         right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
         a, b = order[right - 1], order[right]
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
-        R, n = self.rotations, self.rotations.shape[1]
-        turn = Rotation.from_matrix((np.swapaxes(R[a], -1, -2) @ R[b]).reshape(-1, 3, 3)).as_rotvec().reshape(-1, n, 3)
-        turned = R[a] @ Rotation.from_rotvec((w * turn).reshape(-1, 3)).as_matrix().reshape(-1, n, 3, 3)
+        turned = part_way(self.rotations[a], self.rotations[b], w)
         return replace(self, origins=self.origins[a] * (1 - w) + self.origins[b] * w, rotations=turned,
                        bending=[None if one is None else one.between(a, b, w[:, :, 0]) for one in self.bending])
 
@@ -111,6 +108,26 @@ class Solids:
         if self.water is not None and self.water.reach is not None:
             points.append(np.column_stack([self.water.reach, np.full(2, self.water.level)]))
         return np.concatenate(points) if points else np.zeros((0, 3))
+
+
+def part_way(A: np.ndarray, B: np.ndarray, w: Any) -> np.ndarray:
+    """Rotations (..., 3, 3) a share w (..., 1) of the way from A to B, about the one axis of the turn between them."""
+    Q = np.swapaxes(A, -1, -2) @ B
+    twice = np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], axis=-1)
+    cosine = (np.trace(Q, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(np.linalg.norm(twice, axis=-1) / 2, cosine)[..., None]
+    # Near a half turn the differences vanish; the axis then is in the columns of the symmetric part.
+    halves = Q + np.swapaxes(Q, -1, -2) - 2 * cosine[..., None, None] * np.eye(3)
+    largest = np.linalg.norm(halves, axis=-2).argmax(axis=-1)
+    column = np.take_along_axis(halves, largest[..., None, None], axis=-1)[..., 0]
+    column = column * np.where((column * twice).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    axis = np.where(cosine[..., None] < -0.9, column, twice)
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    x, y, z = np.moveaxis(np.divide(axis, length, out=np.zeros_like(axis), where=length > 0), -1, 0)
+    zero = np.zeros_like(x)
+    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    turned = (w * angle)[..., None]
+    return np.asarray(A @ (np.eye(3) + np.sin(turned) * K + (1 - np.cos(turned)) * K @ K))
 
 
 def _filled(solution: Solution, records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from symdyn.errors import ArgumentError
-from symdyn.runtime.pictures.bodies import make_artists, make_axes, show
+from symdyn.runtime.pictures.bodies import height_of, make_artists, make_axes, show, title
 from symdyn.runtime.pictures.drawing import Drawing
 from symdyn.runtime.pictures.figure import Picture
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _COLUMNS = 4
 _SIDE = 4.2
+# Room for labels below and for titles above axes of space, in parts of their height.
+_BELOW, _ABOVE = 0.14, 0.13
 
 
 def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = None) -> Figure:
@@ -36,16 +38,29 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
     spans = np.ptp(drawing.limits(), axis=1)
     columns = min(len(times), _COLUMNS)
     rows = -(-len(times) // columns)
-    height = _SIDE * 1.05 if drawing.spatial else _SIDE * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.4
-    figure = Picture(figsize=(_SIDE * columns, height * rows), layout="constrained")
+    height = _SIDE if drawing.spatial else _SIDE * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.4
+    figure = Picture(figsize=(_SIDE * columns, height * rows), layout=None if drawing.spatial else "constrained")
     grid = figure.add_gridspec(rows, columns)
     for k, (time, eye) in enumerate(zip(times, views, strict=True)):
         axes = make_axes(figure, grid[divmod(k, columns)], drawing, eye)
         show(make_artists(axes, there), there, k if len(solution.t) > 1 else 0)
-        axes.set_title(f"t = {time:.5g} s", fontsize=10, y=0.97 if drawing.spatial else None)
+        title(axes, f"t = {time:.5g} s", 10)
+    if drawing.spatial:
+        _close_up(figure, rows, columns)
     if path is not None:
         figure.savefig(path, dpi=110)
     return figure
+
+
+def _close_up(figure: Figure, rows: int, columns: int) -> None:
+    """Axes of space are square; leave out of the figure what is blank above and below all of them."""
+    ends = np.array([height_of(axes) for axes in figure.axes])
+    low, high = ends[:, 0].min() - _BELOW, ends[:, 1].max() + _ABOVE
+    figure.set_size_inches(_SIDE * columns, _SIDE * (high - low) * rows)
+    for k, axes in enumerate(figure.axes):
+        row, column = divmod(k, columns)
+        axes.set_position((column / columns, (rows - 1 - row) / rows - low / (high - low) / rows, 1 / columns,
+                           1 / (high - low) / rows))
 
 
 def _pictures(solution: Solution, t: Any, view: Any) -> tuple[np.ndarray, list[Any]]:

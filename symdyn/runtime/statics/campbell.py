@@ -17,7 +17,7 @@ import scipy.optimize
 from symdyn.errors import ArgumentError
 from symdyn.runtime.statics.equilibrium import begin, find
 from symdyn.runtime.statics.linear import Reduced
-from symdyn.runtime.statics.modes import NAMED, Linear, Mode, Modes, modes_of
+from symdyn.runtime.statics.modes import Linear, Mode, Modes, dominant, modes_of
 from symdyn.runtime.statics.multiblade import Steady, rotor_of, steady
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.terms import Place
@@ -25,8 +25,8 @@ from symdyn.runtime.statics.terms import Place
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# A mode is followed to one whose likeness less the relative gap of eigenvalues is at least this.
-FOLLOWED = -0.5
+# A pattern of blades goes round if its cosine and sine are out of phase by so much: 1 is a round whirl, 0 a standing wave.
+LEAST_WHIRL = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Campbell:
 
     speed         name; values (n,): its values, rad/s
     eigenvalues   (n, n_modes) complex, 1/s; NaN where a mode could not be followed
-    names         by the coordinates with most kinetic energy over all speeds; "forward" and "backward" say which way a whirl
-                  goes round, with the rotor or against it (multi-blade coordinates only)
+    names         by the coordinates with most kinetic energy over all speeds; of blades also "collective", and "forward" or
+                  "backward" where their pattern goes round with the rotor or against it, seen from the fixed frame
     modes         at every speed, as found; equilibria: the states they are about (Equilibrium, or multiblade.Steady)
     """
 
@@ -65,11 +65,12 @@ class Campbell:
             raise ArgumentError(f"{self.title}: there is no mode {name!r}; there are {', '.join(self.names)}")
         return np.asarray(self.frequencies[:, self.names.index(name)])
 
-    def plot(self, path: Any = None, harmonics: Sequence[float] = (1, 3, 6)) -> Any:
-        """The diagram with lines of multiples of the rotor's speed, as a figure; saved if a path is given. Needs matplotlib."""
+    def plot(self, path: Any = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Any:
+        """The diagram up to a frequency (Hz; default: all), with lines of multiples of the rotor's speed, as a figure; saved if a
+        path is given. Needs matplotlib."""
         from symdyn.runtime.pictures.campbell import plot
 
-        return plot(self, path, harmonics)
+        return plot(self, path, harmonics, highest)
 
     def __repr__(self) -> str:
         width = [max(9, len(n)) for n in self.names]
@@ -155,7 +156,10 @@ def _values(values: Any, owner: str) -> np.ndarray:
 
 
 def follow(sets: Sequence[Modes], inertias: Sequence[np.ndarray], values: np.ndarray) -> list[dict[int, Mode]]:
-    """Tracks, each place among the values -> mode: every mode goes on in the one most like it."""
+    """Tracks, each place among the values -> mode: every mode goes on in the one most like it, all of them taken together.
+
+    A track ends, or begins, where the number of modes changes: a pair of eigenvalues becomes real.
+    """
     tracks: list[dict[int, Mode]] = [{0: mode} for mode in sets[0]]
     for k in range(1, len(sets)):
         open_ = [track for track in tracks if k - 1 in track]
@@ -164,9 +168,8 @@ def follow(sets: Sequence[Modes], inertias: Sequence[np.ndarray], values: np.nda
         rows, columns = scipy.optimize.linear_sum_assignment(-likeness)
         taken = set()
         for i, j in zip(rows, columns, strict=True):
-            if likeness[i, j] >= FOLLOWED:
-                open_[i][k] = sets[k][int(j)]
-                taken.add(j)
+            open_[i][k] = sets[k][int(j)]
+            taken.add(j)
         tracks += [{k: mode} for j, mode in enumerate(sets[k]) if j not in taken]
     return tracks
 
@@ -180,7 +183,7 @@ def _likeness(track: dict[int, Mode], mode: Mode, M: np.ndarray, values: np.ndar
     product = abs(np.vdot(before.shape, M @ mode.shape))**2
     norms = np.real(np.vdot(before.shape, M @ before.shape) * np.vdot(mode.shape, M @ mode.shape))
     gap = abs(mode.eigenvalue - expected) / max(abs(mode.eigenvalue), abs(expected), 1e-300)
-    return float((product / norms if norms > 0 else 0.0) - 2 * gap)
+    return float((product / norms if norms > 0 else 0.0) - min(gap, 1.0))
 
 
 def _names(tracks: Sequence[dict[int, Mode]]) -> tuple[str, ...]:
@@ -188,26 +191,24 @@ def _names(tracks: Sequence[dict[int, Mode]]) -> tuple[str, ...]:
     for track in tracks:
         modes = list(track.values())
         shares = np.sum([m.shares for m in modes], axis=0)
-        if shares.any():
-            order = [i for i in np.argsort(-shares, kind="stable") if shares[i] >= NAMED * shares.max()]
-            name = ", ".join(modes[0].coordinates[i] for i in order[:3]) + _whirl(modes)
-        else:
-            name = modes[0].name
-        names.append(name)
+        told = dominant(shares, modes[0].coordinates).split(", ") if shares.any() else [modes[0].name]
+        stems = {label.rpartition(" ")[0] for label in told if label.endswith((" cosine", " sine"))}
+        for stem in sorted(stems):
+            sense = _whirl(modes, stem)
+            if sense:
+                cyclic = [k for k, label in enumerate(told) if label in (f"{stem} cosine", f"{stem} sine")]
+                told = [f"{stem} {sense}" if k == cyclic[0] else label for k, label in enumerate(told) if k not in cyclic[1:]]
+        names.append(", ".join(told))
     return tuple(n if names.count(n) == 1 else f"{n} ({names[:k + 1].count(n)})" for k, n in enumerate(names))
 
 
-def _whirl(modes: Iterable[Mode]) -> str:
-    """Which way the pattern of the blades goes round, seen from the fixed frame, if it does."""
+def _whirl(modes: Iterable[Mode], stem: str) -> str:
+    """Which way the pattern of a set of blades goes round, seen from the fixed frame, if it does."""
     turning = total = 0.0
     for mode in modes:
-        for c, label in enumerate(mode.coordinates):
-            if label.endswith(" cosine"):
-                s = mode.coordinates.index(label.removesuffix("cosine") + "sine")
-                turning -= float(np.imag(mode.shape[c].conj() * mode.shape[s])) * float(mode.shares[c] + mode.shares[s])
-                total += float(np.abs(mode.shape[[c, s]]).max()**2)
-    if not total or abs(turning) < 0.1 * total:
+        c, s = (mode.coordinates.index(f"{stem} {part}") for part in ("cosine", "sine"))
+        turning -= float(np.imag(mode.shape[c].conj() * mode.shape[s]))
+        total += float(np.sum(np.abs(mode.shape[[c, s]])**2)) / 2
+    if not total or abs(turning) < LEAST_WHIRL * total:
         return ""
-    return " forward" if turning > 0 else " backward"
-
-
+    return "forward" if turning > 0 else "backward"

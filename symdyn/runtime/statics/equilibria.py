@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Equilibria this close, in m, rad and Euler parameters, are one.
 APART = 1e-6
+# Names tell them by coordinates that differ by more, in rad or lengths of the mechanism: if these do not do, by the second.
+CLEARLY = (0.1, 1e-3)
 # Random starts differ by so much unless ranges are given: in rad, and in what is no angle.
 TURNS, LENGTHS = np.pi, 1.0
 
@@ -176,17 +178,36 @@ def _span(value: Any, name: str, owner: str) -> tuple[float, float]:
 
 
 def _named(found: list[Equilibrium]) -> list[Equilibrium]:
-    """Each with its number, its stability, and the coordinates in which the equilibria differ."""
+    """Each with its number, its stability, and the coordinates that tell it from the others."""
     if not found:
         return []
     metadata = found[0].module.metadata
     names = metadata["q"]
     lengths = np.array([metadata["units"].get(n) == "m" for n in names], dtype=bool)
-    spread = np.ptp([e.q for e in found], axis=0) / np.where(lengths, natural_length(found[0].place), 1.0)
-    order = [k for k in np.argsort(-spread, kind="stable") if spread[k] > APART][:2]
+    rows = np.array([e.q for e in found]) / np.where(lengths, natural_length(found[0].place), 1.0)
+    telling = sorted(_telling(rows))
     result = []
     for k, e in enumerate(found):
         kind = {True: "stable", False: "unstable", None: "rigid"}[e.stable]
-        where = ", ".join(f"{names[i]} = {e.q[i]:.4g}" for i in sorted(order))
+        where = ", ".join(f"{names[i]} = {e.q[i] if abs(e.q[i]) > APART else 0:.4g}" for i in telling)
         result.append(replace(e, name=f"{k + 1}: {kind}" + (f" at {where}" if where else "")))
     return result
+
+
+def _telling(rows: np.ndarray) -> list[int]:
+    """Columns in which all rows differ, as few as can be found one by one: those that part most pairs, then those that part them
+    furthest."""
+    if len(rows) < 2:
+        return []
+    gaps = np.array([np.abs(a - b) for k, a in enumerate(rows) for b in rows[:k]])
+    chosen: list[int] = []
+    open_ = np.ones(len(gaps), dtype=bool)
+    for clear in CLEARLY:
+        while open_.any():
+            parted = np.sum(gaps[open_] > clear, axis=0)
+            best = int(np.lexsort((gaps[open_].max(axis=0), parted))[-1])
+            if not parted[best]:
+                break
+            chosen.append(best)
+            open_ &= gaps[:, best] <= clear
+    return chosen

@@ -110,8 +110,8 @@ class Equilibrium:
     @property
     def message(self) -> str:
         """What was found, in a sentence."""
-        kind = {True: "stable", False: "unstable", None: "nothing can move"}[self.stable]
-        return f"{kind} equilibrium after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
+        kind = {True: "stable equilibrium", False: "unstable equilibrium", None: "equilibrium, nothing free to move,"}[self.stable]
+        return f"{kind} after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
 
     def __getitem__(self, name: Any) -> float:
         """A coordinate, speed, extra state, parameter or input by name or symbol. Raises ArgumentError for an unknown name."""
@@ -253,7 +253,7 @@ def _demand_stiffness(search: Search) -> None:
         raise EquilibriumNotUnique(
             f"{module.name}: the equilibrium is not unique: there is no stiffness along "
             + " and along ".join(_told(direction, labels) for direction in loose)
-            + f"; fix it, such as fixed={{{_first(loose[0], labels)!r}: ...}}, or add a load that holds it")
+            + f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it")
 
 
 def _direction_names(trial: Trial) -> list[str]:

@@ -63,8 +63,9 @@ class Reduced:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of what moves along each speed."""
-        return coordinate_names(self.place.module.metadata)
+        """Names of what the independent velocities move."""
+        names = coordinate_names(self.place.module.metadata)
+        return tuple(names[k] for k in self.independent)
 
     @property
     def state_labels(self) -> tuple[str, ...]:

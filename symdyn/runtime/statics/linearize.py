@@ -55,8 +55,7 @@ class Linearization:
         self.M, self.C, self.K, self.G = reduced.M, reduced.C, reduced.K, reduced.G
         self.F_in, self.Z = reduced.F_in, reduced.Z
         metadata = self.module.metadata
-        labels = coordinate_names(metadata)
-        self.coordinates = tuple(labels[k] for k in reduced.independent)
+        self.coordinates = reduced.labels
         self.states = (*self.coordinates, *[metadata["u"][k] for k in reduced.independent],
                        *[metadata["z"][k] for k in reduced.states])
 
@@ -123,7 +122,7 @@ class Linearization:
         owner = self.module.name
         (name,) = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
         rows = selection.rows(place)
-        if (self.equilibrium is None and (place.ud.any() or self._reduced.curved)) or self.G.any():
+        if (self.equilibrium is None and not self._at_rest()) or self.G.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues hold at a state of rest or of steady motion; linearize at "
                                 "an equilibrium")
         if (np.count_nonzero(rows, axis=1) > 1).any() and not _fixed_space(rows):
@@ -135,6 +134,11 @@ class Linearization:
         if self.equilibrium is not None:
             changes |= shift(place, selection, name)
         return of_eigenvalue(self._reduced, self.modes()[mode], self._eigen[0], changes)
+
+    def _at_rest(self) -> bool:
+        """Whether accelerations are but rounding, measured by those of a metre or radian at the highest frequency."""
+        largest = float(np.abs(self._eigen[0]).max(initial=0.0))
+        return bool(np.abs(self.ud).max(initial=0.0) <= 1e-9 * largest**2) and not (self.lam.size and self._reduced.place.u.any())
 
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,6 +12,8 @@ from symdyn.errors import ArgumentError
 
 # Eigenvalues below this part of the largest are zero but for rounding: double ones split by the root of it.
 ZERO = 1e-7
+# Entries of the state matrix below this part of the largest are rounding.
+NOISE = 1e-18
 # Coordinates with at least this share of the kinetic energy of the largest are named.
 NAMED = 0.35
 
@@ -19,7 +21,7 @@ NAMED = 0.35
 class Linear(Protocol):
     """M zeta_dot + C zeta + K eta + ... = 0, as linear.Reduced and multiblade.Averaged give it.
 
-    inertia, Z     of all velocities v, (n_u, n_u), and v = Z eta; labels: names of v; state_labels: of the extra states
+    inertia, Z     of all velocities v, (n_u, n_u), and v = Z eta; labels: names of eta; state_labels: of the extra states
     second_order   whether M, C, K say all
     """
 
@@ -55,8 +57,8 @@ class Mode:
     """One mode.
 
     eigenvalue   1/s, of a pair the one with positive imaginary part
-    shape        (n_u,) complex amplitudes of all velocities v (see linear), the one with most energy 1
-    shares       (n_u,) share of each in the kinetic energy, sum 1
+    shape        (n_u,) complex amplitudes of all velocities v (see linear); that of the leading coordinate is 1
+    coordinates  names of the independent ones; shares: of each in the kinetic energy, sum 1, (n,)
     kind         "oscillation", "real" (creeps back), "zero" (neither returns nor leaves) or "unstable"
     name         coordinates with the largest shares
     right, left  eigenvectors of the state matrix
@@ -94,14 +96,14 @@ class Mode:
     @property
     def damping(self) -> float:
         """Damping ratio, -Re / |eigenvalue|; 0 of a zero eigenvalue."""
-        return -self.eigenvalue.real / self.omega if self.kind != "zero" else 0.0
+        return 0.0 - self.eigenvalue.real / self.omega if self.kind != "zero" else 0.0
 
     def __repr__(self) -> str:
         return f"<Mode {self.name}: {self.frequency:.6g} Hz, damping {self.damping:.3g}, {self.kind}>"
 
 
 class Modes:
-    """Modes in the order of their natural frequencies; prints as a table. An index is a number or a name."""
+    """Modes in the order of their natural frequencies; prints as a table. An index is a number, a name, or its first part."""
 
     def __init__(self, title: str, modes: list[Mode]) -> None:
         self.title = title
@@ -158,7 +160,7 @@ def eigen(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         squares, shapes = scipy.linalg.eigh((K + K.T) / 2, (M + M.T) / 2)
         squares = np.where(np.abs(squares) <= ZERO**2 * np.abs(squares).max(initial=0.0), 0.0, squares)
         roots = np.sqrt(-squares.astype(complex))
-        values = np.concatenate([roots, -roots])
+        values = np.concatenate([roots, -roots]) + 0.0  # no negative zeros
         right = np.vstack([np.hstack([shapes, shapes]), np.hstack([shapes * roots, -shapes * roots])])
         # w = M x (conj(lambda), 1), up to a factor: from w^H A = lambda w^H with symmetric M and K.
         pulled = M @ shapes
@@ -168,7 +170,10 @@ def eigen(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # Metres and radians on one footing.
     scale = np.sqrt(np.abs(np.diag(M)))
     scale = np.concatenate([scale, scale, np.ones(len(A) - 2 * len(scale))])
-    values, left, right = scipy.linalg.eig(A * scale[:, None] / scale, left=True)
+    scaled = A * scale[:, None] / scale
+    # Rounding in place of zeros misleads the balancing of LAPACK, which would scale it up.
+    scaled[np.abs(scaled) < NOISE * np.abs(scaled).max(initial=0.0)] = 0.0
+    values, left, right = scipy.linalg.eig(scaled, left=True)
     return values, right / scale[:, None], left * scale[:, None]
 
 
@@ -184,7 +189,10 @@ def modes_of(linear: Linear, title: str) -> Modes:
         if value.imag < 0:
             continue
         found.append(_mode(linear, value, right[:, k], left[:, k], largest))
-    return Modes(title, _paired(found))
+    found = _paired(found)
+    names = [m.name for m in found]
+    return Modes(title, [m if names.count(m.name) == 1 else replace(m, name=f"{m.name} ({names[:k + 1].count(m.name)})")
+                         for k, m in enumerate(found)])
 
 
 def _paired(modes: list[Mode]) -> list[Mode]:
@@ -200,25 +208,30 @@ def _paired(modes: list[Mode]) -> list[Mode]:
 
 def _mode(linear: Linear, value: complex, right: np.ndarray, left: np.ndarray, largest: float) -> Mode:
     n = linear.Z.shape[1]
-    shape = linear.Z @ right[:n]
-    if not np.abs(shape).max(initial=0.0) > 1e-9 * np.abs(right).max(initial=0.0):
-        shape = linear.Z @ right[n:2 * n]
-    energies = np.abs(np.real(shape.conj() * (linear.inertia @ shape)))
+    amplitudes = right[:n] if np.abs(right[:n]).max(initial=0.0) > 1e-9 * np.abs(right).max(initial=0.0) else right[n:2 * n]
+    shape = linear.Z @ amplitudes
+    energies = np.abs(np.real(amplitudes.conj() * (linear.M @ amplitudes)))
     states = np.abs(right[2 * n:])
     if energies.sum() > 0 and not (states.size and np.abs(right[:2 * n]).max(initial=0.0) <= 1e-9 * states.max()):
         shares = energies / energies.sum()
-        leader = int(np.argmax(shares))
-        shape, right = shape / shape[leader], right / shape[leader]
-        order = [i for i in np.argsort(-shares, kind="stable") if shares[i] >= NAMED * shares[leader]]
-        name = ", ".join(linear.labels[i] for i in order[:3])
+        leader = int(np.argmax(np.round(shares, 6)))
+        shape, right = shape / amplitudes[leader], right / amplitudes[leader]
+        name = dominant(shares, linear.labels)
     else:  # of the extra states alone
-        shares = np.zeros(len(shape))
+        shares = np.zeros(n)
         name = linear.state_labels[int(np.argmax(states))]
     if abs(value) <= ZERO * largest:
         kind = "zero"
     else:
         kind = "unstable" if grows(value, largest) else "oscillation" if value.imag else "real"
     return Mode(value, shape, shares, kind, name, linear.labels, right, left)
+
+
+def dominant(shares: np.ndarray, labels: tuple[str, ...]) -> str:
+    """Names of the coordinates with the largest shares, at most three; about equal ones in their order."""
+    relative = shares / shares.max()
+    order = np.argsort(-np.round(5 * relative), kind="stable")
+    return ", ".join([labels[i] for i in order if relative[i] >= NAMED][:3])
 
 
 def grows(value: complex, largest: float) -> bool:

@@ -155,7 +155,7 @@ class Search:
             change[:n] = shake * stream.standard_normal(n)
             near = self._moved(stuck, change * self.widths(stuck))
             if near is not None:
-                good, again = self._descend(near, limit)
+                good = self._descend(near, limit)[0]
         if not good:
             self.best = stuck
         return good, reason

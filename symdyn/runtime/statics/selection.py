@@ -80,6 +80,8 @@ def select(module: Module, free: Any, fixed: Any, unknown: Any) -> Selection:
     owners = {**dict.fromkeys(metadata["parameters"], "parameter"), **dict.fromkeys(metadata["inputs"], "input"),
               **dict.fromkeys(metadata["x"], "state")}
     named = None if free is None else listed(free, owners, "free", owner)
+    if named == []:
+        raise ArgumentError(f"{owner}: free names nothing; name what is to be found, or leave it out for all coordinates")
     more = listed(unknown, {n: k for n, k in owners.items() if k != "state"}, "unknown_params", owner)
     values = {} if fixed is None else _numbers(fixed, metadata["x"], owner)
     solved = list(dict.fromkeys([*(n for n in named or () if owners[n] != "state"), *more]))

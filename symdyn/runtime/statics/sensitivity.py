@@ -21,8 +21,8 @@ from symdyn.runtime.statics.search import Trial
 from symdyn.runtime.statics.selection import Selection
 from symdyn.runtime.statics.terms import Place
 
-# Two eigenvalues this close, relative to the larger, have no derivatives of their own.
-DOUBLE = 1e-8
+# Two eigenvalues closer than so many of their roundings have no derivatives of their own.
+DOUBLE = 1e4
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,12 @@ def shift(place: Place, selection: Selection, parameter: str) -> dict[str, float
     right = place.along("variation", along={parameter: 1.0})
     right = np.concatenate([trial.tested.T @ right[:n_u], right[n_u:n_u + n_c] * place.scale,
                             right[n_u + n_c:][selection.states]])
-    rows = np.abs(J).max(axis=1, initial=0.0)
-    rows = np.where(rows > 0, rows, 1.0)[:, None]
-    columns = np.abs(np.hstack([J, pulls]) / rows).max(axis=0, initial=0.0)
+    whole = np.hstack([J, pulls])
+    rows = np.abs(whole).max(axis=1, initial=0.0)
+    rows = np.where(rows > 0, rows, 1.0)
+    columns = np.abs(whole / rows[:, None]).max(axis=0, initial=0.0)
     columns = np.where(columns > 0, columns, 1.0)
-    found = np.linalg.lstsq(np.hstack([J, pulls]) / rows / columns, -right / rows[:, 0], rcond=1e-13)[0] / columns
+    found = np.linalg.lstsq(whole / rows[:, None] / columns, -right / rows, rcond=1e-13)[0] / columns
     n = trial.directions.shape[1]
     parts = np.split(found, np.cumsum([n, len(selection.states), len(selection.unknown)]))
     changes = dict(zip(metadata["q"], place.N @ trial.directions @ parts[0], strict=True))
@@ -68,7 +69,8 @@ def of_eigenvalue(reduced: Reduced, mode: Mode, others: np.ndarray, changes: Map
     """Of the eigenvalue of a mode, for the direction `changes`; others: all eigenvalues."""
     place, n, value = reduced.place, reduced.n, mode.eigenvalue
     near = np.sort(np.abs(others - value))[:2]
-    if len(near) > 1 and near[1] <= DOUBLE * np.abs(others).max():
+    rounding = np.finfo(float).eps * np.abs(others).max()**2 / max(abs(value), np.finfo(float).tiny)
+    if len(near) > 1 and near[1] <= DOUBLE * rounding:
         raise ArgumentError(f"{place.module.name}: mode {mode.name} has a double eigenvalue, {value:.9g} 1/s, to rounding: it "
                             "has no derivative of its own; change a parameter a little, so that the two part")
     _, n_u, n_z, n_c = place.sizes

@@ -1,0 +1,1 @@
+"""`python -m symdyn.bench.robots`: robots from files beside Pinocchio, agreement and times."""

@@ -1,0 +1,12 @@
+"""Robots from and to files in the Unified Robot Description Format.
+
+    document   XML text to elements that know their lines; entities and external references are refused
+    values     the numbers and names that stand in attributes
+    robot      links and joints as the file has them: records, no symbols
+    parse      elements to a Robot, every fault of the file told
+    checks     what makes a Robot a tree that can move
+    angles     rotation matrices of roll, pitch and yaw, and back
+    parameters symbols for what is not to be a number
+    read       Robot to System
+    write      System to text
+"""

@@ -1,0 +1,107 @@
+"""XML text to elements that know their lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ParseError
+
+from symdyn.errors import MissingExtra, ModelError
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element: its tag, attributes, children in order, and the line of the file that it begins in."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def find(self, tag: str) -> Element | None:
+        """The first child with a tag."""
+        return next(self.all(tag), None)
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The children with a tag."""
+        return (child for child in self.children if child.tag == tag)
+
+    def everything(self) -> Iterator[Element]:
+        """The element and all in it, in the order of the file."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += element.children[::-1]
+
+
+class _Builder:
+    """What the parser tells its elements to."""
+
+    def __init__(self) -> None:
+        self.parser: Any = None
+        self.root: Element | None = None
+        self.open: list[Element] = []
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, dict(attributes), self.parser.parser.CurrentLineNumber)
+        if self.open:
+            self.open[-1].children.append(element)
+        elif self.root is None:
+            self.root = element
+        self.open.append(element)
+
+    def end(self, tag: str) -> None:
+        self.open.pop()
+
+    def data(self, text: str) -> None:
+        """Text between tags, which a URDF has no use for."""
+
+    def close(self) -> Element | None:
+        return self.root
+
+
+def read_document(path: Path) -> Element:
+    """The root element of a file.
+
+    Raises ModelError, with file and line, for a file that cannot be read, that is no XML, or that declares entities or refers
+    to other files; MissingExtra without defusedxml.
+    """
+    try:
+        from defusedxml.common import DefusedXmlException
+        from defusedxml.ElementTree import DefusedXMLParser
+    except ImportError:
+        raise MissingExtra("reading a URDF needs the package defusedxml: pip install 'symdyn[robots]'") from None
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise ModelError([f"{path}: the file cannot be read ({error.strerror}); pass the path of a URDF file"]) from None
+    builder = _Builder()
+    builder.parser = DefusedXMLParser(target=builder)
+    try:
+        builder.parser.feed(text)
+        root = builder.parser.close()
+    except DefusedXmlException as error:
+        line = builder.parser.parser.CurrentLineNumber
+        what = f"declares the entity {error.name!r}" if hasattr(error, "name") else "refers to another file"
+        raise ModelError([f"{path}:{line}: the file {what}, which is refused; a URDF needs no entities: write out what it "
+                          "stands for"]) from None
+    except ParseError as error:
+        raise ModelError([f"{path}:{error.position[0]}: {_no_xml(str(error), text, error.position[0])}"]) from None
+    except (ValueError, LookupError) as error:
+        raise ModelError([f"{path}:1: the text cannot be decoded ({error}); save it as UTF-8"]) from None
+    assert isinstance(root, Element)
+    return root
+
+
+def _no_xml(reason: str, text: bytes, line: int) -> str:
+    """What is wrong with text that is no XML."""
+    reason = reason.partition(":")[0]
+    if reason == "unbound prefix":
+        lines = text.decode("utf-8", "replace").splitlines()
+        found = lines[line - 1].strip() if line <= len(lines) else ""
+        return (f"a tag has a prefix that the file does not declare, in {found[:100]!r}; if it belongs to xacro, run the file "
+                "through xacro first")
+    return f"the file is no XML there ({reason}); pass a URDF file"

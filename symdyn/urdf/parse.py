@@ -1,0 +1,114 @@
+"""Elements to a Robot: every fault of the file is told, with its line."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeVar
+
+from symdyn.urdf.document import Element
+from symdyn.urdf.robot import INERTIA, TYPES, ZERO, Inertial, Link, Mimic, Origin, Robot, UrdfJoint
+from symdyn.urdf.values import FileFaults, Triple
+
+Named = TypeVar("Named", Link, UrdfJoint)
+# What an axis is where none is given.
+AXIS: Triple = (1.0, 0.0, 0.0)
+
+
+def parse(root: Element, faults: FileFaults) -> Robot:
+    """The robot of a file's root element; meshes, limits, transmissions and what simulators add are left out."""
+    if root.tag != "robot":
+        faults.at(root.line, f"the file holds a <{root.tag}>; a URDF holds a <robot>")
+        return Robot("")
+    _refuse_xacro(root, faults)
+    robot = Robot(root.attributes.get("name", "").strip())
+    for element in root.children:
+        if element.tag == "link":
+            _add(robot.links, _link(element, faults), "link", faults)
+        elif element.tag == "joint":
+            _add(robot.joints, _joint(element, faults), "joint", faults)
+    if not robot.links:
+        faults.at(root.line, "the robot has no links; a URDF has at least one <link name=\"...\">")
+    return robot
+
+
+def _refuse_xacro(root: Element, faults: FileFaults) -> None:
+    for element in root.everything():
+        space, _, name = element.tag.rpartition("}")
+        if "xacro" in space:
+            faults.at(element.line, f"<xacro:{name}> is left over from xacro; run the file through xacro first")
+
+
+def _add(known: dict[str, Named], found: Named, what: str, faults: FileFaults) -> None:
+    if not found.name:
+        return
+    if found.name in known:
+        faults.at(found.line, f"the {what} {found.name!r} is there already, in line {known[found.name].line}; give each a name "
+                              "of its own")
+        return
+    known[found.name] = found
+
+
+def _origin(element: Element, what: str, faults: FileFaults) -> Origin:
+    origin = element.find("origin")
+    return Origin(faults.triple(origin, "xyz", what, ZERO), faults.triple(origin, "rpy", what, ZERO))
+
+
+def _link(element: Element, faults: FileFaults) -> Link:
+    name = faults.name(element, "name", "a link")
+    inertial = element.find("inertial")
+    return Link(name, None if inertial is None else _inertial(inertial, f"link {name!r}", faults), element.line)
+
+
+def _inertial(element: Element, what: str, faults: FileFaults) -> Inertial:
+    mass, inertia = element.find("mass"), element.find("inertia")
+    for tag, part in (("mass", mass), ("inertia", inertia)):
+        if part is None:
+            faults.at(element.line, f"{what}: <inertial> has no <{tag}>; add it, or leave out <inertial> for a link without mass")
+    value = 0.0 if mass is None else faults.number(mass, "value", what)
+    if value < 0:
+        faults.at(element.line, f"{what} has the mass {value} kg; give zero or a positive mass")
+    entries = [0.0] * 6 if inertia is None else [faults.number(inertia, entry, what) for entry in INERTIA]
+    return Inertial(_origin(element, what, faults), value, tuple(entries), element.line)
+
+
+def _joint(element: Element, faults: FileFaults) -> UrdfJoint:
+    name = faults.name(element, "name", "a joint")
+    what = f"joint {name!r}"
+    kind = faults.name(element, "type", what)
+    if kind and kind not in TYPES:
+        faults.at(element.line, f"{what} has the type {kind!r}; there are {', '.join(TYPES)}")
+    ends = []
+    for end in ("parent", "child"):
+        found = element.find(end)
+        if found is None:
+            faults.at(element.line, f"{what} has no {end}; write <{end} link=\"...\"/>")
+        ends.append("" if found is None else faults.name(found, "link", f"{what}: {end}"))
+    dynamics = element.find("dynamics")
+    damping = 0.0 if dynamics is None else faults.number(dynamics, "damping", what, 0.0)
+    return UrdfJoint(name, kind, ends[0], ends[1], _origin(element, what, faults), _axis(element, kind, what, faults), damping,
+                     _mimic(element, kind, what, faults), element.line)
+
+
+def _axis(element: Element, kind: str, what: str, faults: FileFaults) -> Triple:
+    """The axis with length 1, whatever its length in the file."""
+    found = element.find("axis")
+    if kind in ("fixed", "floating"):
+        return AXIS
+    axis = faults.triple(found, "xyz", what, AXIS)
+    length = math.hypot(*axis)
+    if length < 1e-12:
+        faults.at(element.line if found is None else found.line, f"{what}: its axis is zero; give a direction")
+        return AXIS
+    # What is a unit vector to rounding stays as it is written.
+    return axis if abs(length - 1) < 1e-15 else (axis[0] / length, axis[1] / length, axis[2] / length)
+
+
+def _mimic(element: Element, kind: str, what: str, faults: FileFaults) -> Mimic | None:
+    found = element.find("mimic")
+    if found is None or kind == "fixed":
+        return None
+    if TYPES.get(kind, 1) != 1:
+        faults.at(found.line, f"{what} is {kind} and has a <mimic>, which takes one coordinate; leave it out")
+        return None
+    return Mimic(faults.name(found, "joint", f"{what}: mimic"), faults.number(found, "multiplier", what, 1.0),
+                 faults.number(found, "offset", what, 0.0), found.line)

@@ -1,0 +1,245 @@
+"""Flexible bodies in whole systems: against published frequencies, an independent beam model, rigid links and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.bench import flexible_cases as cases
+from symdyn.model.joints.modal import Modal
+from symdyn.systems.nrel_5mw_tower import ONSHORE
+from tests.flexible.beam_model import Column
+
+GRAVITY = 9.80665
+
+
+# -- rotating beam
+
+
+@pytest.mark.parametrize(("form", "free", "speeds"), [("embedded", False, cases.SPEEDS), ("recursive", False, cases.SPEEDS),
+                                                      ("absolute", False, (0, 12)), ("recursive", True, (3, 12))])
+def test_frequencies_of_a_rotating_beam(form, free, speeds) -> None:
+    """Flap and lag of modes 1 to 3 to 1e-3; at speed 12 the squares of lag are differences of numbers nearly alike."""
+    module = cases.equations(cases.rotor(7, free), form).compile(backend="numpy")
+    for speed in speeds:
+        np.testing.assert_allclose(cases.rotor_frequencies(module, speed), cases.published(speed), rtol=1e-3)
+
+
+def test_lag_is_softer_than_flap_by_the_speed() -> None:
+    flap, lag = cases.rotor_frequencies(cases.rotor(5).recursive().compile(backend="numpy"), 5.0)
+    np.testing.assert_allclose(flap**2 - lag**2, 25.0, rtol=1e-8)
+
+
+# -- tower
+
+
+@pytest.fixture(scope="module")
+def land():
+    """The catalogue's turbine, and what sits on its tower."""
+    system = sd.systems.land_wind_turbine(rotor="fixed", flexible="tower", wind=False, drives=False)
+    return system, cases.rotor_and_nacelle(system)
+
+
+@pytest.fixture(scope="module")
+def elements(land):
+    """Hz, first fore-aft and side-to-side, of 40 beam elements under gravity."""
+    mass, center, inertia = land[1]
+    column = Column(ONSHORE.length * np.array(ONSHORE.stations), np.array(ONSHORE.mass_per_length), np.array(ONSHORE.stiffness))
+    tips = ((mass, center[0], center[2], inertia[1, 1]), (mass, 0.0, center[2], inertia[0, 0]))
+    return np.array([column.frequencies(tip, GRAVITY)[0] for tip in tips])
+
+
+def test_rotor_and_nacelle(land) -> None:
+    """Published sums for slightly lighter blades: 349,582 kg, centre of mass at (-0.40774, 0, 1.96643) m from the top."""
+    mass, center, inertia = land[1]
+    assert mass == pytest.approx(349_582.342, rel=2e-3)
+    assert center == pytest.approx([-0.40774, 0, 1.96643], abs=1e-2)
+    assert inertia[1, 1] == pytest.approx(23_343_639.6, rel=1e-2)
+
+
+def test_first_frequencies_of_the_tower(land, elements) -> None:
+    """With modes that know of rotor and nacelle, far below 0.2 per cent; -2.4 and 0.6 per cent off the often quoted numbers."""
+    head = land[1]
+    np.testing.assert_allclose(elements, cases.TOWER_REFERENCE, rtol=1e-5)
+    found = cases.tower_frequencies(cases.tower(cases.modes_with_head(2, *head), *head))
+    np.testing.assert_allclose(found, elements, rtol=1e-5)
+    np.testing.assert_allclose(found / cases.TOWER_QUOTED - 1, [-0.0244, 0.0060], atol=1e-4)
+
+
+def test_modes_of_the_bare_tower_converge_slowly(land, elements) -> None:
+    head = land[1]
+    off = [cases.tower_frequencies(cases.tower(count, *head)) / elements - 1 for count in (4, 8, 12)]
+    assert (np.diff(off, axis=0) < 0).all() and (np.array(off) > 0).all()
+    assert 1.5e-3 < off[1].max() < 2.5e-3 and off[2].max() < 2e-3
+
+
+# -- spin-up
+
+
+def test_spin_up_of_a_beam() -> None:
+    """Two theories: rigid links with springs, and assumed modes with foreshortening; about -0.57 m as published."""
+    times = np.linspace(0, 20, 201)
+    links = cases.deflection(cases.spin_up_chain(20), times, 20, 1e-7)
+    modes = cases.deflection(cases.spin_up(cases.spin_up_beam(3)), times)
+    assert modes.min() == pytest.approx(links.min(), rel=3e-3)
+    assert modes.min() == pytest.approx(-0.574, abs=1e-3)
+    assert np.abs(modes - links).max() < 3e-3 * np.abs(links).max()
+    assert np.abs(modes[times > 15]).max() < 5e-3
+
+
+def test_without_foreshortening_the_spin_up_diverges() -> None:
+    """Beyond the beam's first frequency of 3.80 rad/s, as published."""
+    body = cases.unstiffened(cases.spin_up_beam(2))
+    assert np.sqrt(np.linalg.eigvals(np.linalg.solve(body.Me, body.K)).min()) == pytest.approx(3.80, abs=0.02)
+    assert np.abs(cases.deflection(cases.spin_up(body), np.array([0.0, 15.0]))[-1]) > 1e3
+
+
+# -- thrown turbine
+
+
+@pytest.fixture(scope="module")
+def thrown():
+    """One blade; Euler angles embedded, quasi-velocities recursive."""
+    pairs = (cases.thrown("angles", 1).embedding(), cases.thrown("parameters", 1).recursive())
+    return [(found, found.compile()) for found in pairs]
+
+
+def test_energy_and_motion_in_two_sets_of_coordinates(thrown) -> None:
+    one, other = (cases.throw(module) for _, module in thrown)
+    assert max(one.energy_error(), other.energy_error()) < 1e-13
+    assert cases.apart(one, other) < 1e-9
+    assert np.abs(one["tower_mode_1"]).max() > 0.1  # a tenth of the tower's 4 m, with all that bends
+
+
+def test_energy_balance_with_damping(thrown) -> None:
+    solution = cases.throw(thrown[1][1], params={"delta": 2.0})
+    assert solution.energy_error() < 1e-12
+    assert solution.work[-1] < -1.0 and (np.diff(solution.work) < 0).all()
+
+
+def test_identities_in_c_numpy_and_thirty_digits(thrown) -> None:
+    verification = thrown[0][0].verify(states=1)
+    assert verification.passed
+    compared = [c for c in verification.checks if "agrees with the tape" in c.name and c.residual is not None]
+    assert len(compared) == 2
+
+
+def test_formulations_agree() -> None:
+    errors = cases.agreement(cases.thrown("angles", 1), cases.thrown("parameters", 1), 50)
+    assert len(errors) == 5 and max(errors.values()) < 1e-12
+
+
+# -- closed forms and limits
+
+
+def in_both(count: int) -> list[sd.Shape]:
+    return cases.powers("x", count) + cases.powers("y", count)
+
+
+@pytest.mark.parametrize(("form", "tilt"), [("embedded", 0.5), ("recursive", 2.5), ("absolute", 2.5)])
+def test_static_deflection_at_a_tilted_clamp(form, tilt) -> None:
+    """P L^3 / 3 EI + w L^4 / 8 EI, which cubic and quartic shapes have exactly; the load along the beam adds a part that grows
+    with it."""
+    system = cases.column(in_both(3), 1.0, ([2.0, 2.0], [3.0, 3.0]), tilt)
+    module = cases.equations(system, form).compile(backend="numpy")
+    beam, names = cases.beam_of(system), [q.name for q in cases.elastic_joint(system).coordinates]
+    off = []
+    for g in (1e-4, 1e-5):
+        across = g * np.sin(tilt)
+        for m in (1e-9, 0.7):
+            at = module.equilibrium(params={"g": g, "m": m})
+            found = beam.Psi_tip @ [at[name] for name in names]
+            off.append(found[0] / (across * m / (3 * 2) + across / (8 * 2)) - 1)
+            assert abs(found[1]) < 1e-12 * found[0]
+    assert np.abs(off[2:]).max() < 1e-5
+    np.testing.assert_allclose(np.divide(off[:2], off[2:]), 10, rtol=1e-3)
+    assert np.sign(off[0]) == np.sign(np.cos(tilt))
+
+
+def test_a_load_across_the_beam_adds_nothing_of_first_order() -> None:
+    system = cases.column(in_both(3), 1.0, 2.0, np.pi / 2)
+    at = system.recursive().compile(backend="numpy").equilibrium(params={"g": 1e-3, "m": 0.7})
+    names = [q.name for q in cases.elastic_joint(system).coordinates]
+    assert (cases.beam_of(system).Psi_tip @ [at[n] for n in names])[0] == pytest.approx(1e-3 * (0.7 / 6 + 1 / 16), rel=1e-6)
+
+
+def test_buckling_load() -> None:
+    """pi^2 EI / 4 L^2, where the first frequency vanishes; weight 1e-9 of the beam itself."""
+    module = cases.column(cases.powers("x", 4), 1e-9, 1.0).embedding().compile(backend="numpy")
+    critical = cases.buckling_load(module, 1, 4)
+    assert critical == pytest.approx(np.pi**2 / 4, rel=1e-5)
+    first = [list(module.linearize(params={"m": critical * f}).modes())[0] for f in (0.9, 0.99, 1.01)]
+    assert [mode.kind for mode in first] == ["oscillation", "oscillation", "unstable"]
+    assert (first[0].omega / first[1].omega) ** 2 == pytest.approx(10, rel=0.2)
+
+
+def test_stiff_bodies_are_rigid() -> None:
+    """Differences go as 1 / stiffness: of where a hanging mast with a load on it swings, and of how often."""
+    factors = (1e2, 1e4, 1e6)
+
+    def pendulum(rigid: bool) -> sd.System:
+        kappa = sd.parameters("kappa")
+        system = sd.System("pendulum", gravity=[0, 0, -GRAVITY])
+        beam = sd.Beam([0, 1, 2], [1.0, 0.8, 0.5], [90.0, 70.0, 40.0], in_both(2))
+        if rigid:
+            body = beam.modal
+            root = system.add_body("beam", mass=body.m, com=(body.h0 / body.m).tolist(),
+                                   inertia=(body.I0 - body.h0[2] ** 2 / body.m * np.diag([1, 1, 0])).tolist())
+            tip, at = root, (0, 0, 2)
+        else:
+            parts = system.add_flexible_body("beam", beam, stiffness=kappa)
+            root, tip, at = parts.root, parts.tip, (0, 0, 0)
+            system.set_defaults({kappa: 1.0})
+        system.add_joint(sd.Revolute("pivot", system.ground, root, sd.coordinates("swing"), axis=[0, 1, 0],
+                                     parent_rotation=np.diag([1.0, -1.0, -1.0]).tolist()))
+        load = system.add_body("load", mass=1.0, inertia=[0.1, 0.1, 0.1], com=[0.1, 0, 0.1])
+        system.add_joint(sd.Fixed("seat", tip, load, parent_point=at))
+        return system
+
+    stiff, rigid = (pendulum(kind).embedding().compile(backend="numpy") for kind in (False, True))
+    at = rigid.equilibrium()
+    wanted = [at["swing"], rigid.linearize(at).modes()[0].frequency]
+    off = []
+    for kappa in factors:
+        at = stiff.equilibrium(params={"kappa": kappa})
+        off.append([at["swing"], stiff.linearize(at).modes()[0].frequency])
+    off = np.abs(np.array(off) - wanted)
+    np.testing.assert_allclose(off[:-1] / off[1:], 100, rtol=0.02)
+    assert off[-1].max() < 1e-6
+
+
+def test_floating_turbine_rests_with_its_tower_bent() -> None:
+    """Equilibrium of water and structure at once; the top is where the rigid top is but for what bends, as 1 / stiffness."""
+    options = {"flexible": "tower", "rotor": "fixed", "blades": "lumped", "wind": False, "mooring": "linear"}
+    system = sd.systems.floating_wind_turbine(**options)
+    module = system.recursive().compile(backend="numpy")
+    soft, stiff, stiffer = (module.equilibrium(params={"s_T": k}) for k in (1.0, 1e3, 1e5))
+    assert -0.03 < soft["tower_fa1"] < -0.01 and abs(soft["tower_ss1"]) < 1e-6
+    assert soft["tower_fa1"] / stiff["tower_fa1"] == pytest.approx(1e3, rel=0.05)
+    assert stiff["tower_fa1"] / stiffer["tower_fa1"] == pytest.approx(100, rel=1e-3)
+    assert soft["theta"] < stiff["theta"]  # it leans further upwind
+    names = [mode.name for mode in module.linearize(soft).modes()]
+    assert any(name.startswith("tower_fa1") for name in names) and any(name.startswith("tower_ss1") for name in names)
+
+
+def test_absolute_coordinates_of_a_lamp_on_a_ship() -> None:
+    """A body that is light beside another has mass, and nothing is refused."""
+    system = sd.System("ship", gravity=[0, 0, -GRAVITY])
+    ship = system.add_body("ship", mass=1e7, inertia=[1e9, 1e9, 1e9])
+    system.add_joint(sd.Free("sea", system.ground, ship))
+    lamp = system.add_body("lamp", mass=0.5, inertia=[0.01, 0.01, 0.01], com=[0.1, 0, -1])
+    system.add_joint(sd.Revolute("hinge", ship, lamp, axis=[0, 1, 0], parent_point=[1, 2, 20]))
+    assert len(system.augmented("absolute").symbols.speeds) == 12
+
+
+def test_elastic_coordinates_of_a_mode_without_a_carried_end() -> None:
+    """The mass matrix does not ask whether anything sits on the free end."""
+    matrices = []
+    for carries in (True, False):
+        system = sd.System("clamped", gravity=[0, 0, 0])
+        beam = system.add_flexible_body("beam", sd.Beam([0, 1], 1.0, 1.0, in_both(2)), carries=carries)
+        system.add_joint(sd.Fixed("clamp", system.ground, beam.root))
+        assert isinstance(beam.joint, Modal)
+        matrices.append(system.embedding().compile(backend="numpy").mass_matrix([0.1, -0.05, 0.02, 0.03]))
+    np.testing.assert_allclose(matrices[0], matrices[1], rtol=1e-14)
