@@ -90,8 +90,8 @@ VARIATIONS = {
     "variation": "derivative of the balance along a direction of [q; u; z; inputs; p; lam]",
     "second_variation": "the same derivative of the balance's linear form in v (q' = N v), u', u_dot', z', lam'",
 }
-# The parts of the balance that forces are, by themselves.
-FORCES = {
+# Further derivatives, each made by itself when it is asked for.
+DERIVATIVES = {
     "stiffness": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by q; ud: u_dot, lam",
     "damping": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by u; ud: u_dot, lam",
     "rows_q": "derivative of the rate of the constraints, C_dot, by q",
@@ -183,7 +183,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         text = next(iter(source.files.values()))
         if backend == "c":
             assert compiler is not None
-            seldom = name in STATICS or name in VARIATIONS or name in FORCES
+            seldom = name in STATICS or name in VARIATIONS or name in DERIVATIVES
             return CUnit(text, source.metadata, plain(compiler) if seldom else compiler)
         return PythonUnit.from_source(text, source.metadata["name"])
 
@@ -242,7 +242,7 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
               "inputs": [s.name for s in symbols.inputs],
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * baumgarte]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
-    told = {**{n: title for n, (_, title) in FUNCTIONS.items()}, **STATICS, **VARIATIONS, **FORCES}
+    told = {**{n: title for n, (_, title) in FUNCTIONS.items()}, **STATICS, **VARIATIONS, **DERIVATIVES}
     titles = {n: told.get(n, n) for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
@@ -272,7 +272,7 @@ def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
     given = [f"{s.name}_dot" for s in symbols.speeds]
-    if any(n in STATICS or n in VARIATIONS or n in FORCES for n in names):
+    if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
         given += multiplier_names(n_c)
     if any(n in VARIATIONS for n in names):
         given += variation_names(symbols, n_c, "second_variation" in names)

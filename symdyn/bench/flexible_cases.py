@@ -217,9 +217,12 @@ def deflection(system: System, times: np.ndarray, n: int = 0, rtol: float = 1e-8
 # -- thrown turbine
 
 
-def thrown(orientation: str = "angles", blades: int = 2) -> System:
+def thrown(orientation: str = "angles", blades: int = 2, modes: tuple[int, int] = (4, 3)) -> System:
     """A small turbine with a flexible tower and blades that falls and tumbles; parameters: kappa multiplies stiffness, delta
-    damping."""
+    damping.
+
+    modes   how many of the tower, and of each blade
+    """
     g, kappa, delta = sd.parameters("g kappa delta")
     system = sd.System("thrown", gravity=[0, 0, -g])
     hull = system.add_body("hull", mass=20, inertia=[8, 9, 10], com=[0.1, 0, -0.5])
@@ -229,8 +232,9 @@ def thrown(orientation: str = "angles", blades: int = 2) -> System:
         joint = sd.Free("sea", system.ground, hull, sd.coordinates("x y z e0 e1 e2 e3"), sd.EulerParameters(), velocity="body",
                         speeds=sd.speeds("v_x v_y v_z omega_x omega_y omega_z"))
     system.add_joint(joint)
-    tower = sd.Beam([0, 2, 4], [3, 2, 1.5], ([900, 700, 500], [800, 650, 500]), 4, damping_ratio=0.01)
-    blade = sd.Beam([0, 1, 3], [1, 0.6, 0.3], ([600, 400, 200], [1200, 800, 400]), 3, twist=[0.3, 0.2, 0], damping_ratio=0.01)
+    tower = sd.Beam([0, 2, 4], [3, 2, 1.5], ([900, 700, 500], [800, 650, 500]), modes[0], damping_ratio=0.01)
+    blade = sd.Beam([0, 1, 3], [1, 0.6, 0.3], ([600, 400, 200], [1200, 800, 400]), modes[1], twist=[0.3, 0.2, 0],
+                    damping_ratio=0.01)
     mast = system.add_flexible_body("tower", tower, stiffness=kappa, damping=delta)
     system.add_joint(sd.Fixed("foot", hull, mast.root, parent_point=[0, 0, 0.2]))
     nacelle = system.add_body("nacelle", mass=2, inertia=[0.3, 0.2, 0.4], com=[0.3, 0, 0.2])

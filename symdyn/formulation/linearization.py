@@ -19,7 +19,6 @@ from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.node import Node
-from symdyn.tape.tape import reachable
 
 if TYPE_CHECKING:
     from symdyn.formulation.equations import Symbols
@@ -68,10 +67,9 @@ class Varied:
             return vector(*self.forces(), *[row.value for row in self.motion.rows], *self.motion.state_rates())
 
     def by(self, values: np.ndarray, leaves: Sequence[Any]) -> np.ndarray:
-        """Derivatives (len(values), len(leaves)); column by column where numeric algorithms are called."""
+        """Derivatives (len(values), len(leaves)); column by column: speeds and coordinates move what comes after them only."""
         with self.algebra.section("derivatives"):
-            calls = any(node.op == "call" for node in reachable(values.tolist()))
-            return jacobian(self.recorder, values.tolist(), leaves, "forward" if calls else "auto")
+            return jacobian(self.recorder, values.tolist(), leaves, "forward")
 
     def outputs(self) -> np.ndarray:
         """The user's outputs, one after the other."""
@@ -86,7 +84,8 @@ class Varied:
     def second_variation(self) -> np.ndarray:
         """The same derivative of the balance's linear form, its change with v (q' = N v), u', u_dot', z' and lam'."""
         motion = self.motion
-        groups = {name: self._made(made) for name, made in _varied(motion, len(motion.rows)).items()}
+        names = _named([s.name for s in motion.speeds], [z.name for z, _ in motion.states], len(motion.rows))
+        groups = {group: self._made(made) for group, made in names.items()}
         speeds = self._leaves(motion.speeds)
         with self.algebra.section("linear form of the balance"):
             moved = forward(self.recorder, motion.rates, dict(zip(speeds, groups["v"], strict=True)))
@@ -116,8 +115,8 @@ class Varied:
 
 
 def multiplier_names(n_c: int) -> list[str]:
-    """Names of given multipliers."""
-    return [f"lambda_{k + 1}" for k in range(n_c)]
+    """Names of given multipliers; no symbol can have them."""
+    return [f"(lambda {k + 1})" for k in range(n_c)]
 
 
 def variation_names(symbols: Symbols, n_c: int, second: bool) -> list[str]:
@@ -125,10 +124,6 @@ def variation_names(symbols: Symbols, n_c: int, second: bool) -> list[str]:
     moving = [*symbols.coordinates, *symbols.speeds, *symbols.states, *symbols.inputs, *symbols.parameters]
     varied = _named([s.name for s in symbols.speeds], [s.name for s in symbols.states], n_c) if second else {}
     return [*[name for group in varied.values() for name in group], *_along([s.name for s in moving], n_c)]
-
-
-def _varied(motion: Motion, n_c: int) -> dict[str, list[str]]:
-    return _named([s.name for s in motion.speeds], [z.name for z, _ in motion.states], n_c)
 
 
 def _named(speeds: Sequence[str], states: Sequence[str], n_c: int) -> dict[str, list[str]]:

@@ -4,7 +4,7 @@
     values     the numbers and names that stand in attributes
     robot      links and joints as the file has them: records, no symbols
     parse      elements to a Robot, every fault of the file told
-    checks     what makes a Robot a tree that can move
+    checks     what makes a Robot a tree; inertias: what makes it move
     angles     rotation matrices of roll, pitch and yaw, and back
     parameters symbols for what is not to be a number
     read       Robot to System

@@ -66,8 +66,8 @@ class _Builder:
 def read_document(path: Path) -> Element:
     """The root element of a file.
 
-    Raises ModelError, with file and line, for a file that cannot be read, that is no XML, or that declares entities or refers
-    to other files; MissingExtra without defusedxml.
+    Raises ModelError, with file and line, for a file that cannot be read, that is no XML, or that has a document type, by which
+    alone entities and other files come in; MissingExtra without defusedxml.
     """
     try:
         from defusedxml.common import DefusedXmlException
@@ -79,15 +79,14 @@ def read_document(path: Path) -> Element:
     except OSError as error:
         raise ModelError([f"{path}: the file cannot be read ({error.strerror}); pass the path of a URDF file"]) from None
     builder = _Builder()
-    builder.parser = DefusedXMLParser(target=builder)
+    builder.parser = DefusedXMLParser(target=builder, forbid_dtd=True)
     try:
         builder.parser.feed(text)
         root = builder.parser.close()
-    except DefusedXmlException as error:
+    except DefusedXmlException:
         line = builder.parser.parser.CurrentLineNumber
-        what = f"declares the entity {error.name!r}" if hasattr(error, "name") else "refers to another file"
-        raise ModelError([f"{path}:{line}: the file {what}, which is refused; a URDF needs no entities: write out what it "
-                          "stands for"]) from None
+        raise ModelError([f"{path}:{line}: the file declares a document type, which is refused: entities and other files come in "
+                          "by it, and a URDF needs none; leave out <!DOCTYPE ...>"]) from None
     except ParseError as error:
         raise ModelError([f"{path}:{error.position[0]}: {_no_xml(str(error), text, error.position[0])}"]) from None
     except (ValueError, LookupError) as error:

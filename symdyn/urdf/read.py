@@ -20,8 +20,9 @@ from symdyn.model.orientation import EulerParameters
 from symdyn.model.symbols import Coordinate, coordinates
 from symdyn.model.system import System
 from symdyn.urdf.angles import rotation
-from symdyn.urdf.checks import demand_inertia, mimicked, negligible, outwards, tensor
+from symdyn.urdf.checks import mimicked, outwards
 from symdyn.urdf.document import read_document
+from symdyn.urdf.inertias import demand_inertia, negligible, tensor
 from symdyn.urdf.parameters import Names, Parameters, plain
 from symdyn.urdf.parse import parse
 from symdyn.urdf.robot import ZERO, Inertial, Link, Origin, Robot, UrdfJoint
@@ -68,6 +69,8 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     moving = {j.name: following[j.name][0] if j.name in following else j.name for j in order
               if j.kind != "fixed" and j.name not in still and following.get(j.name, ("-",))[0] != ""}
     demand_inertia(robot, order, moving, faults)
+    if root == "floating" and all(link.inertial is None or link.inertial.nothing for link in robot.links.values()):
+        faults.at(document.line, "no link has mass or inertia, so that nothing can move freely; give one an <inertial>")
     _raise(faults, robot.name)
     builder = _Builder(robot, _system_name(robot.name or path.stem) if name is None else name, patterns, damping)
     system = builder.system(base, order, following, moving, root == "floating")
@@ -119,7 +122,7 @@ class _Builder:
                 self.coordinates[joint.name] = self._coordinate("q", joint.name)
         child = self._body(self.robot.links[base])
         root = self.joint_names.text("root")
-        system.add_joint(self._free(root, system.ground, child, Origin()) if floating else Fixed(root, system.ground, child))
+        system.add_joint(self._free(root, system.ground, child) if floating else Fixed(root, system.ground, child))
         for joint in order:
             child = self._body(self.robot.links[joint.child])
             made = self._joint(joint, named[joint.name], child, following, moving)
@@ -167,13 +170,13 @@ class _Builder:
             return self._held(joint, name, child, point, offset)
         placed: dict[str, Any] = {"parent_point": point, "parent_rotation": _matrix(rows)}
         if joint.kind == "floating":
-            return self._free(name, parent, child, at)
+            return self._free(name, parent, child, **placed)
         if joint.kind == "planar":
             # Its x and y are along those of the joint's frame, turned by the smallest angle that makes z the normal.
-            normal = _matrix(_onto(joint.axis))
-            placed["parent_rotation"] = _matrix((np.array(rows) @ np.array(_onto(joint.axis))).tolist())
+            normal = _onto(joint.axis)
+            placed["parent_rotation"] = _matrix((np.array(rows) @ np.array(normal)).tolist())
             found = [self._coordinate(letters, joint.name) for letters in ("x", "y", "theta")]
-            return Planar(name, parent, child, found, child_rotation=_transposed(normal), **placed)
+            return Planar(name, parent, child, found, child_rotation=_matrix(normal), **placed)
         kind = Prismatic if joint.kind == "prismatic" else Revolute
         return kind(name, parent, child, self._value(joint, following), axis=list(map(plain, joint.axis)), **placed)
 
@@ -187,17 +190,16 @@ class _Builder:
             return sp.UnevaluatedExpr(q)
         return plain(multiplier) * q + plain(offset)
 
-    def _free(self, name: str, parent: Body, child: Body, at: Origin) -> Free:
+    def _free(self, name: str, parent: Body, child: Body, **placed: Any) -> Free:
         found = [self._coordinate(letters, name) for letters in ("x", "y", "z", "e0", "e1", "e2", "e3")]
-        return Free(name, parent, child, found, orientation=EulerParameters(), velocity="body",
-                    parent_point=list(map(plain, at.xyz)), parent_rotation=_matrix(rotation(at.rpy)))
+        return Free(name, parent, child, found, orientation=EulerParameters(), velocity="body", **placed)
 
     def _held(self, joint: UrdfJoint, name: str, child: Body, point: list[Any], value: float) -> Fixed:
         """The joint at rest where its coordinate has a value."""
         R = np.array(rotation(joint.origin.rpy))
         if value and joint.kind == "prismatic":
             shift = R @ np.array(joint.axis) * value
-            point = [p + float(s) for p, s in zip(point, shift)]
+            point = [p + plain(s) for p, s in zip(point, shift.tolist())]
         elif value:
             R = R @ _turned(np.array(joint.axis), value)
         return Fixed(name, self.bodies[joint.parent], child, parent_point=point, parent_rotation=_matrix(R.tolist()))
@@ -205,10 +207,6 @@ class _Builder:
 
 def _matrix(rows: Iterable[Iterable[float]]) -> list[list[Any]]:
     return [[plain(value) for value in row] for row in rows]
-
-
-def _transposed(rows: list[list[Any]]) -> list[list[Any]]:
-    return [list(column) for column in zip(*rows)]
 
 
 def _turned(axis: np.ndarray, angle: float) -> np.ndarray:

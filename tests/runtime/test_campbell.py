@@ -14,6 +14,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.runtime.statics.multiblade import Rotor
 
 HALF, ROOT = sp.Rational(1, 2), sp.sqrt(3) / 2
 HUB = {"M": 10.0, "J": 1.0, "m": 1.5, "e": 0.3, "r": 1.2, "k_h": 900.0, "k_b": 4.0, "d": 0.0}
@@ -101,8 +102,8 @@ def test_whirl_of_a_disc() -> None:
 @pytest.mark.parametrize("damped", [0.0, 6.0])
 def test_three_blades_in_the_fixed_frame(damped: float) -> None:
     """Coleman's equations; without damping the regressive lag mode and the hub couple to ground resonance at some speeds."""
-    speeds = np.linspace(1.0, 14.0, 14)
-    diagram = rotor().campbell("psi_dot", speeds, blades=[("b1", "b2", "b3")], params={"d": damped}, azimuths=4)
+    speeds = np.linspace(1.0, 13.0, 9)
+    diagram = rotor().campbell("psi_dot", speeds, blades=[("b1", "b2", "b3")], params={"d": damped}, azimuths=3)
     grows = []
     for W, modes in zip(speeds, diagram.modes, strict=True):
         M, C, K = coleman(W, damped)
@@ -130,6 +131,18 @@ def test_whirls_are_named_by_their_sense() -> None:
     assert np.isclose(stiff["b1 backward"][-1] * 2 * np.pi, nu - W, rtol=1e-6)
 
 
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_transformation_and_its_derivatives(count: int) -> None:
+    """By differences; columns are orthogonal; the last coordinate is no blade."""
+    turning = Rotor(disc(), 0, 0, (tuple(range(count)),), (), tuple(range(count + 1)))
+    T, first, second = turning.transform(0.7)
+    ahead, behind = turning.transform(0.7 + 1e-5), turning.transform(0.7 - 1e-5)
+    assert np.allclose(first, (ahead[0] - behind[0]) / 2e-5, atol=1e-9)
+    assert np.allclose(second, (ahead[1] - behind[1]) / 2e-5, atol=1e-9)
+    squares = T.T @ T
+    assert np.allclose(squares, np.diag(np.diag(squares)), atol=1e-14) and T[count, count] == 1 and squares[0, 0] == count
+
+
 def test_gravity_on_the_blades_is_in_the_steady_state() -> None:
     """In the fixed frame weight is a constant force: (kappa - I W^2) a_c = -1.5/1.5 S g, the hub sinks by the whole weight."""
     g, W, p = 1e-5, 3.0, HUB
@@ -154,6 +167,7 @@ def test_picture(tmp_path: Any) -> None:
     assert labels == ["1P", "3P", "6P"] and len(upper_axes.lines) == len(diagram.names) + 3
     assert len(lower_axes.lines) == len(diagram.names) + 1 == 3
     assert "phi_dot [rad/s]" in lower_axes.get_xlabel()
+    assert len(diagram.plot(highest=1.55).axes[0].lines) == 1 + 3  # the other mode starts at 1.59 Hz and rises
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

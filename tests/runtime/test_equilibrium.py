@@ -84,15 +84,15 @@ def hanging() -> Any:
 
 def test_many_starts_lead_to_the_four_equilibria_of_a_double_pendulum() -> None:
     """q from the horizontal: down is -pi/2. Whole turns and signs of pi are one; only hanging is stable."""
-    found = double().equilibria(40, seed=4)
+    found = double().equilibria(24, seed=4)
     expected = {(-np.pi / 2, 0.0), (-np.pi / 2, np.pi), (np.pi / 2, 0.0), (np.pi / 2, np.pi)}
     there = {tuple(np.round(np.abs(np.remainder(e.q + 1e-9, 2 * np.pi)) % (2 * np.pi), 6)) for e in found}
     assert there == {tuple(np.round(np.remainder(np.array(q) + 1e-9, 2 * np.pi), 6)) for q in expected}
-    assert len(found) == 4 and sum(found.counts) == 40 and not found.failures
+    assert len(found) == 4 and sum(found.counts) == 24 and not found.failures
     assert found[0].stable and found[0].name.startswith("1: stable at q1 = ") and len(found.stable) == 1
     assert all(not e.stable for e in found.found[1:]) and found.iterations.max() <= 25
     assert all(e.residual_norm < 1e-12 for e in found)
-    assert "4 equilibria from 40 starts" in repr(found) and found[0].name in repr(found)
+    assert "4 equilibria from 24 starts" in repr(found) and found[0].name in repr(found)
 
 
 def test_block_on_saturating_buoyancy_floats_where_the_closed_form_says() -> None:

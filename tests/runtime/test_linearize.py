@@ -16,7 +16,7 @@ from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError
-from symdyn.pipeline import FORCES, STATICS, emit, write_source
+from symdyn.pipeline import DERIVATIVES, STATICS, emit, write_source
 from tests.mechanisms import kitchen_sink
 
 
@@ -232,7 +232,7 @@ def test_written_functions_keep_their_reference_vectors(tmp_path: Any) -> None:
     s.add_output("place", x**2)
     s.defaults, s.initial = {k: 40.0}, {x: sp.sin(0.4), theta: 0.4}
     equations = s.augmented()
-    for number, functions in enumerate(([*STATICS, *FORCES], ["variation"], ["second_variation"])):
+    for number, functions in enumerate(([*STATICS, *DERIVATIVES], ["variation"], ["second_variation"])):
         source = emit(equations, "numpy", functions)
         write_source(source, tmp_path / str(number))
         spec = importlib.util.spec_from_file_location(f"written_{number}", tmp_path / str(number) / "written_crab.py")

@@ -22,7 +22,7 @@ def random_states(model: Model, n: int, rng: np.random.Generator) -> tuple[np.nd
         columns = [model.coordinates.index(s) for s in joint.coordinates if s in model.coordinates]
         if not columns or isinstance(joint, Fixed):
             continue
-        lengths = len(columns) if isinstance(joint, Prismatic) else 3 if isinstance(joint, Free) else 2 * isinstance(joint, Planar)
+        lengths = {Prismatic: 1, Planar: 2, Free: 3}.get(type(joint), 0)
         q[:, columns[:lengths]] = rng.uniform(-0.5, 0.5, (n, lengths))
         if isinstance(joint, Free):
             e = rng.normal(size=(n, 4))

@@ -23,11 +23,13 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
     figure = Picture(figsize=(8.4, 6.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     mark = "o" if len(diagram.values) < 12 else None
-    order = np.argsort(-np.nan_to_num(diagram.frequencies[-1]), kind="stable")  # the legend lists them from above
+    highest = highest or 1.08 * float(np.nanmax(diagram.frequencies, initial=0.0)) or 1.0
+    seen = np.nanmin(diagram.frequencies, axis=0, initial=np.inf) <= highest
+    # The legend lists them from above.
+    order = [k for k in np.argsort(-np.nan_to_num(diagram.frequencies[-1]), kind="stable") if seen[k]]
     for color, k in zip(colors_of(len(order)), order, strict=True):
         upper.plot(diagram.values, diagram.frequencies[:, k], color=color, marker=mark, markersize=3, label=diagram.names[k])
         lower.plot(diagram.values, 100 * diagram.damping[:, k], color=color, marker=mark, markersize=3)
-    highest = highest or 1.08 * float(np.nanmax(diagram.frequencies, initial=0.0)) or 1.0
     ends = np.array([min(0.0, diagram.values.min()), diagram.values.max()])
     for multiple in harmonics:
         line = multiple * np.abs(ends) / (2 * np.pi)

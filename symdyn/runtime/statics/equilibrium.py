@@ -45,7 +45,7 @@ class Equilibrium:
     selection: Selection
     residual: Mapping[str, float]
     iterations: int
-    name: str = "equilibrium"
+    name: str = ""
 
     @property
     def module(self) -> Module:
@@ -110,7 +110,8 @@ class Equilibrium:
     @property
     def message(self) -> str:
         """What was found, in a sentence."""
-        kind = {True: "stable equilibrium", False: "unstable equilibrium", None: "equilibrium, nothing free to move,"}[self.stable]
+        kind = {True: "stable equilibrium", False: "unstable equilibrium",
+                None: "equilibrium, nothing free to move,"}[self.stable]
         return f"{kind} after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
 
     def __getitem__(self, name: Any) -> float:
@@ -128,7 +129,7 @@ class Equilibrium:
         metadata = self.module.metadata
         shown = [*metadata["q"], *[u for u in metadata["u"] if self[u]], *metadata["z"], *self.selection.unknown]
         width = max([4, *map(len, shown)])
-        lines = [f"{self.module.name}: {self.name}, {self.message}"]
+        lines = [f"{self.module.name}: {f'{self.name}, ' if self.name else ''}{self.message}"]
         for name in shown:
             unit = metadata["units"].get(name, "")
             note = "  solved for" if name in self.selection.unknown else "  kept" if name in self.selection.kept else ""
@@ -176,7 +177,8 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     try:
         search = Search(place, selection)
     except EvaluationError as error:
-        raise NoEquilibrium(f"{owner}: the search cannot begin: {error}; begin elsewhere, with start={{...}}") from error
+        raise NoEquilibrium(f"{owner}: the search cannot begin: {str(error).removeprefix(f'{owner}: ')}; begin elsewhere, with "
+                            "start={...}") from error
     if len(search.weights) < len(search.widths(search.best)):
         raise ArgumentError(f"{owner}: {len(search.widths(search.best))} values are unknown, but there are {len(search.weights)} "
                             "equations; fix a coordinate for each parameter that is solved for")

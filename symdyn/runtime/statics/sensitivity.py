@@ -19,7 +19,7 @@ from symdyn.runtime.statics.linear import Reduced
 from symdyn.runtime.statics.modes import Mode
 from symdyn.runtime.statics.search import Trial
 from symdyn.runtime.statics.selection import Selection
-from symdyn.runtime.statics.terms import Place
+from symdyn.runtime.statics.terms import Place, multiplier
 
 # Two eigenvalues closer than so many of their roundings have no derivatives of their own.
 DOUBLE = 1e4
@@ -61,7 +61,7 @@ def shift(place: Place, selection: Selection, parameter: str) -> dict[str, float
     changes = dict(zip(metadata["q"], place.N @ trial.directions @ parts[0], strict=True))
     changes |= {metadata["z"][k]: v for k, v in zip(selection.states, parts[1], strict=True)}
     changes |= dict(zip(selection.unknown, parts[2], strict=True))
-    changes |= {f"lambda_{k + 1}": v for k, v in enumerate(parts[3] * place.scale)}
+    changes |= {multiplier(k): v for k, v in enumerate(parts[3] * place.scale)}
     return {name: float(v) for name, v in changes.items() if v}
 
 
@@ -113,5 +113,5 @@ def _second(place: Place, changes: Mapping[str, float], v: np.ndarray, u: np.nda
     names = place.module.metadata
     vary = {f"{group} {name}": value for group, values, of in (("v", v, "u"), ("u", u, "u"), ("ud", ud, "u"), ("z", z, "z"))
             for name, value in zip(names[of], values, strict=True)}
-    vary |= {f"lambda_{k + 1}": value for k, value in enumerate(lam)}
+    vary |= {multiplier(k): value for k, value in enumerate(lam)}
     return place.along("second_variation", vary=vary, along=dict(changes))

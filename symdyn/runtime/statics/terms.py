@@ -69,7 +69,7 @@ class Place:
         """
         given = {f"({kind} {key})": value for kind, entries in groups.items() for key, value in entries.items()}
         given |= dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True))
-        given |= {f"lambda_{k + 1}": value for k, value in enumerate(self.lam)}
+        given |= {multiplier(k): value for k, value in enumerate(self.lam)}
         ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata["ud"]]
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
@@ -152,6 +152,11 @@ class Place:
             places = [self.module.metadata["q"].index(name) for name in group]
             q[places] /= np.linalg.norm(q[places])
         return q
+
+
+def multiplier(k: int) -> str:
+    """The name that generated code has for the multiplier of constraint k."""
+    return f"(lambda {k + 1})"
 
 
 def rest(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> Place:
