@@ -80,12 +80,10 @@ FUNCTIONS = {
 # Of statics and linearization, compiled together, with what they are used with; the headers' words.
 STATICS = {
     "balance": "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot]; ud: u_dot, lam",
-    "balance_x": "exact derivative of the balance by x",
-    "balance_inputs": "exact derivative of the balance by the inputs",
     "N_dot": "derivative of N by time",
     "rates_q": "derivative of q_dot by q",
 }
-# Along directions that are arguments; made for derivatives by parameters.
+# Along directions that are arguments: one short function in place of long matrices.
 VARIATIONS = {
     "variation": "derivative of the balance along a direction of [q; u; z; inputs; p; lam]",
     "second_variation": "the same derivative of the balance's linear form in v (q' = N v), u', u_dot', z', lam'",

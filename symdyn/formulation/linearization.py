@@ -3,8 +3,8 @@
 balance   [M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot], (n_u + n_c + n_z,), zero in equilibrium; the rows of velocity
           constraints are 0
 
-Accelerations and multipliers are arguments, so that nothing is solved for and derivatives stay short. Derivatives by
-parameters are directional: the direction is an argument, too, and one short function serves any number of parameters.
+Accelerations and multipliers are arguments, so that nothing is solved for and derivatives stay short. Derivatives of the balance
+are directional: the direction is an argument, too, and one short function serves all of the state, the inputs and the parameters.
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ class Varied:
 
     def quantities(self) -> dict[str, Callable[[], Any]]:
         """name -> function that records it."""
-        return {"balance": self.balance, "balance_x": lambda: self.by(self.balance(), self.motion.x()),
-                "balance_inputs": lambda: self.by(self.balance(), self._leaves(self.motion.inputs)),
+        return {"balance": self.balance,
                 "stiffness": lambda: self.by(self.forces(), self._leaves(self.motion.coordinates)),
                 "damping": lambda: self.by(self.forces(), self._leaves(self.motion.speeds)),
                 "N_dot": lambda: self.motion.rate(self.motion.N()),

@@ -7,7 +7,6 @@ import pytest
 
 import symdyn as sd
 from symdyn.bench import flexible_cases as cases
-from symdyn.model.joints.modal import Modal
 from symdyn.systems.nrel_5mw_tower import ONSHORE
 from tests.flexible.beam_model import Column
 
@@ -70,13 +69,6 @@ def test_first_frequencies_of_the_tower(land, elements) -> None:
     found = cases.tower_frequencies(cases.tower(cases.modes_with_head(2, *head), *head))
     np.testing.assert_allclose(found, elements, rtol=1e-5)
     np.testing.assert_allclose(found / cases.TOWER_QUOTED - 1, [-0.0244, 0.0060], atol=1e-4)
-
-
-def test_modes_of_the_bare_tower_converge_slowly(land, elements) -> None:
-    """Eight of them are 0.2 per cent too stiff."""
-    head = land[1]
-    found = cases.tower_frequencies(cases.tower(8, *head))
-    np.testing.assert_allclose(found / elements - 1, [1.78e-3, 2.16e-3], rtol=0.01)
 
 
 # -- spin-up
@@ -142,12 +134,11 @@ def in_both(count: int) -> list[sd.Shape]:
     return cases.powers("x", count) + cases.powers("y", count)
 
 
-@pytest.mark.parametrize(("form", "tilt", "shapes"), [("embedded", 0.5, in_both(3)), ("recursive", 2.5, in_both(3)),
-                                                      ("absolute", 2.5, cases.powers("x", 3))])
-def test_static_deflection_at_a_tilted_clamp(form, tilt, shapes) -> None:
+@pytest.mark.parametrize(("form", "tilt"), [("embedded", 0.5), ("recursive", 2.5)])
+def test_static_deflection_at_a_tilted_clamp(form, tilt) -> None:
     """P L^3 / 3 EI + w L^4 / 8 EI, which cubic and quartic shapes have exactly; the load along the beam adds a part that grows
     with it."""
-    system = cases.column(shapes, 1.0, ([2.0, 2.0], [3.0, 3.0]), tilt)
+    system = cases.column(in_both(3), 1.0, ([2.0, 2.0], [3.0, 3.0]), tilt)
     module = cases.equations(system, form).compile(backend="numpy")
     beam, names = cases.beam_of(system), [q.name for q in cases.elastic_joint(system).coordinates]
     off = []
@@ -175,7 +166,7 @@ def test_buckling_load() -> None:
     module = cases.column(cases.powers("x", 4), 1e-5, 1.0).embedding().compile(backend="numpy")
     critical = cases.buckling_load(module, 1, 4)
     assert critical == pytest.approx(np.pi**2 / 4, rel=1e-5)
-    first = [list(module.linearize(params={"m": critical * f}).modes())[0] for f in (0.9, 0.99, 1.01)]
+    first = [module.linearize(params={"m": critical * f}).modes()[0] for f in (0.9, 0.99, 1.01)]
     assert [mode.kind for mode in first] == ["oscillation", "oscillation", "unstable"]
     assert (first[0].omega / first[1].omega) ** 2 == pytest.approx(10, rel=0.2)
 
@@ -190,8 +181,8 @@ def test_stiff_bodies_are_rigid() -> None:
         beam = sd.Beam([0, 1, 2], [1.0, 0.8, 0.5], [90.0, 70.0, 40.0], in_both(2))
         if rigid:
             body = beam.modal
-            root = system.add_body("beam", mass=body.m, com=(body.h0 / body.m).tolist(),
-                                   inertia=(body.I0 - body.h0[2] ** 2 / body.m * np.diag([1, 1, 0]) + np.diag([0, 0, 1e-3])).tolist())
+            across = float(body.I0[0, 0] - body.h0[2] ** 2 / body.m)
+            root = system.add_body("beam", mass=body.m, com=(body.h0 / body.m).tolist(), inertia=[across, across, 1e-3])
             tip, at = root, (0, 0, 2)
         else:
             parts = system.add_flexible_body("beam", beam, stiffness=kappa)
@@ -239,13 +230,12 @@ def test_absolute_coordinates_of_a_lamp_on_a_ship() -> None:
     assert len(system.augmented("absolute").symbols.speeds) == 12
 
 
-def test_elastic_coordinates_of_a_mode_without_a_carried_end() -> None:
-    """The mass matrix does not ask whether anything sits on the free end."""
+def test_a_free_end_that_carries_nothing() -> None:
+    """The mass matrix is the same whether or not something could sit there."""
     matrices = []
     for carries in (True, False):
         system = sd.System("clamped", gravity=[0, 0, 0])
         beam = system.add_flexible_body("beam", sd.Beam([0, 1], 1.0, 1.0, in_both(2)), carries=carries)
         system.add_joint(sd.Fixed("clamp", system.ground, beam.root))
-        assert isinstance(beam.joint, Modal)
         matrices.append(system.embedding().compile(backend="numpy").mass_matrix([0.1, -0.05, 0.02, 0.03]))
     np.testing.assert_allclose(matrices[0], matrices[1], rtol=1e-14)

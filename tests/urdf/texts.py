@@ -36,8 +36,8 @@ def saved(folder: Path, text: str, name: str = "robot.urdf") -> Path:
 LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="10"/>'
 # Every type of joint, turned frames, a slanted axis, joints that mimic, one of them a joint that mimics itself.
 ALL = robot(
-    link("base"), link("table", BOX), link("arm", BOX), link("slide", BOX), link("plate"), link("flyer", BOX), link("finger", BOX),
-    link("thumb", BOX), link("tip", ""),
+    link("base"), link("table", BOX), link("arm", BOX), link("slide", BOX), link("plate"), link("flyer", BOX),
+    link("finger", BOX), link("thumb", BOX), link("tip", ""),
     joint("turn", "continuous", "base", "table", '<origin xyz="0 0 0.4" rpy="0 0 1.5707963267948966"/><axis xyz="0 0 1"/>'),
     joint("lift", "revolute", "table", "arm", f'<origin xyz="0.1 0 0.2" rpy="1.5708 0.2 -0.1"/><axis xyz="1 2 -2"/>{LIMIT}'),
     joint("push", "prismatic", "arm", "slide", f'<origin xyz="0.3 0 0" rpy="0 0 3.14159265"/><axis xyz="0 -1 0"/>{LIMIT}'),

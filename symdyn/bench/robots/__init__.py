@@ -1,1 +1,8 @@
-"""`python -m symdyn.bench.robots`: robots from files beside Pinocchio, agreement and times."""
+"""`python -m symdyn.bench.robots`: robots from files beside Pinocchio.
+
+    collection        the robots of the package example-robot-data
+    pinocchio_robot   one of them in Pinocchio, its quantities in symdyn's order
+    agreement         how far they are apart at random states
+    pinocchio_aba     Pinocchio's articulated bodies in C++: time and operations
+    command           the table
+"""

@@ -58,7 +58,7 @@ HUMANOIDS = (
     "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf", "human_description/robots/human.urdf",
     "icub_description/robots/icub.urdf", "icub_description/robots/icub_reduced.urdf",
     "romeo_description/urdf/romeo_small.urdf", "simple_humanoid_description/urdf/simple_humanoid.urdf",
-    "simple_humanoid_description/urdf/simple_humanoid_classical.urdf", "talos_data/robots/talos_full_v2.urdf",
+    "simple_humanoid_description/urdf/simple_humanoid_classical.urdf",
     "talos_data/robots/talos_reduced.urdf",
 )
 ROBOTS: tuple[Listed, ...] = (

@@ -26,15 +26,14 @@ class PinocchioAba:
         self.library.robot_open.restype = ctypes.c_void_p
         self.library.robot_operations.restype = ctypes.c_long
 
-    def run(self, robot: PinocchioRobot, q: np.ndarray, u: np.ndarray, fed: int) -> Callable[[int], None]:
-        """run(n): n evaluations at a state in symdyn's order; fed: number of the speed whose coordinate carries the result on."""
+    def run(self, robot: PinocchioRobot, q: np.ndarray, u: np.ndarray) -> Callable[[int], None]:
+        """run(n): n evaluations at a state in symdyn's order; the first coordinate of the last joint carries the result on."""
         message = ctypes.create_string_buffer(_ERROR_SIZE)
         opened = ctypes.c_void_p(self.library.robot_open(_text(robot), message, ctypes.c_long(_ERROR_SIZE)))
         if not opened:
             raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
         at, v, out = robot.q(q), robot.matrix(q) @ u, np.zeros(len(u))
-        joint = next(there for _, there in robot.joints if there.idx_v <= robot.order[fed] < there.idx_v + there.nv)
-        place = ctypes.c_long(joint.idx_q)
+        place = ctypes.c_long(robot.joints[-1][1].idx_q)
 
         def run(n: int) -> None:
             self.library.robot_loop(opened, ctypes.c_long(n), place, address(at), address(v), address(out))

@@ -95,9 +95,7 @@ class Trial:
 
     def by_unknown(self) -> list[np.ndarray]:
         """Derivatives of the balance by the parameters and inputs that are solved for."""
-        names = self.place.module.metadata["inputs"]
-        return [*[self.place.along("variation", along={p: 1.0}) for p in self.selection.parameters],
-                *[self.place.balance_inputs[:, names.index(n)] for n in self.selection.inputs]]
+        return list(self.place.by([*self.selection.parameters, *self.selection.inputs]).T)
 
 
 class Search:

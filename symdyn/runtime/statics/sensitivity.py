@@ -47,7 +47,7 @@ def shift(place: Place, selection: Selection, parameter: str) -> dict[str, float
     trial = Trial(place, selection)
     J = trial.derivative()
     pulls = np.vstack([trial.tested.T @ place.C_r.T, np.zeros((len(J) - trial.tested.shape[1], n_c))])
-    right = place.along("variation", along={parameter: 1.0})
+    right = place.by([parameter])[:, 0]
     right = np.concatenate([trial.tested.T @ right[:n_u], right[n_u:n_u + n_c] * place.scale,
                             right[n_u + n_c:][selection.states]])
     whole = np.hstack([J, pulls])

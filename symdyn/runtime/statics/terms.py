@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -73,6 +73,19 @@ class Place:
         ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata["ud"]]
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
+    def by(self, names: Sequence[str]) -> np.ndarray:
+        """Derivatives of the balance by coordinates, speeds, states, inputs or parameters, (n_u + n_c + n_z, len(names))."""
+        about = self.module.unit("variation").metadata["ud"]
+        given = dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True))
+        given |= {multiplier(k): value for k, value in enumerate(self.lam)}
+        rows = np.tile([given.get(n, 0.0) for n in about], (len(names), 1))
+        for row, name in zip(rows, names, strict=True):
+            row[about.index(f"(along {name})")] = 1.0
+        if not len(names):
+            return np.zeros((len(self.balance), 0))
+        found: np.ndarray = self.module.evaluate("variation", self.t, self.x, self.p, self.inputs, rows)
+        return found.reshape(len(names), -1).T
+
     # -- the balance and its parts
 
     @cached_property
@@ -94,11 +107,13 @@ class Place:
 
     @cached_property
     def balance_x(self) -> np.ndarray:
-        return self.evaluate("balance_x")
+        """By x, (n_u + n_c + n_z, n_x)."""
+        return self.by(self.module.metadata["x"])
 
     @cached_property
     def balance_inputs(self) -> np.ndarray:
-        return self.evaluate("balance_inputs")
+        """By the inputs, (n_u + n_c + n_z, n_in)."""
+        return self.by(self.module.metadata["inputs"])
 
     @cached_property
     def M(self) -> np.ndarray:

@@ -1,0 +1,87 @@
+"""A module in a form that other processes and machines take: its names and the text that was generated for it."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from symdyn.errors import SymdynError
+from symdyn.runtime.compiler import require_compiler
+from symdyn.runtime.module import Module
+from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+
+
+class PortableModule:
+    """A module that can be pickled.
+
+    module      here the module itself; where it was sent to, one made of the text, compiled there once into the cache there
+    functions   what is sent along with all that was used here already
+    """
+
+    def __init__(self, module: Module, functions: Sequence[str]) -> None:
+        self._units: dict[str, dict[str, Any]] = {}
+        self._given = module
+        self._functions = tuple(functions)
+        self.module = Module(module.metadata, self._provide, module.backend, module.fallback)
+        self.at_home = True
+
+    def _provide(self, name: str) -> Unit:
+        unit: Any = self._given.unit(name)
+        text = unit.source if isinstance(unit, CUnit) else Path(unit.module.__file__).read_text(encoding="utf-8")
+        self._units[name] = {"source": text, "metadata": dict(unit.metadata)}
+        return unit  # type: ignore[no-any-return]
+
+    def key(self) -> str:
+        """Changes with what is computed."""
+        self.module.unit("rhs")
+        return hashlib.sha256(self._units["rhs"]["source"].encode()).hexdigest()
+
+    @functools.cached_property
+    def _packed(self) -> bytes:
+        for name in self._functions:
+            self.module.unit(name)
+        record = {"metadata": dict(self.module.metadata), "units": self._units}
+        return zlib.compress(json.dumps(record).encode())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, (self.module.backend, self._packed)
+
+
+class _Arrived:
+    """A portable module where it was sent to."""
+
+    at_home = False
+
+    def __init__(self, backend: str, packed: bytes) -> None:
+        self._sent = backend, packed
+        self.module = _module(backend, packed)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, self._sent
+
+
+def _unpacked(backend: str, packed: bytes) -> _Arrived:
+    return _Arrived(backend, packed)
+
+
+@functools.lru_cache(maxsize=4)
+def _module(backend: str, packed: bytes) -> Module:
+    """Loaded once in a process, however many chunks it computes."""
+    record = json.loads(zlib.decompress(packed))
+    units = record["units"]
+
+    def provide(name: str) -> Unit:
+        there = name if name in units else next((n for n, u in units.items() if name in u["metadata"]["shapes"]), None)
+        if there is None:
+            raise SymdynError(f"{record['metadata']['name']}: {name} was not sent along; it was not used by the samples that were "
+                              "tried in advance. Name it in `functions`")
+        source, metadata = units[there]["source"], units[there]["metadata"]
+        return (CUnit(source, metadata, require_compiler()) if backend == "c"
+                else PythonUnit.from_source(source, metadata["name"]))
+
+    return Module(record["metadata"], provide, backend)

@@ -1,0 +1,156 @@
+"""Samples: which values the members of an ensemble have. Every block of them can be made by itself, at any time, anywhere."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from symdyn.ensembles.axes import SMALLEST, Axis, read_axis
+from symdyn.errors import ArgumentError
+
+SAMPLINGS = ("paired", "grid", "random", "latin_hypercube", "sobol")
+# Rounds of the network that permutes numbers; from four on it is as good as random.
+ROUNDS = 6
+SOBOL_LIMIT = 2**30
+
+
+class Samples:
+    """Values of parameters, initial coordinates, speeds, extra states and inputs, by name.
+
+    values     name or symbol -> a number; a list or array; {"from", "to", "count"}; {"from", "to"} or {"distribution": "normal",
+               "mean", "std"}, also "uniform", "loguniform" (from, to), "truncated_normal" (mean, std, from, to), "lognormal"
+               (median, sigma), "triangular" (from, mode, to)
+    sampling   "paired": the k-th values of all lists belong together; "grid": every combination, the last varies fastest;
+               "random", "latin_hypercube", "sobol": `count` samples, also of lists and spaced values.
+               Default: "random" where there is a count or a distribution, else "grid"
+    seed       of the last three
+
+    Sample k depends on the seed and k alone, and `block` takes memory for its own samples only.
+    Raises ArgumentError with all that is wrong.
+    """
+
+    def __init__(self, values: Mapping[Any, Any], sampling: str | None = None, count: int | None = None, seed: int = 0,
+                 where: str = "samples") -> None:
+        faults: list[str] = []
+        axes: dict[str, Axis] = {}
+        if not isinstance(values, Mapping) or not values:
+            raise ArgumentError(f"{where}: give a mapping from names to values, with one name at least; found {values!r:.80}")
+        for key, value in values.items():
+            name = str(getattr(key, "name", key))
+            axis = read_axis(value, f"{where}.{name}", faults)
+            if axis is not None:
+                axes[name] = axis
+        free = [n for n, a in axes.items() if a.values is None]
+        if sampling is None:
+            sampling = "random" if free or count is not None else "grid"
+        self.names = tuple(axes)
+        self.sampling = sampling
+        self._axes = tuple(axes.values())
+        drawn = sampling in ("random", "latin_hypercube", "sobol")
+        if sampling not in SAMPLINGS:
+            faults.append(f"{where}: sampling {sampling!r} asked for; there are {', '.join(SAMPLINGS)}")
+        elif drawn and (isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1):
+            faults.append(f"{where}: {sampling} needs a count, a whole number from 1 on, found {count!r}")
+        elif not drawn and free:
+            faults.append(f"{where}: {sampling} needs lists or {{from, to, count}}; {', '.join(free)} "
+                          f"{'have' if len(free) > 1 else 'has'} a distribution, which goes with random, latin_hypercube or sobol")
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+            faults.append(f"{where}: the seed must be a whole number from 0 on, found {seed!r}")
+        lengths = {n: len(a.values) for n, a in axes.items() if a.values is not None and a.varies}
+        if sampling == "paired" and len(set(lengths.values())) > 1:
+            faults.append(f"{where}: paired values must be as many of each, found "
+                          + ", ".join(f"{n}: {k}" for n, k in lengths.items()))
+        if not faults and not drawn:
+            found = math.prod(lengths.values()) if sampling == "grid" else max(lengths.values(), default=1)
+            if count is not None and count != found:
+                faults.append(f"{where}: the {sampling} has {found} samples, but the count is {count}; leave the count out")
+            count = found
+        if sampling == "sobol" and not faults and int(count or 0) > SOBOL_LIMIT:
+            faults.append(f"{where}: sobol has {SOBOL_LIMIT} points at most, found the count {count}")
+        if faults:
+            raise ArgumentError("\n".join(faults))
+        assert count is not None
+        self.count, self.seed = int(count), int(seed)
+
+    def block(self, first: int, stop: int) -> np.ndarray:
+        """Samples first to stop - 1, (stop - first, n_names)."""
+        k = np.arange(first, stop)
+        if self.sampling == "paired":
+            columns = [_values(a)[k if a.varies else 0 * k] for a in self._axes]
+        elif self.sampling == "grid":
+            columns, left = [], k
+            for axis in reversed(self._axes):
+                columns.append(_values(axis)[left % len(_values(axis))])
+                left = left // len(_values(axis))
+            columns.reverse()
+        else:
+            drawn = iter(np.clip(self._probabilities(k), SMALLEST, 1 - SMALLEST).T)
+            columns = [a.quantile(next(drawn)) if a.varies else np.full(len(k), _values(a)[0]) for a in self._axes]
+        return np.column_stack(columns)
+
+    def told(self) -> dict[str, Any]:
+        """What tells these samples from others, as plain values."""
+        values = {n: a.told for n, a in zip(self.names, self._axes, strict=True)}
+        return {"sampling": self.sampling, "count": self.count, "seed": self.seed, "values": {
+            n: hashlib.sha256(v.tobytes()).hexdigest() if isinstance(v, np.ndarray) else v for n, v in values.items()}}
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of what is not the same in all samples."""
+        return tuple(n for n, a in zip(self.names, self._axes, strict=True) if a.varies)
+
+    def _probabilities(self, k: np.ndarray) -> np.ndarray:
+        n, first = len(self.varied), int(k[0]) if len(k) else 0
+        if self.sampling == "sobol" and n:
+            from scipy.stats import qmc
+
+            engine = qmc.Sobol(n, seed=self.seed)
+            engine.fast_forward(first)
+            return np.asarray(engine.random(len(k)))
+        # Philox counts in fours of numbers: any of them is reached at once.
+        generator = np.random.Philox(self.seed)
+        generator.advance(first * n // 4)
+        skip = first * n % 4
+        drawn = np.random.Generator(generator).random(skip + len(k) * n)[skip:].reshape(len(k), n)
+        if self.sampling == "random":
+            return drawn
+        places = np.column_stack([_permuted(k, self.count, (self.seed, d)) for d in range(n)]) if n else drawn
+        return (places + drawn) / self.count
+
+    def __repr__(self) -> str:
+        return f"<Samples: {self.count} of {', '.join(self.names)} ({self.sampling})>"
+
+
+def _values(axis: Axis) -> np.ndarray:
+    assert axis.values is not None
+    return axis.values
+
+
+def _permuted(k: np.ndarray, n: int, seed: tuple[int, int]) -> np.ndarray:
+    """Where a permutation of 0 ... n - 1 sends the numbers k: a Feistel network on the next power of four, walked through until
+    it is back below n. No table is needed, however large n is."""
+    half = np.uint64(max(1, ((n - 1).bit_length() + 1) // 2))
+    mask = (np.uint64(1) << half) - np.uint64(1)
+    keys = np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64)
+
+    def walk(x: np.ndarray) -> np.ndarray:
+        left, right = x >> half, x & mask
+        for key in keys:
+            left, right = right, left ^ (_mixed(right + key) & mask)
+        return (left << half) | right
+
+    x = walk(k.astype(np.uint64))
+    while (outside := x >= n).any():
+        x[outside] = walk(x[outside])
+    return x.astype(np.int64)
+
+
+def _mixed(x: np.ndarray) -> np.ndarray:
+    """The finalizer of SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014)."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
