@@ -55,10 +55,12 @@ class Call:
     take   one statement a line, with {name} of its results, {function}, {sizes} each followed by a comma, {arguments} separated
            by commas, {n_in} and {n_out} the numbers of arguments and results, and {code} to return where it fails
     item   what then reads result {k}
+    argument   how one of the arguments is written, with {value}
     """
 
     take: str
     item: str
+    argument: str = "{value}"
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,8 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
     if "call" in table:
         call = table["call"]
         faults += [f"call.{key} is missing" for key in CALL if key not in call]
-        faults += [f"call.{key} is not known" for key in call if key not in CALL]
+        faults += [f"call.{key} is not known" for key in call if key not in (*CALL, "argument")]
+        trials += [("call.argument", call["argument"], {"value": "a"}) for _ in range("argument" in call)]
         take = {"name": "r", "function": "f", "sizes": "1, ", "arguments": "a", "n_in": 1, "n_out": 1, "code": 1}
         trials += [(f"call.{key}", call[key], take if key == "take" else {"name": "r", "k": 0}) for key in CALL if key in call]
     for key, text, given in trials:

@@ -59,6 +59,7 @@ class Function:
     parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
     regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
                 statements of its own
+    inlined     steps that are written where they are used: which products and sums become one depends on it
     """
 
     name: str
@@ -74,6 +75,7 @@ class Function:
     n_w: int = 0
     regular: Function | None = None
     otherwise: Function | None = None
+    inlined: frozenset[Node] = frozenset()
 
     @property
     def size(self) -> int:
@@ -108,11 +110,12 @@ class Program:
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
-          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None) -> Program:
+          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None, like: Program | None = None) -> Program:
     """Write every tape (function name -> tape with one output) in the dialect.
 
     places      leaf name -> (group, place in it)
     otherwise   function name -> the tape for where the first one fails
+    like        the same in another dialect, whose rounding this one is to have
     """
     otherwise = otherwise or {}
     whole = Tape(next(iter(tapes.values())).recorder,
@@ -125,7 +128,8 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                       + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
-    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late)
+    inlined = {w.name: w.inlined for f in like.functions for w in (f, f.regular, f.otherwise) if w} if like else {}
+    write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late, inlined=inlined)
     functions = tuple(
         _either(name, titles[name], write(tape, name=f"{name}_{REGULAR}", title=titles[name]),
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
@@ -166,30 +170,34 @@ def _kernels(tape: Tape) -> dict[str, tuple[int, ...]]:
 
 
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
-              codes: Mapping[str, int], late: set[Node], name: str, title: str) -> Function:
+              codes: Mapping[str, int], late: set[Node], name: str, title: str,
+              inlined: Mapping[str, frozenset[Node]]) -> Function:
     """One function, in parts if it is long and the dialect divides long ones."""
+    wanted = inlined.get(name)
     output = next(iter(tape.outputs.values()))
     running = {*tape.running, *late}
     body = [n for n in tape.steps if n in running and n not in hoisted and n.op != "leaf"]
     operations = count_of(body)
     if dialect.parts is None or len(body) <= dialect.parts.whole:
-        writer = _Writer(dialect, tape, places, hoisted, codes, late)
+        writer = _Writer(dialect, tape, places, hoisted, codes, late, wanted)
         part = writer.part(body, output.entries, writer.results_of(output.entries))
         return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, operations,
-                        tape.longest_chain())
+                        tape.longest_chain(), inlined=frozenset(writer.printer.inline))
     parts: list[Part] = []
     earlier: dict[Node, tuple[str, int]] = {}
+    found: set[Node] = set()
     stretches, slots, n_w = divide(body, output.entries, dialect.parts.longest)
     for k, (stretch, kept) in enumerate(stretches):
-        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late)
+        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
         if k == len(stretches) - 1:
             parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries)))
         else:
             parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots)))
         earlier |= {node: ("w", slots[node]) for node in kept}
+        found |= writer.printer.inline
     groups = {g for part in parts for g in part.arguments}
     return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), operations,
-                    tape.longest_chain(), tuple(parts), n_w)
+                    tape.longest_chain(), tuple(parts), n_w, inlined=frozenset(found))
 
 
 class _Writer:
@@ -197,11 +205,14 @@ class _Writer:
 
     stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, place)
     late     see _late
+    inlined  what is written where it is used; None: what is used once and short
     """
 
     def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
-                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node]) -> None:
+                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node],
+                 inlined: frozenset[Node] | None = None) -> None:
         self.dialect = dialect
+        self.inlined = inlined
         self.late = late
         self.demanded = {unsigned(n.args[1]) for n in late if n.op == "div"}
         self.tape = tape
@@ -351,7 +362,7 @@ class _Writer:
                     continue
                 value = self.printer.operation(node)
                 inline = self.uses[node] <= 1 and not named and node not in self.checks and node not in self.guarded
-                if inline and len(value) <= _INLINE_LENGTH:
+                if inline and (len(value) <= _INLINE_LENGTH if self.inlined is None else node in self.inlined):
                     self.text[node] = value
                     self.printer.inline.add(node)
                 else:
@@ -379,7 +390,8 @@ class _Writer:
                               "add [call] to its dialect.toml, and the algorithm to its templates")
         self.n_calls += 1
         self.text[node] = identifier(f"{kernel.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
-        arguments = fill(", ".join(map(self.printer.text, values)), 116, subsequent_indent="    ", break_long_words=False)
+        written = [way.argument.format(value=self.printer.text(v)) for v in values]
+        arguments = fill(", ".join(written), 116, subsequent_indent="    ", break_long_words=False)
         return way.take.format(name=self.text[node], function=kernel.name, sizes="".join(f"{size}, " for size in kernel.sizes),
                                arguments=arguments, n_in=len(values), n_out=kernel.n_out,
                                code=self.codes[self.checks[node]]).strip().split("\n")

@@ -65,16 +65,22 @@ def tumbling() -> Iterator[Figure]:
     forms = {f"{form}, {orientation}": cases.equations(cases.thrown(orientation), form)
              for orientation in ("angles", "parameters") for form in cases.FORMS[:2]}
     first = None
-    for name, found in forms.items():
-        module = found.compile()
+    for name, form in forms.items():
+        module = form.compile()
         solution = cases.throw(module)
         first = first or solution
         yield f"thrown, {name}: energy error", solution.energy_error(), "", "<= 1e-8"
         yield f"thrown, {name}: motion off embedded, angles", cases.apart(first, solution), "", "< 1e-8"
         damped = cases.throw(module, params={"delta": 2.0})
         yield f"thrown, {name}: energy error with damping", damped.energy_error(), "", "<= 1e-8"
-    for name, found in forms.items():
-        yield f"thrown, {name}: failed checks", sum(c.passed is False for c in found.verify(states=1).checks), "", "<= 0"
+    for way in cases.FORMS[:2]:
+        module = forms[f"{way}, parameters"].compile()
+        found = cases.momenta(module, cases.throw(module, params={"g": 0.0, "delta": 2.0}))
+        off = np.abs(found - found[0]).reshape(-1, 2, 3).max(axis=(0, 2)) / np.linalg.norm(found[0].reshape(2, 3), axis=1)
+        yield f"thrown without gravity, {way}: change of momentum", float(off[0]), "", "< 1e-9"
+        yield f"thrown without gravity, {way}: change of angular momentum", float(off[1]), "", "< 1e-9"
+    for name, form in forms.items():
+        yield f"thrown, {name}: failed checks", sum(c.passed is False for c in form.verify(states=1).checks), "", "<= 0"
 
 
 def limits() -> Iterator[Figure]:
@@ -115,6 +121,8 @@ def floating() -> Iterator[Figure]:
         module = found.compile()
         runs = [module.simulate(t=(0, 600), q={"theta": 0.05, "z": 0.2, "x": 0.5}, rtol=1e-8) for _ in range(3)]
         yield f"floating turbine, {form}: 600 s, rtol 1e-8", min(run.integrator_seconds for run in runs), "s", ""
+        started = module.simulate(t=(0, 60), inputs={"v_w": 8.0, "tau_a": 2e6}, work=True, rtol=1e-9)
+        yield f"floating turbine, {form}: energy error of a start-up", started.energy_error(), "", "<= 1e-8"
 
 
 def main() -> int:

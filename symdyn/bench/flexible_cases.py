@@ -258,6 +258,18 @@ def throw(module: Module, seconds: float = 3.0, **options: Any) -> Any:
     return module.simulate(t=np.linspace(0, seconds, 61), u=speeds, rtol=1e-11, atol=1e-12, work=True, **options)
 
 
+def momenta(module: Module, solution: Any) -> np.ndarray:
+    """(n_t, 6) momentum and angular momentum about the origin, n-frame, of `thrown` in Euler parameters: what belongs to the
+    hull's velocity and angular velocity in M u."""
+    from scipy.spatial.transform import Rotation
+
+    M = np.array([module.mass_matrix(q, solution.params) for q in solution.q])
+    along = np.einsum("nij,nj->ni", M, solution.u)[:, :6]
+    turn = Rotation.from_quat(solution.q[:, [4, 5, 6, 3]])
+    P, L = turn.apply(along[:, :3]), turn.apply(along[:, 3:])
+    return np.column_stack([P, L + np.cross(solution.q[:, :3], P)])
+
+
 def apart(one: Any, other: Any) -> float:
     """Largest difference of the coordinates that two solutions have in common, relative to the largest of each."""
     common = [name for name in one.module.metadata["q"] if name in other.module.metadata["q"]]

@@ -15,7 +15,6 @@ from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
 
-
 # A call with more values than this is differentiated along directions only: its derivatives one by one would be many.
 MANY = 32
 

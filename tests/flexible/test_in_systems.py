@@ -115,6 +115,14 @@ def test_energy_balance_with_damping(thrown) -> None:
     assert solution.work[-1] < -0.5 and (np.diff(solution.work) < 0).all()
 
 
+def test_momentum_and_angular_momentum_are_conserved(thrown) -> None:
+    """Damping is inside: without gravity nothing from outside acts."""
+    module = thrown[1][1]
+    found = cases.momenta(module, cases.throw(module, params={"g": 0.0, "delta": 2.0}))
+    for part in (found[:, :3], found[:, 3:]):
+        assert np.abs(part - part[0]).max() < 1e-10 * np.linalg.norm(part[0])
+
+
 def test_identities_in_c_numpy_and_thirty_digits(thrown) -> None:
     verification = thrown[0][0].verify(states=1)
     assert verification.passed

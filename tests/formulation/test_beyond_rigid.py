@@ -119,7 +119,7 @@ def test_explanation_adds_up() -> None:
     equations = ship(carries=False).embedding()
     parts = equations.explain("M_tilde", 2, 2, simplify=False)
     assert "added mass and deflection" in {c.body for c in parts.contributions}
-    values = {a: v for a, v in zip(equations.symbols.coordinates, np.linspace(0.1, 0.9, 9), strict=True)}
+    values = dict(zip(equations.symbols.coordinates, np.linspace(0.1, 0.9, 9), strict=True))
     numbers = {**values, **equations.symbols.defaults}
     assert float(parts.total.subs(numbers) - equations.explicit("M_tilde", simplify=False)[2, 2].subs(numbers)) == pytest.approx(
         0, abs=1e-12)
@@ -137,7 +137,7 @@ def test_unsymmetric_added_mass() -> None:
 def test_added_mass_of_the_wrong_size() -> None:
     system = ship(water=False)
     system.add_load(sd.AddedMass("hull", [1, 2, 3]))
-    with pytest.raises(ModelError, match="A is not a 6 x 6 matrix; pass 6 rows of 6, or the 6 diagonal entries"):
+    with pytest.raises(ModelError, match=r"A is not a 6 x 6 matrix; pass 6 rows of 6, or the 6 diagonal entries"):
         system.check()
 
 
@@ -145,12 +145,12 @@ def test_load_on_the_ground_and_what_is_no_load() -> None:
     system = ship(water=False)
     system.add_load(sd.AddedMass("ground", [1] * 6))
     system.add_load("wind")
-    with pytest.raises(ModelError, match="(?s)add_load was given 'wind'.*acts on the ground"):
+    with pytest.raises(ModelError, match=r"(?s)add_load was given 'wind'.*acts on the ground"):
         system.check()
 
 
 def test_beam_that_is_none() -> None:
-    with pytest.raises(ModelError, match="flexible body 'mast': beam is 3; pass sd.Beam"):
+    with pytest.raises(ModelError, match=r"flexible body 'mast': beam is 3; pass sd\.Beam"):
         sd.System("a", gravity=[0, 0, -1]).add_flexible_body("mast", 3)
 
 

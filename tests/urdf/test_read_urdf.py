@@ -236,8 +236,8 @@ def test_mimics_of_what_has_several_coordinates(tmp_path: Path) -> None:
 def test_a_leaf_that_moves_without_inertia(tmp_path: Path, inertial: str, kept: str) -> None:
     text = pendulum(link("tip", inertial), joint("wrist", "continuous", "bar", "tip", '<axis xyz="0 1 0"/>'))
     assert faults(tmp_path, text) == [
-        f"6: joint 'wrist' moves link 'tip' (line 5), which {kept}, and nothing else; give the link mass and inertia, or hold the "
-        "joint: type=\"fixed\", or fixed=['wrist']"]
+        f"6: joint 'wrist' moves link 'tip' (line 5), which {kept}, and nothing else; give the link mass and inertia, or hold "
+        "the joint: type=\"fixed\", or fixed=['wrist']"]
     assert len(read(tmp_path, text, fixed="wrist").recursive().symbols.speeds) == 1
 
 
@@ -255,9 +255,9 @@ def test_masses_that_no_body_has(tmp_path: Path) -> None:
     text = pendulum(*[link(f"l{k}", w) for k, w in enumerate(wrong)], *[joint(f"j{k}", "fixed", "bar", f"l{k}") for k in range(3)])
     assert faults(tmp_path, text) == ["5: link 'l0' has the mass -1.0 kg; give zero or a positive mass",
                                       "7: link 'l2': <inertia> has no izz; give it a number"]
-    assert faults(tmp_path, text.replace('"-1"', '"1"').replace("izz", "izz").replace(wrong[2], BALL)) == [
-        "6: link 'l1': its inertia has the principal moments [-0.2, 0.1, 0.4] kg m^2, one is negative; give the inertia about the "
-        "centre of mass"]
+    assert faults(tmp_path, text.replace('"-1"', '"1"').replace(wrong[2], BALL)) == [
+        "6: link 'l1': its inertia has the principal moments [-0.2, 0.1, 0.4] kg m^2, one is negative; give the inertia about "
+        "the centre of mass"]
     assert faults(tmp_path, robot(link("base", "")), root="floating") == [
         "1: no link has mass or inertia, so that nothing can move freely; give one an <inertial>"]
 
@@ -281,8 +281,8 @@ DOCTYPE = ("the file declares a document type, which is refused: entities and ot
     ("", "1: the file is no XML there (no element found); pass a URDF file"),
     ("<sdf version='1.6'/>", "1: the file holds a <sdf>; a URDF holds a <robot>"),
     ('<robot name="r">\n<xacro:include filename="arm.xacro"/>\n</robot>',
-     "2: a tag has a prefix that the file does not declare, in '<xacro:include filename=\"arm.xacro\"/>'; if it belongs to xacro, "
-     "run the file through xacro first"),
+     "2: a tag has a prefix that the file does not declare, in '<xacro:include filename=\"arm.xacro\"/>'; if it belongs to "
+     "xacro, run the file through xacro first"),
     ('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n<link name="a"/>\n<xacro:macro name="leg"/>\n</robot>',
      "3: <xacro:macro> is left over from xacro; run the file through xacro first"),
     ('<?xml version="1.0" encoding="nonsense"?>\n<robot/>',

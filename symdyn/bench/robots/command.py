@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from pathlib import Path
 
 import numpy as np
 
@@ -79,8 +78,8 @@ def measure(robot: Listed, states: int = STATES, aba: PinocchioAba | None = None
         derived = clock.perf_counter() - begun
         recursive = equations if equations.formulation == "recursive" else system.recursive("parallel")
         peer = PinocchioRobot(path, model, robot.floating)
-    tapes = [function_tape(recursive, "inverse_dynamics"), function_tape(recursive, "mass_matrix"), function_tape(equations, "rhs")]
-    tau, M, ud = (tape.operations for tape in tapes)
+    sources = ((recursive, "inverse_dynamics"), (recursive, "mass_matrix"), (equations, "rhs"))
+    tau, M, ud = (function_tape(form, name).operations for form, name in sources)
     q, u, _ = random_states(model, 1, np.random.default_rng(0))
     fed = model.coordinates.index(peer.joints[-1][0].coordinates[0])
     ours = theirs = counted = None
@@ -126,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(row, flush=True)
         failed += not max(row.worst.values()) <= AGREEMENT
     print(f"{len(chosen)} robots, {options.states} random states each; {failed} differ by more than {AGREEMENT:.0e} or failed.\n"
-          "ops: + - * / sqrt sin cos, one each; ABA: Pinocchio's articulated bodies in C++, as it does them (none with joints that "
-          "mimic). ratio: its time over symdyn's.\ntau M ud J com energy: norm of the difference over the norm, the worst state; "
-          "ud divided by the condition number of M.")
+          "ops: + - * / sqrt sin cos, one each; ABA: Pinocchio's articulated bodies in C++, as it does them (it has none with\n"
+          "joints that mimic). ratio: its time over symdyn's. tau M ud J com energy: norm of the difference over the norm, the\n"
+          "worst state; ud divided by the condition number of M.")
     return int(failed > 0)

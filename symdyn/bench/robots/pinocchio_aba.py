@@ -63,7 +63,7 @@ def _lines(robot: PinocchioRobot) -> Iterator[str]:
         data = joint.createData()
         joint.calc(data, neutral[joint.idx_q:joint.idx_q + joint.nq])
         # Pinocchio's subspace has the linear part first; the axis of a joint with several speeds is not looked at.
-        column = np.array(data.S)[:, 0]
+        column = np.array(data.S).reshape(6, -1)[:, 0]
         axis = column[3:] if column[3:].any() else column[:3]
         kind = joint.shortname().removeprefix("JointModel")
         numbers = [*axis, *np.array(place.rotation).ravel(), *np.array(place.translation)]

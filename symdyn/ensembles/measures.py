@@ -1,0 +1,164 @@
+"""What is kept of a motion: a few numbers of a coordinate, speed, input, output or the energy, or what a function returns."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.integrate import trapezoid
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.simulate import N_POINTS
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+    from symdyn.runtime.solution import Solution
+
+# (t (n_t,), values (n_t, ...)) -> result (...)
+REDUCTIONS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "start": lambda t, y: y[0],
+    "end": lambda t, y: y[-1],
+    "min": lambda t, y: y.min(axis=0),
+    "max": lambda t, y: y.max(axis=0),
+    "mean": lambda t, y: trapezoid(y, t, axis=0) / (t[-1] - t[0]),
+    "rms": lambda t, y: np.sqrt(trapezoid(y * y, t, axis=0) / (t[-1] - t[0])),
+    "trace": lambda t, y: y,
+}
+# They need no more than the times they are about.
+OF_ONE_TIME = ("start", "end", "at")
+RESERVED = ("samples", "failed", "t", "about")
+_ASKED = re.compile(rf"(?P<kind>{'|'.join(REDUCTIONS)})\s+(?P<name>\S.*)")
+_AT = re.compile(r"(?P<name>\S.*?)\s+at\s+(?P<time>[-+.\deE]+)")
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number, or an array, of every motion.
+
+    label      its name in the results
+    kind       one of REDUCTIONS, "at", or "function"
+    """
+
+    label: str
+    kind: str
+    name: str = ""
+    time: float = 0.0
+    function: Callable[[Solution], Any] | None = None
+
+    def of(self, solution: Solution) -> np.ndarray:
+        """Its value. Whatever a function of the user raises passes through."""
+        if self.function is not None:
+            return np.asarray(self.function(solution), dtype=float)
+        values = values_of(solution, self.name)
+        if self.kind == "at":
+            return np.asarray(values[int(np.argmin(np.abs(solution.t - self.time)))])
+        return np.asarray(REDUCTIONS[self.kind](solution.t, values))
+
+    def told(self) -> str:
+        """What tells it from others."""
+        function = self.function
+        return f"{self.kind} {self.name}" if function is None else (
+            f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}")
+
+
+def values_of(solution: Solution, name: str) -> np.ndarray:
+    """A quantity over time, (n_t, ...)."""
+    if name == "energy" and name not in solution.outputs:
+        return solution.energy
+    return solution[name]
+
+
+def functions_of(module: Module, measures: Sequence[Measure]) -> list[str]:
+    """Functions of the module that simulations and measures call."""
+    there, constraints = module.functions, module.metadata["constraints"]
+    names = {m.name for m in measures}
+    wanted = ["rhs", *(("C", "lam") if constraints else ("mass_matrix",))]
+    wanted += ["outputs"] * any(n in names for n, _ in module.metadata["outputs"]) + ["energy"] * ("energy" in names)
+    return [n for n in wanted if n in there]
+
+
+def take_measures(asked: Any, module: Module) -> list[Measure]:
+    """Measures as the user gave them.
+
+    asked   None: the end of every coordinate, speed and extra state; texts "end q1", "max q1", "q1 at 2.5", or a mapping from
+            labels to texts and to functions of a Solution
+    Raises ArgumentError with all that is wrong.
+    """
+    if asked is None:
+        asked = [f"end {name}" for name in module.metadata["x"]]
+    if isinstance(asked, str) or not isinstance(asked, (Sequence, Mapping)) or not asked:
+        raise ArgumentError(f"{module.name}: outcomes must be a list of texts such as 'max q1', or a mapping, found {asked!r:.80}")
+    faults: list[str] = []
+    found: list[Measure] = []
+    for label, value in asked.items() if isinstance(asked, Mapping) else [(text, text) for text in asked]:
+        measure = _measure(label, value, module, faults)
+        if measure is None:
+            continue
+        if measure.label in RESERVED or "/" in measure.label or measure.label in [m.label for m in found]:
+            faults.append(f"outcome {measure.label!r}: the name is taken; names must differ from each other and from "
+                          f"{', '.join(RESERVED)}, and have no /")
+        found.append(measure)
+    if faults:
+        raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
+    return found
+
+
+def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measure | None:
+    if callable(value) and isinstance(label, str):
+        return Measure(label, "function", function=value)
+    if not isinstance(value, str) or not isinstance(label, str):
+        faults.append(f"outcome {label!r}: {value!r:.80} is neither a text such as 'max q1' nor a function")
+        return None
+    by_kind, at = _ASKED.fullmatch(value.strip()), _AT.fullmatch(value.strip())
+    match = by_kind or at
+    if match is None:
+        faults.append(f"outcome {value!r}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time")
+        return None
+    name, metadata = match["name"], module.metadata
+    known = [*metadata["x"], *metadata["inputs"], *(n for n, _ in metadata["outputs"]),
+             *(["energy"] if "energy" in metadata["functions"] else ()), *metadata["constraints"]]
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 3)
+        faults.append(f"outcome {value!r}: there is no {name!r}; "
+                      + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"))
+        return None
+    if by_kind is not None:
+        return Measure(label, by_kind["kind"], name)
+    try:
+        return Measure(label, "at", name, float(match["time"]))
+    except ValueError:
+        faults.append(f"outcome {value!r}: {match['time']!r} is not a time")
+        return None
+
+
+def output_times(t: Any, measures: Sequence[Measure], module: Module) -> np.ndarray:
+    """The times that motions are computed at: no more than the measures need.
+
+    t   as for `simulate`; the times of "at" are added to a pair (start, end)
+    Raises ArgumentError for times that do not fit.
+    """
+    t = (0.0, module.metadata["duration"]) if t is None else t
+    try:
+        times = np.array(t, dtype=float)
+    except (TypeError, ValueError):
+        times = np.zeros(0)
+    way = np.sign(times[-1] - times[0]) if times.ndim == 1 and len(times) > 1 else 0.0
+    if not (way and np.isfinite(times).all() and (np.diff(times) * way > 0).all()):
+        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of increasing or decreasing times, found {t!r:.80}")
+    special = [m.time for m in measures if m.kind == "at"]
+    outside = [f"{s:.6g}" for s in special if not min(times) <= s <= max(times)]
+    if outside:
+        raise ArgumentError(f"{module.name}: outcomes are asked for at {', '.join(outside)} s, outside of {times[0]:.6g} to "
+                            f"{times[-1]:.6g} s")
+    if isinstance(t, (tuple, list)) and len(t) == 2:
+        if not all(m.kind in OF_ONE_TIME for m in measures):
+            times = np.linspace(times[0], times[1], N_POINTS)
+        return np.unique(np.concatenate([times, special]))[::int(way)]
+    missing = [f"{s:.6g}" for s in special if np.abs(times - s).min() > 1e-9 * max(1.0, abs(s))]
+    if missing:
+        raise ArgumentError(f"{module.name}: outcomes are asked for at {', '.join(missing)} s, which t does not have")
+    return times

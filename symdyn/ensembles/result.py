@@ -1,0 +1,82 @@
+"""What an ensemble has computed."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symdyn.ensembles.archive import reading
+from symdyn.ensembles.store import RESULT, read_failures
+from symdyn.errors import ArgumentError
+
+
+class Ensemble:
+    """Outcomes of all members, in the order of the samples; arrays are read from the file when they are asked for.
+
+    path       the folder;  file: its ensemble.npz
+    names      what was sampled;  labels: outcomes
+    count      number of members;  n_failed: how many of them have no outcome
+    n_resumed  how many had been computed before;  seconds: wall time of the others
+    """
+
+    def __init__(self, path: Path, n_resumed: int = 0, seconds: float = 0.0) -> None:
+        self.path, self.file = path, path / RESULT
+        self.n_resumed, self.seconds = n_resumed, seconds
+        with reading(self.file) as archive:
+            about = json.loads(str(archive["about"]))
+            self.t: np.ndarray = archive["t"]
+            self.n_failed = int(archive["failed"].sum())
+        self.name: str = about["system"]
+        self.names: tuple[str, ...] = tuple(about["names"])
+        self.varied: tuple[str, ...] = tuple(about["varied"])
+        self.labels: tuple[str, ...] = tuple(about["outcomes"])
+        self.traces: tuple[str, ...] = tuple(about["traces"])
+        self.units: dict[str, str] = about["units"]
+        self.count: int = about["count"]
+
+    def __getitem__(self, name: Any) -> np.ndarray:
+        """An outcome, or values of what was sampled, (count, ...); not a number where a member failed.
+
+        Raises ArgumentError for an unknown name.
+        """
+        name = str(getattr(name, "name", name))
+        if name in self.labels:
+            with reading(self.file) as archive:
+                return archive[name]  # type: ignore[no-any-return]
+        if name in self.names:
+            return self.samples[:, self.names.index(name)]
+        near = difflib.get_close_matches(name, [*self.labels, *self.names], 3)
+        raise ArgumentError(f"{self.path} has no {name!r}; " + (f"did you mean {' or '.join(near)}?" if near else
+                            f"it has {', '.join([*self.labels, *self.names])}"))
+
+    @property
+    def samples(self) -> np.ndarray:
+        """What was sampled, (count, n_names)."""
+        with reading(self.file) as archive:
+            return archive["samples"]  # type: ignore[no-any-return]
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Which members failed, (count,) of bool."""
+        with reading(self.file) as archive:
+            return archive["failed"]  # type: ignore[no-any-return]
+
+    def failures(self, most: int | None = None) -> list[dict[str, Any]]:
+        """Members that failed, each with index, values and message; the first few, or all."""
+        return read_failures(self.path, most)
+
+    def plot(self, path: Any = None, scatter: Sequence[tuple[str, str]] | None = None) -> Any:
+        """Quantiles of every trace over time, and pairs of (sampled, outcome) as points; returns the matplotlib figure, and saves
+        it if a path is given. Raises MissingExtra without matplotlib, ArgumentError for unknown names."""
+        from symdyn.ensembles.picture import draw
+
+        return draw(self, path, scatter)
+
+    def __repr__(self) -> str:
+        failed = f", {self.n_failed} failed" if self.n_failed else ""
+        return f"<Ensemble of {self.name}: {self.count} members{failed}, {', '.join(self.labels)} in {self.file}>"
