@@ -46,6 +46,7 @@ class _Checker:
         self.known = {"ground": system.ground, **{b.name: b for b in system.bodies if isinstance(b.name, str)}}
         self.index = {id(system.ground): -1, **{id(b): k for k, b in enumerate(system.bodies)}}
         self.joints = list(dict.fromkeys(system.joints))
+        self.idle_ends = {id(j.child) for j in self.joints if isinstance(j, Modal) and not j.carries}
         self.loads = [self._at_com(load) for load in system.loads]
 
     def model(self) -> Model:
@@ -119,15 +120,14 @@ class _Checker:
 
     # -- tree
 
-    def _resolve(self, body: Any, where: str) -> int | None:
-        if isinstance(body, Body):
-            if id(body) in self.index:
-                return self.index[id(body)]
-            name, what = body.name, "is a body of another system"
-        else:
-            if isinstance(body, str) and body in self.known:
-                return self.index[id(self.known[body])]
-            name, what = body, "is no body of the system"
+    def _resolve(self, body: Any, where: str, carried: bool = True) -> int | None:
+        found = self.known.get(body) if isinstance(body, str) else body
+        if isinstance(found, Body) and id(found) in self.index:
+            if carried and id(found) in self.idle_ends:
+                self.faults.append(f"{where} is {found.name!r}, the free end of a flexible body, which was added with "
+                                   "carries=False and stays at the clamped end; leave carries out")
+            return self.index[id(found)]
+        name, what = (body.name, "is a body of another system") if isinstance(body, Body) else (body, "is no body of the system")
         self.faults.append(f"{where} is {name!r}, which {what}; bodies: {', '.join(self.known)}"
                            f"{self._nearest(name, self.known)}")
         return None
@@ -152,7 +152,7 @@ class _Checker:
             self.faults.append("the system has no bodies; add one with add_body and join it with add_joint")
         for joint in self.joints:
             parent = self._resolve(joint.parent, f"joint {joint.name!r}: parent")
-            child = self._resolve(joint.child, f"joint {joint.name!r}: child")
+            child = self._resolve(joint.child, f"joint {joint.name!r}: child", not isinstance(joint, Modal))
             if parent is None or child is None:
                 doubtful.update(range(len(s.bodies)) if child is None else {child})
             elif child == -1:

@@ -324,7 +324,7 @@ class System:
         place in it. Returns the path.
 
         Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a
-        file that cannot be written.
+        file that cannot be written; ArgumentError for a path that is none.
         """
         from symdyn.urdf.write import write_urdf
 

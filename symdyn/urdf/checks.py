@@ -33,7 +33,8 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
     while waiting:
         order.append(waiting.pop())
         waiting += hanging.get(order[-1].child, [])[::-1]
-    looped = [joint for joint in carrying.values() if joint not in order and joint.parent in robot.links]
+    placed = {joint.name for joint in order}
+    looped = [joint for joint in carrying.values() if joint.name not in placed and joint.parent in robot.links]
     if looped:
         names = ", ".join(f"{joint.name!r} (line {joint.line})" for joint in looped)
         faults.at(looped[0].line, f"joints {names} hang on each other in a loop; a URDF is a tree that begins at one link")
@@ -41,12 +42,12 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
 
 
 def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str, tuple[str, float, float]]:
-    """For each joint that mimics: the joint whose coordinate q it follows in the end, "" if that is held; its coordinate is
-    multiplier q + offset."""
+    """For each joint that mimics: the joint whose coordinate q it follows in the end, "" if that does not move it; its
+    coordinate is multiplier q + offset. Joints that are held are at zero, and follow none."""
     found: dict[str, tuple[str, float, float]] = {}
     for joint in robot.joints.values():
         source, multiplier, offset, passed = joint, 1.0, 0.0, [joint.name]
-        while source.mimic is not None:
+        while source.mimic is not None and source.name not in held:
             mimic = source.mimic
             following = robot.joints.get(mimic.joint)
             offset += multiplier * mimic.offset
@@ -68,7 +69,7 @@ def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str
                 break
             source = following
             passed.append(source.name)
-        if joint.mimic is not None:
-            idle = source.kind == "fixed" or source.name in held
+        if joint.mimic is not None and joint.name not in held:
+            idle = source.kind == "fixed" or source.name in held or multiplier == 0
             found[joint.name] = ("" if idle else source.name, multiplier, offset)
     return found

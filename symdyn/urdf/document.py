@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
-from symdyn.errors import MissingExtra, ModelError
+from symdyn.errors import ArgumentError, MissingExtra, ModelError
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,13 @@ class _Builder:
 
     def close(self) -> Element | None:
         return self.root
+
+
+def as_path(path: Any) -> Path:
+    """A path given as text or Path. Raises ArgumentError for anything else."""
+    if not isinstance(path, (str, Path)) or "\0" in str(path):
+        raise ArgumentError(f"the path is {path!r}; pass that of a URDF file, as text or a Path")
+    return Path(path)
 
 
 def read_document(path: Path) -> Element:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from symdyn.urdf.angles import rotation
@@ -20,19 +22,24 @@ def demand_inertia(robot: Robot, order: list[UrdfJoint], moving: dict[str, str],
     moving   joint -> the joint whose coordinate moves it; those that are not in it are fixed
     """
     _demand_definite(robot, faults)
-    carried = {joint.child: joint for joint in order}
+    movers = _movers(order, moving)
     borne: dict[str, float] = {}
     further: set[str] = set()
-    for link in robot.links.values():
-        mover, R, p = _mover(link.name, carried, moving)
-        if mover is None or link.inertial is None or link.inertial.nothing:
+    # From the leaves inwards: what has mass tells the joint that carries it, and that one the next.
+    heavy: set[str] = set()
+    for link in (robot.links[joint.child] for joint in reversed(order)):
+        mover = movers.get(link.name)
+        if mover is None:
             continue
-        leader = moving[mover.name]
-        borne[leader] = borne.get(leader, 0.0) + _along(mover, link.inertial, R, p)
-        inner, _, _ = _mover(mover.parent, carried, moving)
-        while inner is not None:
-            further.add(moving[inner.name])
-            inner, _, _ = _mover(inner.parent, carried, moving)
+        leader = moving[mover.joint.name]
+        inertial = link.inertial
+        if inertial is not None and not inertial.nothing:
+            borne[leader] = borne.get(leader, 0.0) + _along(mover, inertial)
+            heavy.add(mover.joint.name)
+        inner = movers.get(mover.joint.parent)
+        if mover.joint.name in heavy and inner is not None:
+            heavy.add(inner.joint.name)
+            further.add(moving[inner.joint.name])
     for joint in order:
         if moving.get(joint.name) == joint.name and joint.name not in further and not borne.get(joint.name, 0.0) > 0:
             child = robot.links[joint.child]
@@ -53,31 +60,42 @@ def _demand_definite(robot: Robot, faults: FileFaults) -> None:
                                               "is negative; give the inertia about the centre of mass")
 
 
-def _mover(name: str, carried: dict[str, UrdfJoint], moving: dict[str, str]) -> tuple[UrdfJoint | None, np.ndarray, np.ndarray]:
+class _Mover(NamedTuple):
     """The joint that a link moves with, and the link's frame in that joint's: R (3, 3) and p (3,), m."""
-    R, p = np.eye(3), np.zeros(3)
-    while name in carried:
-        joint = carried[name]
+
+    joint: UrdfJoint
+    R: np.ndarray
+    p: np.ndarray
+
+
+def _movers(order: list[UrdfJoint], moving: dict[str, str]) -> dict[str, _Mover]:
+    """The mover of each link that moves."""
+    found: dict[str, _Mover] = {}
+    for joint in order:
+        before = found.get(joint.parent)
         if joint.name in moving:
-            return joint, R, p
-        turn, shift = place(joint.origin)
-        R, p = turn @ R, shift + turn @ p
-        name = joint.parent
-    return None, R, p
+            found[joint.child] = _Mover(joint, np.eye(3), np.zeros(3))
+        elif before is not None:
+            turn, shift = place(joint.origin)
+            found[joint.child] = _Mover(before.joint, before.R @ turn, before.p + before.R @ shift)
+    return found
 
 
-def _along(joint: UrdfJoint, inertial: Inertial, R: np.ndarray, p: np.ndarray) -> float:
-    """Inertia of a link that a joint moves along it: kg for a prismatic one, else kg m^2; R, p: the link's frame in it."""
+def _along(mover: _Mover, inertial: Inertial) -> float:
+    """Inertia of a link along the joint that moves it: kg for a prismatic one, else kg m^2."""
+    joint = mover.joint
     if TYPES[joint.kind] != 1:
         return 0.0 if inertial.nothing else 1.0
     if joint.kind == "prismatic":
         return inertial.mass
     turn, shift = place(inertial.origin)
     axis = np.array(joint.axis)
-    arm = np.cross(axis, p + R @ shift)
-    across = (R @ turn).T @ axis
+    center = mover.p + mover.R @ shift
+    arm = np.cross(axis, center)
+    across = (mover.R @ turn).T @ axis
     found = inertial.mass * (arm @ arm) + across @ tensor(inertial) @ across
-    return float(found) if found > _NONE * (np.abs(inertial.inertia).max() + inertial.mass * (shift @ shift)) else 0.0
+    least = _NONE * (np.abs(inertial.inertia).max() + inertial.mass * (center @ center))
+    return float(found) if found > least else 0.0
 
 
 def negligible(robot: Robot) -> float:

@@ -21,7 +21,7 @@ from symdyn.model.symbols import Coordinate, coordinates
 from symdyn.model.system import System
 from symdyn.urdf.angles import rotation
 from symdyn.urdf.checks import mimicked, outwards
-from symdyn.urdf.document import read_document
+from symdyn.urdf.document import as_path, read_document
 from symdyn.urdf.inertias import demand_inertia, negligible, tensor
 from symdyn.urdf.parameters import Names, Parameters, plain
 from symdyn.urdf.parse import parse
@@ -43,20 +43,20 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
                velocity of its origin and its angular velocity in its own axes
     name       of the system; default: the file's name of the robot
     fixed      names of joints, with * and ?, that are held where their coordinate is zero
-    damping    whether joints have the viscous damping of <dynamics>
+    damping    whether joints with one coordinate of their own have the viscous damping of <dynamics>
 
     Bodies are the links, with the links' frames. A joint's coordinate is q_JOINT (planar: x_, y_, theta_JOINT; floating: x_,
     y_, z_, e0_ ... e3_JOINT), where every character that no symbol has is an underscore. A joint that mimics another has no
     coordinate, but multiplier q + offset in terms of the other's; the drive of q then moves both. A link without <inertial> has
     no mass. Friction, limits, drives, meshes and whatever else is in the file are not looked at, nor are files it refers to.
 
-    Raises ModelError that tells every fault of the file with its line; ArgumentError for an unknown root and for names that are
-    none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
+    Raises ModelError that tells every fault of the file with its line; ArgumentError for an unknown root, and for a path and
+    names that are none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
     """
     patterns, held = _patterns(symbolic, "symbolic"), _patterns(fixed, "fixed")
     if root not in ROOTS:
         raise ArgumentError(f"root is {root!r}; pass 'fixed' or 'floating'")
-    path = Path(path)
+    path = as_path(path)
     document = read_document(path)
     faults = FileFaults(path)
     robot = parse(document, faults)
@@ -105,6 +105,7 @@ class _Builder:
         self.names = Names()
         self.parameters = Parameters(patterns, self.names)
         self.damping = damping
+        self.negligible = negligible(robot)
         self.built = System(name)
         self.bodies: dict[str, Body] = {}
         self.coordinates: dict[str, Coordinate] = {}
@@ -143,7 +144,7 @@ class _Builder:
         mass = take("m", name, inertial.mass)
         com = [take(f"c_{axis}", name, value) for axis, value in zip("xyz", inertial.origin.xyz)]
         I = tensor(inertial)
-        if np.abs(I).max() <= negligible(self.robot):
+        if np.abs(I).max() <= self.negligible:
             I = np.zeros((3, 3))
         if inertial.origin.rpy != ZERO:
             R = np.array(rotation(inertial.origin.rpy))
@@ -166,7 +167,7 @@ class _Builder:
         rows = rotation(at.rpy)
         point = [self.parameters.take(f"p_{axis}", joint.name, value) for axis, value in zip("xyz", at.xyz)]
         if joint.name not in moving:
-            offset = following[joint.name][2] if joint.name in following and joint.kind != "fixed" else 0.0
+            _, _, offset = following.get(joint.name, ("", 0.0, 0.0))
             return self._held(joint, name, child, point, offset)
         placed: dict[str, Any] = {"parent_point": point, "parent_rotation": _matrix(rows)}
         if joint.kind == "floating":

@@ -17,6 +17,7 @@ from symdyn.model.loads import JointForce
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, Input
 from symdyn.urdf.angles import angles
+from symdyn.urdf.document import as_path
 from symdyn.urdf.parameters import Names
 
 # What limits are where a type of joint must have some, m or rad, N or N m, m/s or rad/s.
@@ -33,8 +34,9 @@ def urdf_text(model: Model) -> str:
 
 
 def write_urdf(model: Model, path: str | Path) -> Path:
-    """Write `urdf_text` to a file; returns its path. Raises ModelError as that does, and where the file cannot be written."""
-    text, path = urdf_text(model), Path(path)
+    """Write `urdf_text` to a file; returns its path. Raises ModelError as that does, and where the file cannot be written,
+    ArgumentError for a path that is none."""
+    text, path = urdf_text(model), as_path(path)
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:

@@ -100,6 +100,12 @@ def test_joints_that_are_held(tmp_path: Path) -> None:
     shifted = ALL.replace('<mimic joint="push"/>', '<mimic joint="push" offset="0.2"/>')
     close = {j.name: j for j in read(tmp_path, shifted, fixed="push").joints}["close"]
     assert list(close.parent_point) == [0, 0, sp.Float(0.2)]
+    # A joint that is held follows no other; one that follows with the factor zero stays at its offset.
+    grip = {j.name: j for j in read(tmp_path, ALL, fixed="grip").joints}["grip"]
+    np.testing.assert_allclose(np.array(grip.parent_rotation, dtype=float), np.array(sd.rotation.about("Y", 0.5)), atol=1e-15)
+    still = ALL.replace('multiplier="-0.5"', 'multiplier="0"')
+    grip = {j.name: j for j in read(tmp_path, still).joints}["grip"]
+    np.testing.assert_allclose(np.array(grip.parent_rotation, dtype=float), R, atol=1e-15)
     with pytest.raises(ModelError, match=r"fixed has 'push1', which fits no joint of the file; did you mean 'push'"):
         read(tmp_path, ALL, fixed="push1")
 
@@ -252,7 +258,8 @@ def test_what_carries_something_needs_no_inertia_of_its_own(tmp_path: Path) -> N
 def test_masses_that_no_body_has(tmp_path: Path) -> None:
     wrong = ['<inertial><mass value="-1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>',
              BALL.replace('ixy="0"', 'ixy="0.3"'), BALL.replace(' izz="0.1"', "")]
-    text = pendulum(*[link(f"l{k}", w) for k, w in enumerate(wrong)], *[joint(f"j{k}", "fixed", "bar", f"l{k}") for k in range(3)])
+    links, joints = [link(f"l{k}", w) for k, w in enumerate(wrong)], [joint(f"j{k}", "fixed", "bar", f"l{k}") for k in range(3)]
+    text = pendulum(*links, *joints)
     assert faults(tmp_path, text) == ["5: link 'l0' has the mass -1.0 kg; give zero or a positive mass",
                                       "7: link 'l2': <inertia> has no izz; give it a number"]
     assert faults(tmp_path, text.replace('"-1"', '"1"').replace(wrong[2], BALL)) == [
@@ -300,6 +307,9 @@ def test_files_that_are_not_there(tmp_path: Path) -> None:
 
 
 def test_options_that_are_none(tmp_path: Path) -> None:
+    for path in (7, b"robot.urdf", "a\0b"):
+        with pytest.raises(ArgumentError, match=r"the path is .*; pass that of a URDF file, as text or a Path"):
+            sd.read_urdf(path)
     with pytest.raises(ArgumentError, match="root is 'free'; pass 'fixed' or 'floating'"):
         read(tmp_path, ALL, root="free")
     with pytest.raises(ArgumentError, match=r"symbolic is \[1\]; pass names as text"):

@@ -102,9 +102,13 @@ def test_a_tilt_that_its_cosine_does_not_show(tmp_path: Path) -> None:
 def test_a_robot_with_inertias_of_no_body(folder: Path) -> None:
     with pytest.raises(ModelError) as raised:
         sd.read_urdf(folder / "romeo_description/urdf/romeo_laas_small.urdf")
-    assert len(raised.value.faults) == 5
-    assert all(re.search(r"small\.urdf:\d+: link '\w+': its inertia has the principal moments \[-0\.", f)
-               for f in raised.value.faults)
+    found = [re.sub(r"^.*small\.urdf:(\d+: link '\w+': its inertia).*$", r"\1", f) for f in raised.value.faults]
+    assert found[:3] == [f"328: {link_of('body')}", f"359: {link_of('LHipPitch_link')}", f"431: {link_of('RHipPitch_link')}"]
+    assert len(found) == 5
+
+
+def link_of(name: str) -> str:
+    return f"link {name!r}: its inertia"
 
 
 def test_a_robot_with_joints_that_move_nothing(folder: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import symdyn as sd
 from symdyn.bench.robots import collection
-from symdyn.errors import MissingExtra, ModelError
+from symdyn.errors import ArgumentError, MissingExtra, ModelError
 from symdyn.urdf.angles import angles, rotation
 from tests.urdf.texts import ALL, saved
 
@@ -122,6 +122,11 @@ def test_written_angles_of_any_rotation(rpy: tuple[float, float, float]) -> None
 
 
 # -- what a URDF has no words for
+
+
+def test_a_path_that_is_none() -> None:
+    with pytest.raises(ArgumentError, match="the path is 7; pass that of a URDF file"):
+        branching().to_urdf(7)
 
 
 def fault_of(change: Callable[[sd.System], object]) -> str:

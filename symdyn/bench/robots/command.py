@@ -98,7 +98,7 @@ def measure(robot: Listed, states: int = STATES, aba: PinocchioAba | None = None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; 1 if a robot could not be compared or differs by more than AGREEMENT."""
+    """Print the table; 1 if a robot could not be compared or differs by more than AGREEMENT, 2 if there is none."""
     parser = argparse.ArgumentParser(prog="python -m symdyn.bench.robots", description=__doc__)
     parser.add_argument("robots", nargs="*", default=["*"], help="names, with * and ?; default: all")
     parser.add_argument("--states", type=int, default=STATES, help=f"random states of each robot (default {STATES})")
@@ -107,6 +107,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = [r for r in ROBOTS if any(fnmatchcase(r.name, p) for p in options.robots)]
     if not chosen:
         print(f"no robot is named {', '.join(options.robots)}; there are {', '.join(r.name for r in ROBOTS)}", file=sys.stderr)
+        return 2
+    try:
+        folder()
+    except SymdynError as error:
+        print(error, file=sys.stderr)
         return 2
     aba, failed = None, 0
     if not options.no_times:

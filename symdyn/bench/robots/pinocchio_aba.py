@@ -14,6 +14,8 @@ from symdyn.bench.robots.pinocchio_robot import PinocchioRobot
 from symdyn.errors import SymdynError
 
 _ERROR_SIZE = 1000
+# Rounding times the condition numbers of mass matrices; a wrong model differs by far more.
+_AGREEMENT = 1e-7
 
 
 class PinocchioAba:
@@ -38,6 +40,11 @@ class PinocchioAba:
         def run(n: int) -> None:
             self.library.robot_loop(opened, ctypes.c_long(n), place, address(at), address(v), address(out))
 
+        run(1)
+        wanted = robot.pin.aba(robot.model, robot.data, at, v, np.zeros(len(v)))
+        if not np.linalg.norm(out - wanted) <= _AGREEMENT * np.linalg.norm(wanted):
+            raise SymdynError(f"the model that was given to C++ is not the robot's: it accelerates by {out}, "
+                              f"Pinocchio's by {wanted}")
         return run
 
     def operations(self, robot: PinocchioRobot, q: np.ndarray, u: np.ndarray) -> int:
