@@ -25,7 +25,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import sympy as sp
-from IPython.display import HTML, Image, Math, display
+from IPython.display import Image, Math, display
 from scipy.spatial.transform import Rotation
 from sympy import latex
 
@@ -38,7 +38,8 @@ from symdyn.systems.turbine_parts import blade_beam
 # ### A small one first
 #
 # Three coordinates are enough to see what is special about a turbine: the pitch $\theta$ of the platform, the yaw $\psi_N$ of the
-# nacelle and the azimuth $\phi_H$ of the rotor, at the height $h$ on the tower. The rotor is alike about all axes across its shaft.
+# nacelle and the azimuth $\phi_H$ of the rotor, at the height $h$ on the tower. The rotor is alike about all axes across its
+# shaft.
 
 # %%
 theta, yaw, azimuth = sd.coordinates("theta psi_N phi_H")
@@ -127,6 +128,19 @@ S_2, S_3 = (recursive.link(k).S for k in (2, 3))
 display(Math(rf"\mathbf S_2^T = {latex(S_2.T)} \qquad \mathbf S_3^T = {latex(S_3.T)}"))
 
 # %% [markdown]
+# For the platform, with $\mathbf r_{G/O} = [0, 0, z_P]$ in its own axes, the rows of $\mathbf J$ are
+#
+# $$\mathbf J_P = \begin{bmatrix} \mathbf 1 & -[\mathbf R\, \mathbf r_{G/O}\, \times]\, \mathbf G \\
+# \mathbf 0 & \mathbf G \end{bmatrix}$$
+
+# %%
+angles = [psi, theta, phi]
+G = sd.rotation.euler_rates("ZYX", angles, frame="n")
+arm = sd.rotation.from_euler("ZYX", angles) * sp.Matrix([0, 0, z_P])
+J_P = sp.Matrix(sp.BlockMatrix([[sp.eye(3), -sd.rotation.skew(list(arm)) * G], [sp.zeros(3), G]]))
+display(Math(rf"\mathbf G = {latex(G)}"))
+
+# %% [markdown]
 # They have to agree. 200 random states: angles up to 60°, speeds up to 1 rad/s and 1 m/s, a wind of 10 m/s. From
 # $\mathbf q, \dot{\mathbf q}$ follow the places and velocities of the bodies, and from these the coordinates of the other forms.
 
@@ -152,6 +166,10 @@ states = {
     "recursive, quasi-velocities": np.hstack([q[:, :3], e[:, 0], q[:, 6:],
                                               np.einsum("nji,nj->ni", R[:, 0], u[:, :3]), omega[:, 0], u[:, 6:]]),
 }
+J = modules["embedding"].J(q[0])[:6, :6]
+J_0 = np.array(J_P.subs({**dict(zip(angles, q[0, 3:6])), z_P: -0.3}), dtype=float)
+print(f"J of the platform: largest difference {abs(J - J_0).max():.0e}")
+
 found = {name: module.outputs(np.zeros(n), states[name], inputs=[10.0])["acceleration"] for name, module in modules.items()}
 largest = np.linalg.norm(found["embedding"], axis=1)
 for name, acceleration in found.items():
@@ -181,13 +199,14 @@ floating = system.embedding().compile()
 print(", ".join(floating.metadata["q"]))
 print("inputs:", ", ".join(floating.metadata["inputs"]))
 masses = {body.name: float(body.mass.subs(system.defaults)) for body in system.check().bodies}
-print(", ".join(f"{name} {mass / 1000:.1f} t" for name, mass in masses.items()), f"; sum {sum(masses.values()) / 1000:.1f} t")
+print(", ".join(f"{name} {mass / 1000:.1f} t" for name, mass in masses.items()))
+print(f"together {sum(masses.values()) / 1000:.1f} t")
 
 # %% [markdown]
 # ## 4. Hydrostatics
 #
-# The hull is a box that the water plane cuts. Volume and centre of buoyancy of the wet part are exact at any draft, heel and trim,
-# capsized too. First the hull alone, with the mass and the centre of mass of the whole turbine.
+# The hull is a box that the water plane cuts. Volume and centre of buoyancy of the wet part are exact at any draft, heel and
+# trim, capsized too. First the hull alone, with the mass and the centre of mass of the whole turbine.
 
 # %%
 centers = floating.evaluate("positions", 0, np.zeros(16)).reshape(-1, 3)
@@ -252,8 +271,8 @@ print(rest)
 print(f"draft: {4 - rest['z']:.3f} m")
 
 # %% [markdown]
-# The barge floats 14 cm deeper than by its weight alone: the lines pull it down. It leans by a twentieth of a degree towards the rotor, which
-# hangs upwind of the tower.
+# The barge floats 14 cm deeper than by its weight alone: the lines pull it down. It leans by a twentieth of a degree towards the
+# rotor, which hangs upwind of the tower.
 #
 # ### Several equilibria
 #
@@ -268,11 +287,16 @@ assert len(several.stable) == 1
 
 # %% [markdown]
 # One is stable. The unstable ones are the crests that separate floating from capsizing: a little less, and the turbine comes
-# back; a little more, and it goes over. The stable one on the other side has to be looked for there.
+# back; a little more, and it goes over. The crest straight ahead, in pitch, lies near the angle at which the righting arm of the
+# hull alone vanishes; the lines have a part in it here. The stable equilibrium on the other side has to be looked for there.
 
 # %%
+crest = floating.equilibrium(fixed=kept, start={"theta": 1.1})
+print(f"crest in pitch at {np.degrees(crest['theta']):.1f} degrees, stable: {crest.stable}; hull alone {vanishing:.1f} degrees")
 capsized = floating.equilibrium(fixed=kept, start={"phi": 3.1, "z": 2.0})
-print(capsized)
+print(f"capsized: roll {np.degrees(capsized['phi']):.1f} degrees, deck {6 - capsized['z']:.2f} m under water, "
+      f"stable: {capsized.stable}")
+assert not crest.stable and capsized.stable
 
 # %% [markdown]
 # ### Ballast
@@ -286,7 +310,7 @@ for wind in (0.0, 5.0, 10.0):
     leaning = floating.equilibrium(fixed=kept, inputs={"v_w": wind})
     upright = floating.equilibrium(free=["x", "y", "z", "psi", "theta", "phi", x_b], fixed={**kept, "theta": 0.0},
                                    params={m_b: 4e5}, inputs={"v_w": wind})
-    print(f"{wind:4.0f} m/s{np.degrees(leaning['theta']):12.3f} deg{upright['x_b']:8.2f} m{upright['x']:8.2f} m"
+    print(f"{wind:4.0f} m/s{np.degrees(leaning['theta']):12.3f} deg{upright['x_b']:8.2f} m{round(upright['x'], 2) + 0.0:8.2f} m"
           f"{4 - upright['z']:8.3f} m")
 
 # %% [markdown]
@@ -311,8 +335,8 @@ print(modes)
 # ### The same from a free decay
 #
 # The nonlinear model starts 1 cm or 0.01 rad off its rest, along one mode after the other. The time between passages through rest
-# is the period. Nothing holds its rotor, so that it is compared with the modes in which the rotor is free: in roll it stays behind,
-# and the period is a little shorter than above.
+# is the period. Nothing holds its rotor, so that it is compared with the modes in which the rotor is free: in roll it stays
+# behind, and the period is a little shorter than above.
 
 # %%
 names = floating.metadata["q"]
@@ -334,21 +358,37 @@ for mode in floating.linearize(rest.x).modes():
 # %% [markdown]
 # ### What changes a period
 #
-# The derivative of a frequency by any parameter is exact, and counts that the equilibrium moves with it.
+# The derivative of a frequency by any parameter is exact, and counts that the equilibrium moves with it. Beside it stands the
+# difference quotient of two equilibria and their modes.
 
 # %%
-print(f"{'d (pitch period) by':28}{'derivative':>14}{'of 1 % more':>14}")
 pitch = modes["theta"]
+
+
+def pitch_period(**params):
+    return floating.linearize(floating.equilibrium(fixed=kept, params=params, start=rest)).modes()["theta"].period
+
+
+print(f"{'pitch period by':20}{'derivative':>14}{'quotient':>14}{'of 1 % more':>15}")
 for name in ("m_N", "h_T", "A_pitch", "L_h", "m_P"):
     slope = -linear.derivative("theta", name).damped_frequency * pitch.period**2
-    print(f"{name:28}{slope:14.4g}{slope * 0.01 * rest[name]:12.4f} s")
+    value, change = rest[name], 1e-4 * rest[name]
+    quotient = (pitch_period(**{name: value + change}) - pitch_period(**{name: value - change})) / (2 * change)
+    print(f"{name:20}{slope:14.6g}{quotient:14.6g}{slope * 0.01 * value:13.4f} s")
+    assert abs(quotient / slope - 1) < 1e-4
+
+# %% [markdown]
+# The length of the hull $L_h$ does most: with it grow the second moment of the water plane, and the pitch stiffness. (Its added
+# mass is a parameter of its own here.)
+
 # %% [markdown]
 # ## 7. Motion
 #
 # The rotor starts by the torque of the wind, which falls as it gets faster, against the torque of the generator, which grows.
 #
 # Every run integrates the work of its loads along with the motion: of wind, drives and damping. What is left of input −
-# dissipation − change of energy, relative to the energy that is exchanged, is the error of the run.
+# dissipation − change of energy, relative to the kinetic energy or the range of the potential energy, whichever is larger, is the
+# error of the run.
 
 # %%
 RATED = 12.1 * np.pi / 30  # rad/s, of the rotor
@@ -401,7 +441,7 @@ plt.show()
 # %% [markdown]
 # The start-up shows two things beside the rotor. The wind takes the platform along and lets it pitch. The generator's torque
 # goes from the rotor through the tower to the platform, which rolls a little. In the thrust step the pitch overshoots within
-# seconds, the surge within minutes.
+# seconds, the surge within a minute.
 
 # %%
 heights = [float(e) for e in np.degrees([step["theta"].max(), step["theta"][-1]])]
@@ -418,8 +458,9 @@ print(f"start-up: roll at the end {np.degrees(start['phi'][-1]):.3f} degrees, at
 # \mathbf j$: the moment is along $-y$, the pitch is negative, and the turbine leans against the wind. That is the sign of the
 # term of section 1. When the nacelle has turned, $\mathbf e = [\cos\psi_N, \sin\psi_N, 0]$ gives a moment $+\sin\psi_N$ in roll.
 #
-# The nacelle turns by 45° at 0.5° per second, begun and ended gently, with the rotor spinning and with the rotor at rest. The
-# difference is the gyroscopic effect. Divided by the stiffness of section 6 the moment gives the angles at which it is in balance.
+# The nacelle turns by 37.5° at 0.5° per second, begun and ended gently, with the rotor spinning and with the rotor at rest. The
+# difference is the gyroscopic effect. Divided by the stiffness of section 6 the moment gives the angles at which it is in
+# balance.
 
 # %%
 rate = np.radians(0.5)
@@ -430,17 +471,17 @@ def gently(t, begin, end):
     return np.clip(t - begin, 0, end - begin)**2 / (2 * (end - begin)) + np.maximum(t - end, 0)
 
 
-turn = {"yaw_c": lambda t, x: rate * (gently(t, 10, 30) - gently(t, 100, 120))}
-t = np.linspace(0, 140, 281)
+turn = {"yaw_c": lambda t, x: rate * (gently(t, 10, 25) - gently(t, 85, 100))}
+t = np.linspace(0, 120, 241)
 spinning, resting = (floating.simulate(t, rest.q, {"azimuth_dot": omega}, inputs=turn, work=True, rtol=1e-9)
                      for omega in (RATED, 0.0))
 for motion in (spinning, resting):
     assert motion.energy_error() < 1e-8
 I_shaft = floating.linearize(rest.x).M[-1, -1]
-moment = I_shaft * RATED * rate * np.interp(t, [10, 30, 100, 120], [0, 1, 1, 0])
+moment = I_shaft * RATED * rate * np.interp(t, [10, 25, 85, 100], [0, 1, 1, 0])
 places = {name: linear.coordinates.index(name) for name in ("theta", "phi")}
 expected = {"theta": -moment * np.cos(spinning["yaw"]), "phi": moment * np.sin(spinning["yaw"])}
-turning = (t > 30) & (t < 100)
+turning = (t > 25) & (t < 85)
 print(f"I_x = {I_shaft:.4g} kg m^2, moment {moment[turning].mean() / 1000:.0f} kN m; "
       f"energy balances {spinning.energy_error():.0e} and {resting.energy_error():.0e}")
 
@@ -450,7 +491,7 @@ for name, label in (("theta", "pitch"), ("phi", "roll")):
     balance = np.degrees(expected[name] / linear.K[places[name], places[name]])
     line, = axes.plot(t, 1000 * difference, label=label)
     axes.plot(t, 1000 * balance, "--", color=line.get_color(), linewidth=1, label=f"{label}, in balance")
-    print(f"{label}: {1000 * difference[turning].mean():.1f} mdeg on the average from 30 s to 100 s, expected "
+    print(f"{label}: {1000 * difference[turning].mean():.1f} mdeg on the average from 25 s to 85 s, expected "
           f"{1000 * balance[turning].mean():.1f} mdeg")
 axes.set(xlabel="time, s", ylabel="spinning less resting, mdeg")
 axes.grid(color="0.9")
@@ -470,7 +511,8 @@ runs["pitch"].picture([0, 0.5 * pitch.period], view=(12, -65))
 # %%
 with tempfile.TemporaryDirectory() as folder:
     film = Path(folder) / "turbine.gif"
-    floating.simulate((0, 12), rest.q + [0, 0, 1, 0, np.radians(5), 0, 0, 0], {"azimuth_dot": RATED}).animate(film, fps=4, speed=2)
+    swaying = floating.simulate((0, 12), rest.q + [0, 0, 1, 0, np.radians(5), 0, 0, 0], {"azimuth_dot": RATED})
+    swaying.animate(film, fps=4, speed=2)
     display(Image(data=film.read_bytes(), format="gif"))
 
 # %% [markdown]
@@ -480,6 +522,7 @@ with tempfile.TemporaryDirectory() as folder:
 with tempfile.TemporaryDirectory() as folder:
     page = step.report(Path(folder) / "thrust_step.html").read_text(encoding="utf-8")
 print(f"{len(page) / 1000:.0f} kB")
+
 # %% [markdown]
 # ## 8. Flexible tower and blades
 #
@@ -491,13 +534,14 @@ print(f"{len(page) / 1000:.0f} kB")
 flexible = sd.systems.floating_wind_turbine(flexible=True).embedding().compile()
 bent = flexible.equilibrium(fixed=kept)
 elastic = flexible.linearize(bent)
-print(f"pitch {np.degrees(bent['theta']):.4f} degrees; tower top {1000 * bent['tower_fa1']:.1f} mm towards the rotor in its "
-      f"first mode; tip of the level blades {bent['blade2_edge1']:.2f} m and {bent['blade3_edge1']:.2f} m edgewise")
+print(f"pitch {np.degrees(bent['theta']):.4f} degrees")
+print(f"tower top in its first mode {1000 * bent['tower_fa1']:.1f} mm along x, towards the rotor")
+print(f"tips of the two lower blades in their first edgewise mode {bent['blade2_edge1']:.2f} m and {bent['blade3_edge1']:.2f} m")
 print(elastic.modes())
 
 # %% [markdown]
-# Surge, sway, yaw and heave stay. Pitch and roll take longer than the rigid ones of section 6: the tower gives way. With tower and
-# blades made stiffer by a factor the flexible turbine goes over into the rigid one. The blades of the table are 0.7 % lighter
+# Surge, sway, yaw and heave stay. Pitch and roll take longer than the rigid ones of section 6: the tower gives way. With tower
+# and blades made stiffer by a factor the flexible turbine goes over into the rigid one. The blades of the table are 0.7 % lighter
 # than the sums which the reference code makes of it and the rigid turbine has, and so the rigid one gets their mass, centre and
 # inertia here.
 
@@ -505,6 +549,7 @@ print(elastic.modes())
 blade = blade_beam().modal
 z_B = blade.h0[2] / blade.m
 same_blade = {"m_B": blade.m, "z_B": z_B, "I_B": blade.I0[0, 0] - blade.m * z_B**2}
+print(f"a blade of the table: {blade.m:.0f} kg, of the rigid turbine: {rest['m_B']:.0f} kg")
 rigid = floating.linearize(floating.equilibrium(fixed=kept, params=same_blade)).modes()["theta"].period
 print(f"{'stiffness':>10}{'pitch period':>16}{'less the rigid one':>22}")
 for factor in (1.0, 10.0, 100.0, 1e4, 1e6):
@@ -540,7 +585,7 @@ print(f"3P meets the tower fore and aft at {elastic.modes()['tower_fa1'].frequen
 windy = flexible.equilibrium(fixed=kept, inputs={"v_w": 10.0}, start=bent)
 stiffer = floating.equilibrium(fixed=kept, inputs={"v_w": 10.0})
 print(f"pitch {np.degrees(windy['theta']):.3f} degrees (rigid {np.degrees(stiffer['theta']):.3f}); the tower's top is "
-      f"{windy['tower_fa1']:.3f} m off the straight tower, and {87.6 * np.sin(windy['theta']):.2f} m off the vertical by the pitch")
+      f"{windy['tower_fa1']:.3f} m off the straight tower, and {87.6 * np.sin(windy['theta']):.2f} m off the vertical")
 
 # %% [markdown]
 # ## 9. Campbell diagram
@@ -554,9 +599,9 @@ diagram = flexible.campbell("azimuth_dot", np.linspace(0.1, 1.4, 14), blades=gro
 diagram.plot(highest=1.5)
 
 # %% [markdown]
-# The modes of the platform lie at the bottom, far from the rotor's. The first flapwise mode splits in two that whirl, one with the
-# rotor and one against it; seen from the nacelle they are apart by about twice the speed of the rotor. Where a line of 1P, 3P or
-# 6P meets a mode the rotor shakes it.
+# The modes of the platform lie at the bottom, far from the rotor's. The first flapwise mode splits in two that whirl, one with
+# the rotor and one against it; seen from the nacelle they are apart by about twice the speed of the rotor. Where a line of 1P, 3P
+# or 6P meets a mode the rotor shakes it.
 
 # %%
 last = diagram.modes[-1]
@@ -577,10 +622,12 @@ held = {"x": 0, "y": 0, "psi": 0}
 before = ashore.equilibrium(fixed=held)
 lifted = crane.equilibrium(fixed=held)
 upright = crane.equilibrium(free=["z", "theta", "phi", "alpha", "beta", "m_x"], fixed={**held, "phi": 0.0})
-for title, module, state in (("before lifting", ashore, before), ("lifted", crane, lifted), ("lifted, with ballast", crane, upright)):
+for title, module, state in (("before lifting", ashore, before), ("lifted", crane, lifted),
+                             ("lifted, with ballast", crane, upright)):
     told = module.outputs(0, state.x, params=state.params)
     print(f"{title:22} draft {told['draft']:.3f} m, heel {told['heel_deg']:6.3f} degrees")
-print(f"ballast moved: {upright['m_x'] / 1000:.0f} t")
+print(f"ballast moved: {upright['m_x'] / 1000:.1f} t; by moments 2 m_x y_b = m_c |y_t|: "
+      f"{-upright['m_c'] * upright['y_t'] / (2 * upright['y_b']) / 1000:.1f} t")
 
 # %% [markdown]
 # ## 11. The slides, formula by formula

@@ -6,13 +6,12 @@ a processor takes for its steps in their order (symdyn.tape.cycles), how many th
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
 from symdyn.formulation.augmented import augment
 from symdyn.formulation.embedding import embed
@@ -107,7 +106,7 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto", coordina
         from symdyn.runtime.compiler import require_compiler
 
         require_compiler()
-    with _collector_paused():
+    with collector_paused():
         derived = _worth_comparing(model, formulation, coordinates)
     times: Sequence[float | None] = [None] * len(derived)
     if tune:
@@ -239,16 +238,3 @@ def _coupled(model: Model) -> list[int]:
         counts += range(above, above + own)
         before[child] = above + own
     return counts
-
-
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """No search for garbage meanwhile: the nodes of a derivation all stay, and to look through them again and again takes as
-    long as a long derivation itself."""
-    running = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if running:
-            gc.enable()

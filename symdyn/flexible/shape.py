@@ -53,6 +53,16 @@ class Shape:
         both.parts = (*self.parts, *other.parts)
         return both
 
+    def along(self, direction: str) -> bool:
+        """Whether it deflects in this direction alone."""
+        return all(part == direction for part, _, _ in self.parts)
+
+    def named(self, name: str) -> Shape:
+        """The same shape under another name."""
+        same = Shape.__new__(Shape)
+        same.name, same.faults, same.parts = str(name), [*self.faults], self.parts
+        return same
+
     def _polynomial(self, coefficients: Any, powers: Any) -> PPoly | None:
         c = numbers(coefficients, "coefficients", self.faults)
         if c is None:

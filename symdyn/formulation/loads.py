@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,15 +10,20 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ModelError
+from symdyn.formulation.flexible import FlexibleLink
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.site import BodySite
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
 from symdyn.model.elements import Action, Element, Watch
+from symdyn.model.joints.modal import exactly
 from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
 from symdyn.spatial.vectors import cross, dot, zeros
 from symdyn.tape.differentiate import forward
-from symdyn.tape.node import is_zero
+from symdyn.tape.node import exact, is_zero
+
+# Deflection of a beam's free end, by its length, that is told to be far.
+FAR = 0.2
 
 
 @dataclass
@@ -97,8 +103,18 @@ class Loads:
         return total
 
     def watches(self) -> list[Watch]:
-        """What elements want to be looked at."""
-        return [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
+        """What elements want to be looked at, and how far elastic bodies bend."""
+        found = [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
+        return [*found, *(self._bending(body) for body in self.tree.flexible)]
+
+    def _bending(self, body: FlexibleLink) -> Watch:
+        name = self.tree.links[body.link].joint.name
+        with self.algebra.section(f"joint {name}: deflection"):
+            away = exactly(body.beam.Psi_tip) @ body.eta / exact(body.beam.length)
+            part = self.algebra.sqrt(dot(away, away))
+        return Watch(f"deflection of {name}", part, -math.inf, FAR,
+                     f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to second "
+                     f"order, which is meant for deflections below {FAR:g}")
 
     # -- each kind
 

@@ -63,7 +63,7 @@ class TreeQuantities(Motion):
                "joint_points": self.joint_points, "reactions": self.reactions, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
-        if any(isinstance(load, Element) for load in self.model.loads):
+        if self.tree.flexible or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
         return {**super().quantities(), **own, **(self.identification.quantities() if self.tree.rigid else {})}
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.solution import REST
 from symdyn.runtime.watches import WATCHES, watched
 
 if TYPE_CHECKING:
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
 WHERE = {"c": "compiled C", "numpy": "NumPy"}
 # An energy balance worse than this is marked.
 DOUBTFUL = 1e-6
-# With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
-_REST = 1e-10
 
 
 @dataclass(frozen=True)
@@ -142,9 +141,8 @@ def energy(solution: Solution) -> Energy | None:
     change = solution.energy - solution.energy[0]
     difference = float(np.abs(change - solution.work).max())
     kinetic, potential = solution.energies.T
-    rests = max(kinetic.max(), np.ptp(potential)) < _REST * np.abs(potential).max()
-    relative = difference / float(np.abs(solution.energy).max()) if rests else solution.energy_error()
-    return Energy(float(solution.work[-1]), float(change[-1]), difference, relative, bool(rests),
+    rests = max(kinetic.max(), np.ptp(potential)) < REST * np.abs(potential).max()
+    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(), bool(rests),
                   np.column_stack([solution.work, change]))
 
 

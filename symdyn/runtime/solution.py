@@ -22,6 +22,9 @@ from symdyn.runtime.reactions import reaction, reactions, unique_reactions
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
+# With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
+REST = 1e-10
+
 
 class Solution:
     """A motion.
@@ -192,12 +195,15 @@ class Solution:
         return reaction(self, joint, frame)
 
     def energy_error(self) -> float:
-        """Largest |change of energy - work of the loads| over the larger of kinetic energy and range of potential energy.
+        """Largest |change of energy - work of the loads| over the larger of kinetic energy and range of potential energy; where
+        both are rounding errors, of a mechanism at rest, over its potential energy.
 
         Raises ArgumentError as `work` does.
         """
         kinetic, potential = self.energies.T
         scale = max(kinetic.max(), np.ptp(potential))
+        if scale < REST * np.abs(potential).max():
+            scale = np.abs(potential).max()
         return float(np.abs(self.energy - self.energy[0] - self.work).max() / scale) if scale > 0 else 0.0
 
     # -- pictures and files

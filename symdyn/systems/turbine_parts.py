@@ -151,13 +151,45 @@ def _add_lumped_rotor(system: System) -> Body:
     return rotor
 
 
-def tower_beam() -> Beam:
-    """The land-based tower with its published modes, two fore and aft along x and two from side to side along y."""
+def published_tower_beam() -> Beam:
+    """The land-based tower with its published modes, two fore and aft along x and two from side to side along y. They were fitted
+    to another model: the first frequencies on land are 3.4 % and 0.9 % above those of the tower's own modes."""
     data = nrel_5mw_tower.ONSHORE
     directions = [("x", c) for c in data.fore_aft] + [("y", c) for c in data.side_to_side]
     shapes = [Shape(direction, c, name=mode) for (direction, c), mode in zip(directions, TOWER_MODES, strict=True)]
     return Beam(data.stations, data.mass_per_length, data.stiffness, shapes, length=data.length,
                 damping_ratio=data.damping_ratio, name="tower")
+
+
+def tower_beam() -> Beam:
+    """The land-based tower with its own two lowest modes fore and aft, along x, and from side to side, along y, computed on land
+    under the weight of nacelle and rotor."""
+    data = nrel_5mw_tower.ONSHORE
+    mass, com, inertia = head()
+    own = published_tower_beam().modes(len(TOWER_MODES), tip_mass=mass, tip_com=com, tip_inertia=inertia,
+                                       gravity=(0, 0, -nrel.GRAVITY))
+    along = [[shape for shape in own if shape.along(direction)] for direction in ("x", "y")]
+    shapes = [shape.named(mode) for shape, mode in zip([*along[0], *along[1]], TOWER_MODES, strict=True)]
+    return Beam(data.stations, data.mass_per_length, data.stiffness, shapes, length=data.length,
+                damping_ratio=data.damping_ratio, name="tower")
+
+
+def head() -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass (kg), centre of mass from the tower's top (3,) (m), and inertia about it (3, 3) (kg m^2) of nacelle, hub and blades in
+    tower axes, the same at every azimuth."""
+    shaft = np.array(sp.rot_ccw_axis2(-nrel.TILT), dtype=float)
+    apex = np.array([0, 0, nrel.SHAFT_HEIGHT]) + nrel.OVERHANG * shaft[:, 0]
+    parts = [(nrel.NACELLE_MASS, np.array([nrel.NACELLE_COM[0], 0, nrel.NACELLE_COM[1]]),
+              np.diag([0, 0, nrel.NACELLE_YAW_INERTIA])),
+             (nrel.HUB_MASS, apex, shaft @ np.diag([nrel.HUB_INERTIA, 0, 0]) @ shaft.T)]
+    for k in range(3):
+        R = shaft @ np.array(sp.rot_ccw_axis1(2 * sp.pi * k / 3) * sp.rot_ccw_axis2(nrel.CONE), dtype=float)
+        at = apex + (nrel.HUB_RADIUS + nrel.BLADE_COM) * R[:, 2]
+        parts.append((nrel.BLADE_MASS, at, R @ np.diag([nrel.BLADE_INERTIA, nrel.BLADE_INERTIA, 0]) @ R.T))
+    mass = sum(m for m, _, _ in parts)
+    center = sum(m * at for m, at, _ in parts) / mass
+    inertia = sum(I + m * ((at - center) @ (at - center) * np.eye(3) - np.outer(at - center, at - center)) for m, at, I in parts)
+    return mass, np.asarray(center), np.asarray(inertia)
 
 
 def blade_beam() -> Beam:

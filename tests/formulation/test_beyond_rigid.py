@@ -161,3 +161,12 @@ def test_elastic_coordinates_must_be_symbols() -> None:
     system.add_joint(sd.Fixed("clamp", system.ground, mast.root))
     with pytest.raises(ModelError, match="elastic coordinates must be symbols"):
         system.check()
+
+
+def test_far_deflection_is_told() -> None:
+    system = sd.System("rod", gravity=[0, 0, 0])
+    rod = system.add_flexible_body("rod", BEAM)
+    system.add_joint(sd.Fixed("clamp", system.ground, rod.root))
+    module = system.embedding().compile(backend="numpy")
+    with pytest.warns(sd.SimulationWarning, match=r"in this motion: rod_bends: the free end goes 0\.\d+ of the length aside"):
+        module.simulate((0, 0.1), q={"rod_mode_1": 0.9})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find
 from symdyn.runtime.statics.linear import natural_length
 from symdyn.runtime.statics.selection import Selection, listed, select
@@ -95,7 +95,7 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore" if found else "default")  # what is watched over is told once
                 new = find(place, selection, max_iterations)
-        except NoEquilibrium as error:
+        except (NoEquilibrium, EvaluationError, ArgumentError) as error:  # also from a start where nothing can be evaluated
             failures.append((place.x, str(error)))
             iterations.append(-1)
             continue

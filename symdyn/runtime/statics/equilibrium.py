@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning
+from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import normalised, number
 from symdyn.runtime.statics.linear import Reduced
@@ -18,6 +17,7 @@ from symdyn.runtime.statics.modes import eigen, stable
 from symdyn.runtime.statics.search import Search, Trial
 from symdyn.runtime.statics.selection import Selection, select
 from symdyn.runtime.statics.terms import Place, coordinate_names, null_space, rest
+from symdyn.runtime.watches import WATCHES, warn
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -209,7 +209,10 @@ def _refuse(search: Search, reason: str) -> NoReturn:
     order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:TOLD]
     left = ", ".join(f"{forces[labels[k]]:.6g} {_FORCES.get(metadata['units'].get(metadata['u'][k], ''), '')}".strip()
                      + f" along {labels[k]}" for k in order)
-    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["q"], trial.place.q, strict=True))
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"]], [*trial.place.q, *trial.place.z],
+                                                       strict=True))
+    rates = ", ".join(f"{metadata['z'][k]} by {trial.place.rates_z[k]:.3g} a second" for k in trial.selection.states
+                      if abs(trial.place.rates_z[k]) > 1e-9)
     gaps = trial.place.C * trial.place.scale
     names = metadata.get("constraints", ())
     open_ = ", ".join(f"{n} by {g:.3g} m" for n, g in zip(names, gaps, strict=True) if abs(g) > 1e-9)
@@ -218,6 +221,7 @@ def _refuse(search: Search, reason: str) -> NoReturn:
     parts = [f"no equilibrium found: {reason}, after {search.steps} iterations"]
     parts += [f"forces left are {left}"] if left else []
     parts += [f"constraints are open: {open_}"] if open_ else []
+    parts += [f"extra states change: {rates}"] if rates else []
     parts += [*loose, f"the last state is {where}; begin elsewhere with start={{...}}, or check the loads"]
     raise NoEquilibrium(f"{module.name}: " + "; ".join(parts))
 
@@ -232,21 +236,26 @@ def _demand_stiffness(search: Search) -> None:
     """Raises EquilibriumNotUnique for a direction in which nothing holds."""
     trial, module = search.best, search.module
     place, columns = trial.place, search.columns
-    n_u = place.sizes[1]
-    if trial.selection.conditions:  # what is solved for takes part: as many equations as unknowns, seen by the scaled derivative
-        J = trial.derivative() * search.weights[:, None] * search.widths(trial)
-        labels = [*_direction_names(trial), *[module.metadata["z"][k] for k in trial.selection.states], *trial.selection.unknown]
+    _, n_u, _, n_c = place.sizes
+    states = trial.selection.states
+    inner = place.by_z[n_u + n_c:][states][:, states]
+    drifting = bool(states) and np.linalg.matrix_rank(inner) < len(states)
+    if trial.selection.conditions or drifting:  # all unknowns take part, as many as equations, seen by the scaled derivative
+        J = search.scaled(trial)[1]
+        labels = [*_direction_names(trial), *[module.metadata["z"][k] for k in states], *trial.selection.unknown]
         _, values, Vt = np.linalg.svd(J)
         loose = Vt[len(values):] if len(values) < J.shape[1] else Vt[values <= 1e-9 * values.max(initial=0.0)]
+        if not trial.selection.conditions:  # extra states that nothing brings back may be anything
+            _, sizes, Wt = np.linalg.svd(loose[:, :trial.directions.shape[1]], full_matrices=False)
+            loose = Wt[sizes > 1e-6]
     else:
         rows = np.vstack([place.C_r, trial.selection.rows(place)]) * columns
         Z = null_space(rows)
         K = place.by_v[:n_u] * np.outer(columns, columns)
         reduced = Z.T @ K @ Z
-        if place.sizes[2] and len(trial.selection.states):  # what extra states do at rest is stiffness, too
-            on_z, states = slice(n_u + place.sizes[3], None), trial.selection.states
-            inner, outer = place.by_z[on_z][states][:, states], place.by_v[on_z][states] * columns
-            reduced = reduced - Z.T @ (place.by_z[:n_u][:, states] * columns[:, None]) @ np.linalg.pinv(inner) @ outer @ Z
+        if states:  # what extra states do at rest is stiffness, too
+            outer = place.by_v[n_u + n_c:][states] * columns
+            reduced = reduced - Z.T @ (place.by_z[:n_u][:, states] * columns[:, None]) @ np.linalg.inv(inner) @ outer @ Z
         _, values, Vt = np.linalg.svd(reduced)
         size = max(np.abs(K).max(initial=0.0), 1e-300)
         loose = (Vt @ Z.T)[values <= LOOSE * size] if len(values) else Vt[:0] @ Z.T
@@ -292,12 +301,5 @@ def _demand_steady(trial: Trial) -> None:
 
 def _look(place: Place) -> None:
     """Warn of what elements watch over."""
-    watches = place.module.metadata.get("watches", ())
-    if not watches:
-        return
-    for (label, least, most, message), value in zip(watches, np.atleast_1d(place.evaluate("watches")), strict=True):
-        if not least <= value <= most:
-            bounds = " and ".join([*([f"at least {least:g}"] if np.isfinite(least) else []),
-                                   *([f"at most {most:g}"] if np.isfinite(most) else [])])
-            warnings.warn(f"{place.module.name}: in equilibrium {label} is {value:.6g}, should be {bounds}: {message}",
-                          SimulationWarning, stacklevel=4)
+    if place.module.metadata.get(WATCHES, ()):
+        warn(place.module, place.evaluate(WATCHES), "in equilibrium", 5)

@@ -160,7 +160,7 @@ class Search:
 
     def _descend(self, trial: Trial, limit: int) -> tuple[bool, str]:
         self.best = trial
-        F, J, widths = self._scaled(trial)
+        F, J, widths = self.scaled(trial)
         radius, last = np.inf, np.inf
         while self.steps < limit:
             U, values, Vt = np.linalg.svd(J, full_matrices=False)
@@ -177,7 +177,7 @@ class Search:
             factor, step = self._limited(trial, step, widths)
             predicted = 0.5 * (F @ F - np.sum((F + J @ step)**2))
             new = self._moved(trial, step * widths)
-            scaled = self._scaled(new) if new is not None else None
+            scaled = self.scaled(new) if new is not None else None
             actual = 0.5 * (F @ F - scaled[0] @ scaled[0]) if scaled is not None else -np.inf
             length = _length(step)
             if scaled is not None and new is not None and (actual > 1e-4 * predicted or self._rounding(F, scaled[0], newton)):
@@ -214,7 +214,7 @@ class Search:
         """Whether only rounding is left: steps are taken then though they may not reduce the residual."""
         return newton <= 1e-6 and float(np.linalg.norm(new)) <= max(SOLVED, 2 * float(np.linalg.norm(F)))
 
-    def _scaled(self, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def scaled(self, trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual and derivative, scaled, forces without what multipliers balance; scales of the unknowns."""
         widths = self.widths(trial)
         F, J = trial.residual() * self.weights, trial.derivative() * self.weights[:, None] * widths

@@ -71,6 +71,9 @@ def of_eigenvalue(reduced: Reduced, mode: Mode, others: np.ndarray, changes: Map
     near = np.sort(np.abs(others - value))[:2]
     rounding = np.finfo(float).eps * np.abs(others).max()**2 / max(abs(value), np.finfo(float).tiny)
     if len(near) > 1 and near[1] <= DOUBLE * rounding:
+        if mode.kind == "zero":
+            raise ArgumentError(f"{place.module.name}: mode {mode.name} has the eigenvalue zero, to rounding, whose size has no "
+                                "derivative; ask for another mode, or add a load that holds it")
         raise ArgumentError(f"{place.module.name}: mode {mode.name} has a double eigenvalue, {value:.9g} 1/s, to rounding: it "
                             "has no derivative of its own; change a parameter a little, so that the two part")
     _, n_u, n_z, n_c = place.sizes
