@@ -19,7 +19,8 @@ from symdyn.model.symbols import Coordinate
 
 @dataclass(frozen=True)
 class FlexibleBody:
-    """root, tip: frames at the clamped and at the free end, to be used as bodies; the beam's mass counts to the root.
+    """root, tip: frames at the clamped and at the free end, to be used as bodies; the beam's mass counts to the root, whose
+    centre of mass, as `positions` and J have it, is that of the straight beam.
 
     coordinates   eta, one a mode; joint: named like the body, which has them
     """

@@ -193,8 +193,8 @@ def head() -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def blade_beam() -> Beam:
-    """A blade, z from root to tip, x downwind where there is no cone, y against the motion of the rising blade's leading edge:
-    its own three lowest modes, computed with its twist, which turns it about -z."""
+    """A blade, z from root to tip, x downwind where there is no cone, y against the way it moves as the rotor turns: its own
+    three lowest modes, computed with its twist, which turns it about -z."""
     data = nrel_5mw_blade
     stations, twist, mass, flap, edge = np.array(data.TABLE).T
     return Beam(stations, mass * data.MASS_FACTOR, (flap, edge), len(BLADE_MODES), length=data.LENGTH,

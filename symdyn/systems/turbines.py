@@ -67,10 +67,11 @@ def floating_wind_turbine(rotor: str = "free", blades: str = "three", orientatio
                   wind on the hub, and tau_g (N m), torque of the generator between hub and nacelle, which brakes
     ballast       water that is moved in the hull: m_x (kg) by l_b (m) along x and m_y along y move its G to
                   (m_x l_b/m_P, m_y l_b/m_P, z_P); none at first
-    flexible      "tower": it bends in four modes, tower_fa1, tower_fa2 along x, tower_ss1, tower_ss2 along y (m at the top);
+    flexible      "tower": it bends in its own lowest modes, tower_fa1, tower_fa2 along x, tower_ss1, tower_ss2 along y (m);
                   "blades": each bends in its three lowest modes, blade1_flap1, blade1_edge1, blade1_flap2, ... ; True: both.
                   Stiffness and damping are multiplied by s_T, d_T and s_B, d_B. In q those of the tower stand before yaw, those
-                  of the blades are the last
+                  of the blades are the last. The drag of the tower acts on its foot, as if it were straight, and does not
+                  bend it
 
     It starts at rest in equilibrium without wind, rigid. Outputs: tower_top (m), nacelle_velocity (m/s), tower_top_acceleration
     (m/s^2) (n-frame), platform_pitch_deg (its Euler angle theta, degrees).

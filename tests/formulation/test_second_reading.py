@@ -1,7 +1,8 @@
-"""Trees with added mass and elastic bodies in every way of writing them; rest states that extra states take part in."""
+"""Trees with added mass and elastic bodies in every way of writing them; rest with extra states; stiffness at half a turn."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium
+from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium, SimulationWarning
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.recursion import RecursiveTree
 from symdyn.formulation.tree import build
@@ -167,3 +168,26 @@ def test_what_is_loose_under_constraints_is_told_when_parameters_are_solved_for(
     module = system.set_defaults({k: 5, f: 1}).augmented().compile(backend="numpy")
     with pytest.raises(EquilibriumNotUnique, match=r"no stiffness along x \(0.60\), y \(0.40\)"):
         module.equilibrium(free=["x", "y", "z", "f"], fixed={"z": 1})
+
+
+# -- half a turn
+
+
+def turned(orientation: Any, rate: str) -> None:
+    """A body on springs that turns about the vertical with 2 rad/s, for 1.5 s, to 172 degrees or less."""
+    system = sd.System("buoy", gravity=[0, 0, 0])
+    buoy = system.add_body("buoy", mass=5, inertia=[1, 1, 1])
+    system.add_joint(sd.Free("sea", system.ground, buoy, orientation=orientation))
+    system.add_load(sd.LinearStiffness(buoy, [1, 1, 1, 1, 1, 0.01], name="mooring"))
+    system.embedding().compile(backend="numpy").simulate((0, 1.5), u={rate: 2.0})
+
+
+def test_half_a_turn_of_a_rotation_vector_is_told() -> None:
+    with pytest.warns(SimulationWarning, match=r"mooring: the body has turned by 17\d.* degrees; at half a turn its angles jump"):
+        turned(sd.EulerParameters(), "omega_z_sea")
+
+
+def test_half_a_turn_of_coordinates_is_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        turned(sd.EulerAngles("ZYX"), "q_sea_4_dot")

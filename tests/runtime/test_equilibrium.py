@@ -267,8 +267,9 @@ def test_elements_that_watch_warn_in_numbers() -> None:
     guide = s.add_joint(sd.Prismatic("guide", s.ground, raft, z, axis=[0, 0, 1]))
     s.add_joint_force(guide, 1e6 * (3 - z))
     s.add_load(sd.Buoyancy(raft, boxes=[sd.Box((4, 2, 1))], density=1025))
-    with pytest.warns(SimulationWarning, match=r"raft: in equilibrium .* is 0, should be at least .*has left the water"):
+    with pytest.warns(SimulationWarning, match=r"raft: in equilibrium: .*has left the water: .* of its volume is 0$") as told:
         s.embedding().compile(backend="numpy").equilibrium(start={"z": 0.0})
+    assert told[0].filename == __file__
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

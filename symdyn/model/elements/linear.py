@@ -15,8 +15,8 @@ from symdyn.model.elements.site import Action, Site, Watch
 from symdyn.spatial.vectors import cross, dot, inner, vector
 
 ANGLES = ("auto", "ZYX", "rotation vector")
-# Tilt, in degrees, up to which a linear stiffness is meant.
-TILT = 20.0
+# Tilt, in degrees, up to which a linear stiffness is meant; turn up to which it is safe that its angles do not jump.
+TILT, TURN = 20.0, 120.0
 # (1 - x/2 cot(x/2)) / x^2 is the sum of these times x^(2k), used below x^2 = SMALL, where what is left out is below 1e-26.
 COTANGENT = (Fraction(1, 12), Fraction(1, 720), Fraction(1, 30240), Fraction(1, 1209600), Fraction(1, 47900160),
              Fraction(691, 1307674368000), Fraction(1, 74724249600))
@@ -33,13 +33,13 @@ class LinearStiffness(Element):
     force       (6,) at the reference: N, N m; point: (3,) body axes, m; reference: (6,) m, rad
     angles      "ZYX": roll, pitch, yaw of R = R_z(psi) R_y(theta) R_x(phi), along whose rates the moments act; singular at a
                 pitch of 90 degrees, where the run stops and tells so
-                "rotation vector": axis times angle, without singularity below half a turn
+                "rotation vector": axis times angle, without singularity below half a turn, where it jumps to the opposite
                 "auto": "ZYX" for a body whose joint with the ground has these angles, else the rotation vector
     Where the moments vanish with the angles, both are the same for small angles; a prestress (`force`) turns with the axes of
     its kind. The potential is 1/2 (xi - reference)^T K (xi - reference) - force . (xi - reference) with the symmetric part of K;
     what is not symmetric in K has no potential and counts as a force that does work (a matrix of moments about fixed axes, of
     a prestressed mooring for example, is not quite symmetric). A linear stiffness is meant for small angles: a tilt above 20
-    degrees gives a warning.
+    degrees gives a warning, and a turn above 120 degrees where the angles are not coordinates of a joint.
     """
 
     kind = "linear stiffness"
@@ -75,7 +75,8 @@ class LinearStiffness(Element):
         even, odd = a.matrix((self.K + self.K.T) / 2), a.matrix((self.K - self.K.T) / 2)
         elastic, other = force - even @ xi, -(odd @ xi)
         return Action(self._wrench(site, turned, point, elastic), self._wrench(site, turned, point, other),
-                      inner(xi, even @ xi) / 2 - inner(force, xi), (self._tilt(site),))
+                      inner(xi, even @ xi) / 2 - inner(force, xi),
+                      (self._tilt(site),) if site.angles_given and not turned else (self._tilt(site), self._turn(site)))
 
     def _wrench(self, site: Site, turned: bool, point: np.ndarray, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment about the origin, body axes, of generalized forces along xi."""
@@ -90,6 +91,13 @@ class LinearStiffness(Element):
         return Watch(f"tilt of {self.where}", tilt, -1.0, TILT,
                      f"{self.where}: the body tilts by {{value}} degrees; a linear stiffness is meant for small angles, up to "
                      f"{TILT:g} degrees")
+
+    def _turn(self, site: Site) -> Watch:
+        """Of a potential that is alike on both sides of half a turn the energy tells nothing."""
+        a, r = site.algebra, site.rotation_vector
+        return Watch(f"turn of {self.where}", a.sqrt(dot(r, r)) * 180 / a.recorder.pi(), -1.0, TURN,
+                     f"{self.where}: the body has turned by {{value}} degrees; at half a turn its angles jump, and the moments "
+                     "with them")
 
 
 def about_angles(site: Site, Q: np.ndarray, where: str) -> np.ndarray:

@@ -18,7 +18,7 @@ from symdyn.tape.node import is_zero
 class MooringLine(Element):
     """An elastic line from a fairlead of the body to an anchor, in the shape it has at rest (quasi-static catenary).
 
-    fairlead    (3,) body axes, m; anchor: (3,) n-frame, m
+    fairlead    (3,) body axes, m; anchor: (3,) n-frame, whose z is upward whatever the model's gravity, m
     length      unstretched, m
     weight      in water per unstretched length, N/m
     stiffness   EA, N
