@@ -31,9 +31,9 @@ _HOME = {
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
-    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EnsembleStopped", "EquilibriumNotUnique",
-                      "EvaluationError", "GimbalLock", "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium",
-                      "NotARotation", "NotNormalized", "RotationError",
+    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EnsembleStopped",
+                      "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock", "MissingExtra",
+                      "ModelError", "ModelWarning", "NoEquilibrium", "NotARotation", "NotNormalized", "RotationError",
                       "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase", "UnsupportedExpression",
                       "ZeroAxis"),
 }

@@ -43,6 +43,10 @@ class EvaluationError(SymdynError, ArithmeticError):
     """The equations cannot be evaluated at a state; the message tells which value and where."""
 
 
+class EvaluationWarning(UserWarning):
+    """Some of many states cannot be evaluated; their results are NaN, and the message tells which, and why."""
+
+
 class SimulationWarning(UserWarning):
     """A simulation stopped early; the solution up to there is kept, and its message tells when, where and why."""
 
@@ -107,3 +111,11 @@ class NoEquilibrium(SymdynError, ArithmeticError):
 
 class EquilibriumNotUnique(NoEquilibrium):
     """Something can move without any stiffness; the message names the direction."""
+
+
+class EnsembleStopped(SymdynError):
+    """An ensemble stopped early: its executor died or the disk is full. `n_done` of `count` samples are kept."""
+
+    def __init__(self, message: str, n_done: int, count: int) -> None:
+        super().__init__(message)
+        self.n_done, self.count = n_done, count

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.backend.source import CORRECTIONS, Content, Source, render
+from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
 from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
@@ -108,12 +109,14 @@ OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
 
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
-         specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False) -> Source:
+         specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
+         batch: bool = False) -> Source:
     """The source of the named functions (default: STANDARD and OF_CONSTRAINTS, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
     work         rhs gets one more state at the end: the work of all loads but gravity and springs
     baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
+    batch        C only: also rhs and integrator of many states at once, a state in each lane of the processor's vectors
 
     Raises SymdynError for an unknown function, parameter, backend or a broken template.
     """
@@ -126,8 +129,9 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
-    content = _content(equations, names, standalone, bound, work, baumgarte)
-    return render(content, backend, templates, standalone, integrator)
+    with collector_paused():
+        content = _content(equations, names, standalone, bound, work, baumgarte)
+        return render(content, backend, templates, standalone, integrator, batch)
 
 
 def has_function(equations: Equations, name: str) -> bool:
@@ -163,6 +167,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                           "emit() writes source for others")
 
     def source_of(name: str) -> Source:
+        if name == "rhs_batch":
+            return emit(equations, backend, ("rhs",), templates, standalone=False, specialize=specialize, batch=True)
         if not name.startswith("rhs"):
             group: tuple[str, ...] = CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
             if name in STATICS:
@@ -200,6 +206,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "masses": {p.name: body for p, body in equations.symbols.masses.items()},
+                "output_units": dict(equations.symbols.point_units),
                 "watches": [[w.label, w.least, w.most, w.message] for w in equations.watched()],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}

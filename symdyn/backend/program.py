@@ -2,93 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import groupby
-from textwrap import fill
-from typing import Any
 
-from symdyn.backend.dialect import Dialect, identifier
+from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
-from symdyn.backend.printer import Printer
+from symdyn.backend.function import ARGUMENTS, Function, Part
 from symdyn.backend.user_functions import called
-from symdyn.errors import SymdynError
+from symdyn.backend.writer import STOPPING, Writer, checks_of, cores_of
 from symdyn.tape.external import UserFunction
-from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
-from symdyn.tape.tape import Tape, count_of, reachable, unsigned
+from symdyn.tape.node import Node
+from symdyn.tape.tape import Tape, count_of, unsigned
 
-GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
-ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
-_INLINE_LENGTH = 72
 # Ends of the names of the two ways of a function that is tried in one way first.
 REGULAR, OTHERWISE = "regular", "singular"
-# Operations that may stop a function.
-STOPPING = ("call", "guard")
-
-
-@dataclass(frozen=True)
-class Section:
-    """Statements under one heading."""
-
-    title: str
-    lines: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Part:
-    """A stretch of a long function, a function of its own: compilers take more than linear time for one function.
-
-    arguments   groups it reads, of t q u z ud inputs p c, in this order; it also gets w, which holds what parts hand on
-    results     statements that keep values in w; of the last part, those that store the function's result
-    """
-
-    arguments: tuple[str, ...]
-    loads: tuple[str, ...]
-    sections: tuple[Section, ...]
-    results: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Function:
-    """One function of the generated module.
-
-    arguments   groups it reads, of t q u z ud inputs p c, in this order
-    shape       of its result; loads, sections, results: statements in the dialect
-    parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
-    regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
-                statements of its own
-    inlined     steps that are written where they are used: which products and sums become one depends on it
-    """
-
-    name: str
-    title: str
-    shape: tuple[int, ...]
-    arguments: tuple[str, ...]
-    loads: tuple[str, ...]
-    sections: tuple[Section, ...]
-    results: tuple[str, ...]
-    operations: Mapping[str, int]
-    longest_chain: int
-    parts: tuple[Part, ...] = ()
-    n_w: int = 0
-    regular: Function | None = None
-    otherwise: Function | None = None
-    inlined: frozenset[Node] = frozenset()
-
-    @property
-    def size(self) -> int:
-        """Number of entries of the result."""
-        total = 1
-        for k in self.shape:
-            total *= k
-        return total
-
-    @property
-    def count(self) -> int:
-        """Operations of one evaluation."""
-        return sum(self.operations.values())
 
 
 @dataclass(frozen=True)
@@ -122,9 +50,9 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                  {name: next(iter(tape.outputs.values())) for name, tape in
                   [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]})
     codes = {r: k + 1 for k, r in enumerate(dict.fromkeys(
-        [*reasons, *_checks(whole, whole.steps).values()]))}
+        [*reasons, *checks_of(whole, whole.steps).values()]))}
     late = _late(whole, tapes, otherwise)
-    used = set(_cores([a for n in (*whole.running, *late) for a in n.args]
+    used = set(cores_of([a for n in (*whole.running, *late) for a in n.args]
                       + [e for o in whole.outputs.values() for e in o.entries]))
     constants = {node: k for k, node in enumerate(n for n in whole.prologue if n in used and n not in late)}
     hoisted = {node: ("c", k) for node, k in constants.items()}
@@ -134,21 +62,21 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
         _either(name, titles[name], write(tape, name=f"{name}_{REGULAR}", title=titles[name]),
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
         else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
-    prologue = _Writer(dialect, whole, places, {}, codes, late).prologue(constants)
+    prologue = Writer(dialect, whole, places, {}, codes, late).prologue(constants)
     return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole), called(whole))
 
 
 def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
     """Steps that depend on parameters only, and yet wait until a function runs: they divide by what may vanish, and then there
     is another way to compute the function."""
-    either = [set(_checks(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
-    always = [set(_checks(tape, tape.prologue)) for tape in
+    either = [set(checks_of(tape, tape.prologue)) for name, tape in tapes.items() if name in otherwise]
+    always = [set(checks_of(tape, tape.prologue)) for tape in
               [*[tape for name, tape in tapes.items() if name not in otherwise], *otherwise.values()]]
     demanded = set().union(*either).difference(*always)
     late: set[Node] = set()
     for node in whole.prologue:
         divides = node.op == "div" and unsigned(node.args[1]) in demanded
-        if divides or (node.op in STOPPING and node in demanded) or not late.isdisjoint(_cores(node.args)):
+        if divides or (node.op in STOPPING and node in demanded) or not late.isdisjoint(cores_of(node.args)):
             late.add(node)
     return late
 
@@ -179,7 +107,7 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     body = [n for n in tape.steps if n in running and n not in hoisted and n.op != "leaf"]
     operations = count_of(body)
     if dialect.parts is None or len(body) <= dialect.parts.whole:
-        writer = _Writer(dialect, tape, places, hoisted, codes, late, wanted)
+        writer = Writer(dialect, tape, places, hoisted, codes, late, wanted)
         part = writer.part(body, output.entries, writer.results_of(output.entries))
         return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, operations,
                         tape.longest_chain(), inlined=frozenset(writer.printer.inline))
@@ -188,7 +116,7 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     found: set[Node] = set()
     stretches, slots, n_w = divide(body, output.entries, dialect.parts.longest)
     for k, (stretch, kept) in enumerate(stretches):
-        writer = _Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
+        writer = Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
         if k == len(stretches) - 1:
             parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries)))
         else:
@@ -198,224 +126,3 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     groups = {g for part in parts for g in part.arguments}
     return Function(name, title, output.shape, tuple(g for g in ARGUMENTS if g in groups), (), (), (), operations,
                     tape.longest_chain(), tuple(parts), n_w, inlined=frozenset(found))
-
-
-class _Writer:
-    """Writes one function or part of one: decides which nodes get a variable, and in which words.
-
-    stored   nodes that are read from an array: what the prologue or an earlier part computed -> (group, place)
-    late     see _late
-    inlined  what is written where it is used; None: what is used once and short
-    """
-
-    def __init__(self, dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]],
-                 stored: Mapping[Node, tuple[str, int]], codes: Mapping[str, int], late: set[Node],
-                 inlined: frozenset[Node] | None = None) -> None:
-        self.dialect = dialect
-        self.inlined = inlined
-        self.late = late
-        self.demanded = {unsigned(n.args[1]) for n in late if n.op == "div"}
-        self.tape = tape
-        self.places = places
-        self.stored = stored
-        self.codes = codes
-        self.names = tape.recorder.names
-        self.checks: Mapping[Node, str] = {}
-        self.taken: set[str] = set()
-        self.text: dict[Node, str] = {}
-        self.printer = Printer(dialect, self.text)
-        self.uses: Counter[Node] = Counter()
-        self.results: set[Node] = set()
-        self.guarded: set[Any] = set()
-        self.groups: set[str] = set()
-        self.n_unnamed = 0
-        self.n_calls = 0
-
-    def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]]) -> Part:
-        """Statements for the steps of `body`, of which `entries` are used afterwards."""
-        self.checks = _checks(self.tape, [*self.tape.running, *(n for n in self.tape.prologue if n in self.late)])
-        self._count(body, entries)
-        # Only what the sines and cosines need is read before them; anything else would wait in registers, or be spilled.
-        at_once = self._at_once(body)
-        needed = set(reachable(at_once)).difference(at_once)
-        before = [n for n in body if n in needed]
-        loads = self._read([*before, *at_once])
-        sections = self._statements(before) + self._sines_and_cosines(at_once)
-        sections += self._statements([n for n in body if n not in self.text])
-        others = self._read((), entries)
-        if others:
-            sections.append(Section("the other arguments", tuple(others)))
-        written = results()
-        return Part(tuple(g for g in ARGUMENTS if g in self.groups), tuple(loads), tuple(sections), written)
-
-    def results_of(self, entries: Sequence[Any]) -> Callable[[], tuple[str, ...]]:
-        """What stores the entries as result, once their text is known."""
-        return lambda: tuple(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
-                             for k, e in enumerate(entries))
-
-    def keep(self, nodes: Sequence[Node], slots: Mapping[Node, int]) -> tuple[str, ...]:
-        """What keeps values for later parts."""
-        assert self.dialect.parts is not None
-        return tuple(self.dialect.parts.store.format(k=slots[n] + self.dialect.first, value=self.printer.text(n))
-                     for n in nodes)
-
-    def prologue(self, constants: Mapping[Node, int]) -> Function:
-        """The function that computes the constants c from the parameters p."""
-        body = [n for n in self.tape.prologue if n not in self.late]
-        self.checks = _checks(self.tape, body)
-        self._count(body, tuple(constants))
-        loads: list[str] = []
-        for node in body:
-            for core in _cores(node.args):
-                if core.op == "leaf" and core not in self.text:
-                    self._load(core, loads)
-        sections = self._statements(body)
-        results = self.results_of(tuple(constants))()
-        return Function("prologue", "constants: everything that depends on parameters only", (len(constants),),
-                        tuple(g for g in ("p",) if g in self.groups), tuple(loads), tuple(sections), results,
-                        count_of(body), 0)
-
-    # -- leaves and constants
-
-    def _read(self, body: Sequence[Node], entries: Sequence[Any] = ()) -> list[str]:
-        """Reads the leaves and constants among the arguments of these steps and the entries that are not read yet."""
-        used = dict.fromkeys(core for values in [*[n.args for n in body], entries] for core in _cores(values)
-                             if core not in self.text and (core.op == "leaf" or core in self.stored))
-        lines: list[str] = []
-        for leaf in sorted((n for n in used if n.op == "leaf"),
-                           key=lambda n: (list(GROUPS).index(n.mask), self.places[n.args[1]][1])):
-            self._load(leaf, lines)
-        for node in sorted((n for n in used if n in self.stored), key=lambda n: self.stored[n]):
-            group, place = self.stored[node]
-            self.groups.add(group)
-            unnamed = f"k{place + 1}" if group == "c" else f"w{place + 1}"
-            self.text[node] = identifier(self.names.get(node, unnamed), self.taken)
-            load = self.dialect.load["c"] if group == "c" else self.dialect.parts.load  # type: ignore[union-attr]
-            lines.append(self.dialect.assign.format(name=self.text[node], value=load.format(k=place + self.dialect.first)))
-            if node in self.demanded and node in self.checks:
-                lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
-        return lines
-
-    def _load(self, leaf: Node, lines: list[str]) -> None:
-        group, place = self.places[leaf.args[1]]
-        self.groups.add(group)
-        if group == "t":
-            self.text[leaf] = "t"
-            return
-        value = self.dialect.load[group].format(k=place + self.dialect.first)
-        self._assign(leaf, leaf.args[1], value, lines)
-
-    def _assign(self, node: Node, name: str, value: str, lines: list[str]) -> None:
-        """A variable for a node, and what is demanded of it."""
-        self.text[node] = identifier(name, self.taken)
-        lines.append(self.dialect.assign.format(name=self.text[node], value=value))
-        if node in self.checks:
-            lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
-
-    # -- sines and cosines
-
-    def _at_once(self, body: Sequence[Node]) -> list[Node]:
-        """The sines and cosines that need no other one, if the dialect takes so many of them all at once."""
-        chosen: list[Node] = []
-        waiting: set[Node] = set()
-        for node in body:
-            if not waiting.isdisjoint(_cores(node.args)):
-                waiting.add(node)
-            elif node.op in ("sin", "cos"):
-                chosen.append(node)
-                waiting.add(node)
-        return chosen if self.dialect.sincos is not None and len(chosen) >= self.dialect.sincos.least else []
-
-    def _sines_and_cosines(self, nodes: Sequence[Node]) -> list[Section]:
-        """The section that takes these all at once."""
-        way = self.dialect.sincos
-        if way is None or not nodes:
-            return []
-        angles = list(dict.fromkeys(n.args[0] for n in nodes))
-        lines = way.take.format(n=len(angles), angles=", ".join(map(self.printer.text, angles))).strip().split("\n")
-        for node in nodes:
-            place = angles.index(node.args[0]) + self.dialect.first
-            self._assign(node, self._name(node), (way.sin if node.op == "sin" else way.cos).format(k=place), lines)
-        return [Section("sines and cosines", tuple(lines))]
-
-    # -- statements
-
-    def _count(self, body: Sequence[Node], entries: Sequence[Any]) -> None:
-        """Note how often each node is used, and which are results."""
-        self.uses = Counter(core for values in [*[n.args for n in body], entries] for core in _cores(values))
-        self.results = set(_cores(entries))
-        self.guarded = {n.args[0] for n in body if n.op == "guard"}
-
-    def _statements(self, body: Sequence[Node]) -> list[Section]:
-        """Sections of statements; each begins with the arguments that are first needed there."""
-        sections: list[Section] = []
-        for title, group in groupby(body, key=lambda node: node.section):
-            nodes = list(group)
-            lines = self._read(nodes)
-            for node in nodes:
-                named = node in self.names and node not in self.results
-                if node.op == "call":
-                    lines += self._call(node)
-                    continue
-                if node.op == "guard":
-                    lines.append(self._guard(node))
-                    continue
-                value = self.printer.operation(node)
-                inline = self.uses[node] <= 1 and not named and node not in self.checks and node not in self.guarded
-                if inline and (len(value) <= _INLINE_LENGTH if self.inlined is None else node in self.inlined):
-                    self.text[node] = value
-                    self.printer.inline.add(node)
-                else:
-                    self._assign(node, self._name(node), value, lines)
-            if lines:
-                sections.append(Section(title, tuple(lines)))
-        return sections
-
-    def _guard(self, node: Node) -> str:
-        """The statement that stops where the margin is not positive; the node is written as the value that it guards."""
-        value, margin = node.args
-        self.text[node] = self.printer.text(value)
-        return self.dialect.check.format(name=f"({self.printer.text(margin)})", code=self.codes[self.checks[node]])
-
-    # -- numeric algorithms
-
-    def _call(self, node: Node) -> list[str]:
-        """The statements that call one; its node stands for the array of results."""
-        kernel, *values = node.args
-        way = self.dialect.call
-        mine = isinstance(kernel, UserFunction)
-        if way is None:
-            called = f"function {kernel.signature}" if mine else f"numeric algorithm {kernel.name}"
-            raise SymdynError(f"the equations call the {called}, which the backend {self.dialect.name} does not have; "
-                              "add [call] to its dialect.toml, and the algorithm to its templates")
-        self.n_calls += 1
-        self.text[node] = identifier(f"{kernel.label}_call{self.n_calls}" if mine else f"solved{self.n_calls}", self.taken)
-        written = [way.argument.format(value=self.printer.text(v)) for v in values]
-        arguments = fill(", ".join(written), 116, subsequent_indent="    ", break_long_words=False)
-        return way.take.format(name=self.text[node], function=kernel.name, sizes="".join(f"{size}, " for size in kernel.sizes),
-                               arguments=arguments, n_in=len(values), n_out=kernel.n_out,
-                               code=self.codes[self.checks[node]]).strip().split("\n")
-
-    def _name(self, node: Node) -> str:
-        known = self.names.get(node)
-        if known:
-            return known
-        first = unsigned(node.args[0]) if node.args else None
-        if node.op in ("sin", "cos", "tan", "sqrt") and isinstance(first, Node) and first.op == "leaf":
-            return f"{node.op}_{first.args[1]}"
-        self.n_unnamed += 1
-        return f"x{self.n_unnamed}"
-
-
-def _checks(tape: Tape, steps: Sequence[Node]) -> dict[Node, str]:
-    """What must be positive for these steps: pivots that they divide by, not those that another function divides by."""
-    divisors = {unsigned(n.args[1]) for n in steps if n.op == "div"}
-    divisors.update(n for n in steps if n.op in STOPPING)
-    return {n: reason for n, reason in tape.recorder.checks.items() if n in divisors}
-
-
-def _cores(values: Sequence[Any]) -> list[Node]:
-    """The nodes among values, without their signs; a sign of a difference is written by exchanging its sides."""
-    return [core for core in map(unsigned, values) if isinstance(core, Node)]
-
-

@@ -16,8 +16,10 @@ import jinja2
 import numpy as np
 
 import symdyn
+from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
-from symdyn.backend.program import Function, Part, Program, build
+from symdyn.backend.function import Function, Part
+from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.backend.user_functions import header as header_of_user_functions
 from symdyn.backend.user_functions import texts as texts_of_user_functions
@@ -87,12 +89,13 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True) -> Source:
+           integrator: bool = True, batch: bool = False) -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
     standalone   with reference vectors, header and example; False for a module that is only loaded
     integrator   C only: with the compiled integrator (needs the function rhs)
+    batch        C only: with rhs, and the integrator if there is one, of many states at once
     Raises SymdynError for an unknown backend or a broken template.
     """
     folders = template_folders(templates)
@@ -100,14 +103,19 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     if backend not in known:
         raise SymdynError(f"there is no backend {backend!r}; there are {', '.join(known)}; "
                           "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
-    dialect = next(read_dialect(f / backend) for f in folders if (f / backend / "dialect.toml").is_file())
+    folder = next(f / backend for f in folders if (f / backend / "dialect.toml").is_file())
+    dialect = read_dialect(folder)
     environment = _environment(*folders) if templates is not None else _shipped(*folders)
     content = _with_violation(content)
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
     program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise)
-    context = _context(content, program, dialect, standalone, integrator and "rhs" in content.tapes)
+    lanes = None
+    if batch and backend == "c" and "rhs" in content.tapes:
+        shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
+        lanes = batch_of(shipped.parent, dialect, program, content.tapes, content.titles, places, content.otherwise)
+    context = _context(content, program, dialect, standalone, integrator and "rhs" in content.tapes, lanes)
     files = {}
     wanted = dialect.files or {}
     if not standalone:
@@ -154,7 +162,8 @@ def _template_fault(template: str, error: Exception) -> str:
     return f"template {where}: {error}"
 
 
-def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool) -> dict[str, Any]:
+def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool,
+             lanes: Batch | None) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
@@ -170,6 +179,13 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
 
     def part_signature(part: Part) -> str:
         return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
+
+    def lanes_signature(part: Function | Part) -> str:
+        vectors = {g: "symdyn_vector t" if g == "t" else f"const symdyn_vector *{g}" for g in _C_TYPE}
+        return "".join(f"{vectors[g]}, " for g in part.arguments)
+
+    def lanes_call(part: Function | Part) -> str:
+        return ", ".join(f"lanes->{g}" if g in ("p", "c", "inputs") else state(g, "x") for g in part.arguments)
 
     def part_call(part: Part) -> str:
         return "".join(f"{g}, " for g in part.arguments)
@@ -219,6 +235,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
         "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
+        "lanes": lanes, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
+        "one_call": ", ".join([*("time" if g == "t" else state(g, "one") for g in uses.get("rhs", ())), "result"]),
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
         "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,15 +22,19 @@ Figure = tuple[str, float, str, str]
 # Bodies and joints alone.
 BARE: dict[str, Any] = {"hydrostatics": None, "mooring": None, "added_mass": False, "damping": False, "wind": False,
                         "drives": False}
+# While a wave grows: yaw command (rad), torques on the rotor (N m), wind (m/s).
+INPUTS = {"yaw_c": 0.3, "tau_a": 2e6, "tau_g": 1.5e6, "v_w": 9.0}
 STATES = 1000
 ANGLE = np.pi / 3
 
 
 class States(NamedTuple):
-    """q (n, n_q) and u (n, n_u) in the order of some equations."""
+    """q (n, n_q) and u (n, n_u) in the order of some equations; time, s, and inputs by name, which are zero unless given."""
 
     q: np.ndarray
     u: np.ndarray
+    t: float = 0.0
+    inputs: Mapping[str, float] = MappingProxyType({})
 
 
 def turbine(**options: Any) -> System:
@@ -45,9 +50,10 @@ def random_states(n: int, seed: int = 0) -> States:
 
 
 def values(equations: Equations, states: States, *names: str) -> dict[str, np.ndarray]:
-    """Quantities of equations at states, inputs and time zero, parameters at their numbers."""
+    """Quantities of equations at states, parameters at their numbers."""
     s = equations.symbols
-    given: dict[str, Any] = {p.name: float(v) for p, v in s.defaults.items()} | {a.name: 0.0 for a in s.inputs} | {"t": 0.0}
+    given: dict[str, Any] = {p.name: float(v) for p, v in s.defaults.items()}
+    given |= {"t": states.t} | {a.name: states.inputs.get(a.name, 0.0) for a in s.inputs}
     given |= dict(zip([a.name for a in (*s.coordinates, *s.speeds)], [*states.q.T, *states.u.T], strict=True))
     return evaluate_rows(equations.tape(*names), given, len(states.q))
 
@@ -81,16 +87,20 @@ class Poses:
 
     def quasi_velocities(self) -> States:
         """Of the form in Euler parameters."""
-        q, u = self.states
-        return States(np.column_stack([q[:, :3], self.e[:, 0], q[:, 6:]]),
-                      np.column_stack([self.v_body[:, 0], self.omega_body[:, 0], u[:, 6:]]))
+        q, u, *_ = self.states
+        return self.states._replace(q=np.column_stack([q[:, :3], self.e[:, 0], q[:, 6:]]),
+                                    u=np.column_stack([self.v_body[:, 0], self.omega_body[:, 0], u[:, 6:]]))
 
-    def absolute(self) -> States:
-        """Of the augmented form: the platform's own coordinates, then those of the six other bodies."""
-        bodies = range(1, self.p.shape[1])
-        return States(np.column_stack([self.states.q[:, :6], *[np.column_stack([self.p[:, k], self.e[:, k]]) for k in bodies]]),
-                      np.column_stack([self.states.u[:, :6],
-                                       *[np.column_stack([self.v[:, k], self.omega_body[:, k]]) for k in bodies]]))
+    def absolute(self, equations: Equations) -> States:
+        """Of the augmented form: the platform's own coordinates, those of the six other bodies, those of driven joints."""
+        (q, u, *_), bodies = self.states, range(1, self.p.shape[1])
+        own = ["yaw", "azimuth"]
+        driven = [own.index(c.name) for c in equations.symbols.coordinates if c.name in own]
+        return self.states._replace(
+            q=np.column_stack([q[:, :6], *[np.column_stack([self.p[:, k], self.e[:, k]]) for k in bodies],
+                               *[q[:, 6 + k] for k in driven]]),
+            u=np.column_stack([u[:, :6], *[np.column_stack([self.v[:, k], self.omega_body[:, k]]) for k in bodies],
+                               *[u[:, 6 + k] for k in driven]]))
 
 
 def difference(found: np.ndarray, wanted: np.ndarray) -> float:
@@ -109,13 +119,14 @@ def formulations(n: int, seed: int = 0, **options: Any) -> dict[str, float]:
     """
     system, quasi = turbine(**options), turbine(orientation="parameters", **options)
     embedded = system.embedding()
-    states = random_states(n, seed)
+    states = random_states(n, seed)._replace(t=7.3, inputs=INPUTS)
     wanted = body_accelerations(embedded, states)
     poses = Poses(embedded, system, states)
     absolute = system.augmented("absolute")
+    placed = poses.absolute(absolute)
     return {
-        "constraints": float(np.abs(values(absolute, poses.absolute(), "C")["C"]).max()),
-        "augmented, absolute coordinates": difference(body_accelerations(absolute, poses.absolute()), wanted),
+        "constraints": float(np.abs(values(absolute, placed, "C")["C"]).max()),
+        "augmented, absolute coordinates": difference(body_accelerations(absolute, placed)[:, :wanted.shape[1]], wanted),
         "recursive, Euler angles": difference(body_accelerations(system.recursive(), states), wanted),
         "recursive, quasi-velocities": difference(body_accelerations(quasi.recursive(), poses.quasi_velocities()), wanted),
         "embedded, quasi-velocities": difference(body_accelerations(quasi.embedding(), poses.quasi_velocities()), wanted),
@@ -190,7 +201,7 @@ def derivation() -> Iterator[Figure]:
 
 def agreement() -> Iterator[Figure]:
     """Three formulations, and the passage through a pitch of 90 degrees."""
-    for what, options in (("bare", BARE), ("with loads", {"drives": False})):
+    for what, options in (("bare", BARE), ("with loads", {"waves": True})):
         for name, value in formulations(STATES, **options).items():
             yield f"{what}: {name}, {STATES} states", value, "", "< 1e-10" if name != "constraints" else ""
     error, left = tumbling(turbine(**BARE | {"orientation": "parameters"}).embedding().compile())

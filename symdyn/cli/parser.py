@@ -17,6 +17,7 @@ from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.report import report
 from symdyn.cli.simulate import simulate
+from symdyn.cli.sweep import sweep
 from symdyn.cli.values import stabilization
 
 
@@ -53,6 +54,8 @@ def make_parser() -> argparse.ArgumentParser:
                                     "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
+    _add_sweep(command("sweep", sweep, "simulate many samples of parameters and initial states, as a TOML file tells",
+                       system=False))
     proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
                     "identities at random states")
     formulation(proof)
@@ -106,6 +109,20 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--gif", action="store_true", help="save an animation too")
     parser.add_argument("--report", metavar="FILE", type=Path, help="write a report of the run: one HTML file, no network needed")
+    parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
+    _add_output(parser)
+
+
+def _add_sweep(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="what varies, and what is kept of each motion")
+    parser.add_argument("--system", metavar="NAME", help="in the place of the file's: a system of the catalogue, or a Python "
+                        "file that defines system()")
+    parser.add_argument("--jobs", metavar="N", type=int, help="motions that are computed at a time (default: one a processor)")
+    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--dask-timeout", metavar="SECONDS", type=float, default=30.0, help="how long it is waited for")
+    parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped, in the same folder")
+    parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
+    parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(parser)
 

@@ -52,8 +52,8 @@ def _energy(solution: Solution) -> str:
                                                                solution.inputs).any()
     if kept:
         # Loads that could do work did none: energy_error() would ask for the work in their case.
-        kinetic, potential = solution.energies.T
-        largest = max(kinetic.max(), potential.max() - potential.min())
+        scale, rests = solution.energy_scale
         change = abs(solution.energy - solution.energy[0]).max()
-        return f"energy is kept to {change / largest if largest > 0 else 0.0:.2g} of its largest part"
+        of = "its potential energy: it rests" if rests else "its largest part"
+        return f"energy is kept to {change / scale if scale > 0 else 0.0:.2g} of {of}"
     return f"energy goes from {solution.energy[0]:.6g} J to {solution.energy[-1]:.6g} J by loads and drives"

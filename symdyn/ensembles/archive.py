@@ -12,6 +12,8 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
+# Bytes that are read at a time.
+PIECE = 2**22
 
 
 class Entry(NamedTuple):
@@ -65,3 +67,17 @@ def reading(path: Path) -> Iterator[Any]:
     """The arrays of an archive, each read when it is asked for."""
     with np.load(path, allow_pickle=False) as archive:
         yield archive
+
+
+def thinned(path: Path, name: str, step: int) -> np.ndarray:
+    """Every `step`-th row of an array, without holding all of it."""
+    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
+        np.lib.format.read_magic(member)  # type: ignore[arg-type]
+        shape, _, dtype = np.lib.format.read_array_header_1_0(member)  # type: ignore[arg-type]
+        row = int(np.prod(shape[1:])) * dtype.itemsize
+        at_once = step * max(1, PIECE // (step * max(1, row)))
+        kept = [np.zeros((0, *shape[1:]), dtype)]
+        for first in range(0, shape[0], at_once):
+            n = min(at_once, shape[0] - first)
+            kept.append(np.frombuffer(member.read(n * row), dtype).reshape(n, *shape[1:])[::step].copy())
+    return np.concatenate(kept)

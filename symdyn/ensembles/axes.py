@@ -94,7 +94,8 @@ def read_axis(value: Any, where: str, faults: list[str]) -> Axis | None:
         except (TypeError, ValueError):
             array = None
     if array is None or array.ndim > 1 or array.size == 0:
-        faults.append(f"{where}: give a number, a list of numbers, {{from, to, count}} or {{distribution, ...}}, found {value!r:.80}")
+        faults.append(f"{where}: give a number, a list of numbers, {{from, to, count}} or {{distribution, ...}}, "
+                      f"found {value!r:.80}")
         return None
     array = array.reshape(-1)
     return listed(array, array.tolist() if len(array) <= 64 else array)
@@ -126,17 +127,18 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
             faults.append(f"{where}.{key}: must be a finite number, found {value[key]!r}")
         else:
             numbers[key] = float(value[key])
-    if len(faults) > before:
+    if len(numbers) < len(wanted):
         return None
     told = {"distribution": name, **numbers}
     if "count" in wanted:
         if numbers["count"] < 2 or numbers["count"] != int(numbers["count"]):
             faults.append(f"{where}.count: must be a whole number from 2 on, found {value['count']!r}")
             return None
+        if len(faults) > before:
+            return None
         values = np.linspace(numbers["from"], numbers["to"], int(numbers["count"]))
         return listed(values, numbers)
     if not _fits(name, numbers):
         faults.append(f"{where}: {name} needs {DISTRIBUTIONS[name][1]}, found "
                       + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.items()))
-        return None
-    return Axis(None, _quantile(name, numbers), told)
+    return None if len(faults) > before else Axis(None, _quantile(name, numbers), told)

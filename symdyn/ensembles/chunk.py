@@ -11,13 +11,23 @@ from typing import Any
 import numpy as np
 
 from symdyn.ensembles.measures import Measure
-from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.ensembles.portable import NotSent
+from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
 from symdyn.runtime.arguments import take
+from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.module import Module
+from symdyn.runtime.outcome import Outcome
+from symdyn.runtime.solution import Solution
 
 GROUPS = ("q", "u", "z", "parameters", "inputs")
 # Longer messages of failed members are cut.
 MESSAGE = 400
+# Numbers of motions that are held at a time, 8 bytes each.
+NUMBERS = 2**21
+
+
+class MemberFailed(SymdynError):
+    """A motion has no outcome; the message tells why."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +39,8 @@ class Setting:
     places       for each name of a sample its group and its place there
     consistent   begin with the nearest state that fulfils the constraints, what is sampled kept
     options      of `simulate`
+    shapes       of the outcomes of one member
+    vectors      several members are integrated at once on one processor core
     """
 
     system: Any
@@ -40,6 +52,7 @@ class Setting:
     consistent: bool
     options: Mapping[str, Any]
     shapes: tuple[tuple[int, ...], ...] = ()
+    vectors: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,45 +73,119 @@ class Done:
     columns: dict[str, np.ndarray]
     failures: list[tuple[int, str]] = field(default_factory=list)
 
+    def fail(self, place: int, error: Exception) -> None:
+        """Note a failed member, and leave its row empty."""
+        for column in self.columns.values():
+            column[place] = np.nan
+        self.failures.append((place, _message(error)))
+
 
 def run_chunk(chunk: Chunk) -> Done:
     """Simulate every sample of a chunk; a member that fails is noted, and the others go on."""
     setting = chunk.setting
     n = len(chunk.values)
     done = Done(chunk.index, {m.label: np.full((n, *shape), np.nan) for m, shape in zip(setting.measures, setting.shapes)})
+    finite = np.isfinite(chunk.values).all(axis=1)
+    for k in np.flatnonzero(~finite).tolist():
+        bad = ", ".join(f"{n} = {v}" for n, v in zip(setting.names, chunk.values[k], strict=True) if not np.isfinite(v))
+        done.fail(k, ArgumentError(f"{setting.system.module.name}: a sample must be finite, found {bad}"))
     # Filters of warnings belong to the whole process; in the one of the caller they are set once, around all chunks.
     with contextlib.nullcontext() if setting.system.at_home else quiet():
-        for k, sample in enumerate(chunk.values):
-            try:
-                for measure, shape, value in zip(setting.measures, setting.shapes, member(setting, sample)):
-                    if value.shape != shape:
-                        raise ArgumentError(f"outcome {measure.label!r} has the shape {value.shape}, elsewhere {shape}")
-                    done.columns[measure.label][k] = value
-            except Exception as error:  # whatever it is, it is this member's; its row is empty
-                for column in done.columns.values():
-                    column[k] = np.nan
-                done.failures.append((k, _message(error)))
+        (_on_vectors if setting.vectors else _one_by_one)(setting, chunk.values, np.flatnonzero(finite), done)
+    for k in sorted(set(range(n)) - {k for k, _ in done.failures}):
+        wrong = [label for label, column in done.columns.items() if not np.isfinite(column[k]).all()]
+        if wrong:
+            done.fail(k, MemberFailed(f"{', '.join(wrong)}: the outcome is not finite"))
+    done.failures.sort()
     return done
 
 
-def member(setting: Setting, sample: np.ndarray) -> list[np.ndarray]:
-    """The outcomes of one sample. Raises whatever is wrong with it."""
+def _one_by_one(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Done) -> None:
+    """Simulate samples, by their places, one after the other."""
+    for k in rows.tolist():
+        try:
+            solution = motion(setting, values[k])
+            for measure, shape in zip(setting.measures, setting.shapes, strict=True):
+                done.columns[measure.label][k] = _fitting(measure, measure.of(solution), shape)
+        except Exception as error:  # whatever it is, it is this member's
+            _raise_others(error)
+            done.fail(k, error)
+
+
+def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Done) -> None:
+    """Simulate samples, by their places, several at once."""
     module: Module = setting.system.module
-    groups = {name: values.copy() for name, values in setting.base.items()}
-    for (group, place), value in zip(setting.places, sample, strict=True):
-        groups[group][place] = value
+    states, times = list(module.metadata["x"]), setting.times
+    at_once = max(1, NUMBERS // (len(times) * len(states)))
+    for part in (rows[k:k + at_once] for k in range(0, len(rows), at_once)):
+        groups = _groups(setting, values[part])
+        try:
+            batch = module.simulate_batch(groups["q"], groups["u"], groups["parameters"], z=groups["z"], t=times,
+                                          inputs=groups["inputs"], **setting.options)
+        except SymdynError as error:  # of all of them: each tells it for itself
+            _raise_others(error)
+            _one_by_one(setting, values, part, done)
+            continue
+        for place, message in batch.messages.items():
+            done.fail(int(part[place]), MemberFailed(message))
+        well = np.flatnonzero(batch.success)
+        others = [m for m in setting.measures if m.name not in states]
+        for measure in setting.measures:
+            if measure.name in states:
+                over_time = batch.x[well, :, states.index(measure.name)].T
+                done.columns[measure.label][part[well]] = measure.reduce(times, over_time).T
+        for place in well.tolist() if others else ():
+            outcome = Outcome(times, batch.x[place], True, "reached the end", False, int(batch.n_steps[place]),
+                              int(batch.n_rejected[place]), 0)
+            solution = Solution(module, outcome, groups["parameters"][place], Inputs(groups["inputs"][place]), "dop853", 0.0)
+            try:
+                for measure in others:
+                    shape = setting.shapes[setting.measures.index(measure)]
+                    done.columns[measure.label][part[place]] = _fitting(measure, measure.of(solution), shape)
+            except Exception as error:  # whatever it is, it is this member's
+                _raise_others(error)
+                done.fail(int(part[place]), error)
+
+
+def _raise_others(error: Exception) -> None:
+    """What this process lacks is no fault of a member: another one may have it."""
+    if isinstance(error, (NotSent, CompileError, CompilerNotFound, MemoryError)):
+        raise error
+
+
+def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any]) -> bool:
+    """Whether motions can be integrated several at once, with the very steps of `simulate`."""
+    metadata = module.metadata
+    return (module.backend == "c" and not (metadata["constraints"] or metadata["unit_groups"] or consistent)
+            and bool(metadata["x"]) and set(options) <= {"rtol", "atol", "max_step", "first_step"})
+
+
+def motion(setting: Setting, sample: np.ndarray) -> Solution:
+    """The motion of one sample. Raises whatever is wrong with it."""
+    module: Module = setting.system.module
+    groups = {group: rows[0] for group, rows in _groups(setting, sample[None, :]).items()}
     q, u, p = groups["q"], groups["u"], groups["parameters"]
     if setting.consistent:
         keep = [n for n, (group, _) in zip(setting.names, setting.places, strict=True) if group in ("q", "u")]
         q, u = module.consistent(q, u, p, float(setting.times[0]), keep)
     solution = module.simulate(setting.times, q, u, p, z=groups["z"], inputs=groups["inputs"], **setting.options)
     if not solution.success:
-        raise ArithmeticError(solution.message)
-    outcomes = [m.of(solution) for m in setting.measures]
-    wrong = [m.label for m, value in zip(setting.measures, outcomes, strict=True) if not np.isfinite(value).all()]
-    if wrong:
-        raise ArithmeticError(f"{', '.join(wrong)}: the outcome is not finite")
-    return outcomes
+        raise MemberFailed(solution.message)
+    return solution
+
+
+def _groups(setting: Setting, samples: np.ndarray) -> dict[str, np.ndarray]:
+    """Coordinates, speeds, states, parameters and inputs of samples, each (n, ...)."""
+    groups = {name: np.tile(values, (len(samples), 1)) for name, values in setting.base.items()}
+    for (group, place), column in zip(setting.places, samples.T, strict=True):
+        groups[group][:, place] = column
+    return groups
+
+
+def _fitting(measure: Measure, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    if value.shape != shape:
+        raise ArgumentError(f"outcome {measure.label!r} has the shape {value.shape}, elsewhere {shape}")
+    return value
 
 
 def setting_of(system: Any, names: Sequence[str], times: np.ndarray, measures: Sequence[Measure], given: Mapping[str, Any],
@@ -141,5 +228,4 @@ def quiet() -> Iterator[None]:
 
 def _message(error: Exception) -> str:
     text = str(error) or type(error).__name__
-    known = isinstance(error, ArithmeticError) or type(error).__module__.startswith("symdyn")
-    return (text if known else f"{type(error).__name__}: {text}")[:MESSAGE]
+    return (text if isinstance(error, SymdynError) else f"{type(error).__name__}: {text}")[:MESSAGE]

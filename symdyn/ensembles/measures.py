@@ -30,7 +30,7 @@ REDUCTIONS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 }
 # They need no more than the times they are about.
 OF_ONE_TIME = ("start", "end", "at")
-RESERVED = ("samples", "failed", "t", "about")
+RESERVED = ("samples", "failed", "(failures)", "t", "about")
 _ASKED = re.compile(rf"(?P<kind>{'|'.join(REDUCTIONS)})\s+(?P<name>\S.*)")
 _AT = re.compile(r"(?P<name>\S.*?)\s+at\s+(?P<time>[-+.\deE]+)")
 
@@ -53,10 +53,13 @@ class Measure:
         """Its value. Whatever a function of the user raises passes through."""
         if self.function is not None:
             return np.asarray(self.function(solution), dtype=float)
-        values = values_of(solution, self.name)
+        return self.reduce(solution.t, values_of(solution, self.name))
+
+    def reduce(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Its value from those over time, (n_t, ...)."""
         if self.kind == "at":
-            return np.asarray(values[int(np.argmin(np.abs(solution.t - self.time)))])
-        return np.asarray(REDUCTIONS[self.kind](solution.t, values))
+            return np.asarray(values[int(np.argmin(np.abs(t - self.time)))])
+        return np.asarray(REDUCTIONS[self.kind](t, values))
 
     def told(self) -> str:
         """What tells it from others."""
@@ -82,17 +85,25 @@ def functions_of(module: Module, measures: Sequence[Measure]) -> list[str]:
 
 
 def take_measures(asked: Any, module: Module) -> list[Measure]:
-    """Measures as the user gave them.
+    """Measures as the user gave them, see `read_measures`. Raises ArgumentError with all that is wrong."""
+    faults: list[str] = []
+    found = read_measures(asked, module, faults)
+    if faults:
+        raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
+    return found
+
+
+def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure]:
+    """Measures as the user gave them; what is wrong is added to the faults.
 
     asked   None: the end of every coordinate, speed and extra state; texts "end q1", "max q1", "q1 at 2.5", or a mapping from
             labels to texts and to functions of a Solution
-    Raises ArgumentError with all that is wrong.
     """
     if asked is None:
         asked = [f"end {name}" for name in module.metadata["x"]]
     if isinstance(asked, str) or not isinstance(asked, (Sequence, Mapping)) or not asked:
-        raise ArgumentError(f"{module.name}: outcomes must be a list of texts such as 'max q1', or a mapping, found {asked!r:.80}")
-    faults: list[str] = []
+        faults.append(f"outcomes must be a list of texts such as 'max q1', or a mapping, found {asked!r:.80}")
+        return []
     found: list[Measure] = []
     for label, value in asked.items() if isinstance(asked, Mapping) else [(text, text) for text in asked]:
         measure = _measure(label, value, module, faults)
@@ -102,8 +113,6 @@ def take_measures(asked: Any, module: Module) -> list[Measure]:
             faults.append(f"outcome {measure.label!r}: the name is taken; names must differ from each other and from "
                           f"{', '.join(RESERVED)}, and have no /")
         found.append(measure)
-    if faults:
-        raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
     return found
 
 
@@ -148,7 +157,8 @@ def output_times(t: Any, measures: Sequence[Measure], module: Module) -> np.ndar
         times = np.zeros(0)
     way = np.sign(times[-1] - times[0]) if times.ndim == 1 and len(times) > 1 else 0.0
     if not (way and np.isfinite(times).all() and (np.diff(times) * way > 0).all()):
-        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of increasing or decreasing times, found {t!r:.80}")
+        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of increasing or decreasing times, "
+                            f"found {t!r:.80}")
     special = [m.time for m in measures if m.kind == "at"]
     outside = [f"{s:.6g}" for s in special if not min(times) <= s <= max(times)]
     if outside:

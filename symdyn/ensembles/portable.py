@@ -16,6 +16,10 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 
 
+class NotSent(SymdynError):
+    """A function is not among those that came along."""
+
+
 class PortableModule:
     """A module that can be pickled.
 
@@ -78,8 +82,8 @@ def _module(backend: str, packed: bytes) -> Module:
     def provide(name: str) -> Unit:
         there = name if name in units else next((n for n, u in units.items() if name in u["metadata"]["shapes"]), None)
         if there is None:
-            raise SymdynError(f"{record['metadata']['name']}: {name} was not sent along; it was not used by the samples that were "
-                              "tried in advance. Name it in `functions`")
+            raise NotSent(f"{record['metadata']['name']}: {name} was not sent along; it was not used by the samples that "
+                          "were tried in advance. Name it in `functions`")
         source, metadata = units[there]["source"], units[there]["metadata"]
         return (CUnit(source, metadata, require_compiler()) if backend == "c"
                 else PythonUnit.from_source(source, metadata["name"]))

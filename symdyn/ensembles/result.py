@@ -19,7 +19,8 @@ class Ensemble:
     """Outcomes of all members, in the order of the samples; arrays are read from the file when they are asked for.
 
     path       the folder;  file: its ensemble.npz
-    names      what was sampled;  labels: outcomes
+    names      what was sampled, of which `varied` is not the same in all;  labels: outcomes, `traces` those over the times t;
+               shapes: of one member's outcomes
     count      number of members;  n_failed: how many of them have no outcome
     n_resumed  how many had been computed before;  seconds: wall time of the others
     """
@@ -30,12 +31,13 @@ class Ensemble:
         with reading(self.file) as archive:
             about = json.loads(str(archive["about"]))
             self.t: np.ndarray = archive["t"]
-            self.n_failed = int(archive["failed"].sum())
+        self.n_failed: int = about["n_failed"]
         self.name: str = about["system"]
         self.names: tuple[str, ...] = tuple(about["names"])
         self.varied: tuple[str, ...] = tuple(about["varied"])
         self.labels: tuple[str, ...] = tuple(about["outcomes"])
         self.traces: tuple[str, ...] = tuple(about["traces"])
+        self.shapes: dict[str, tuple[int, ...]] = {n: tuple(s) for n, s in about["shapes"].items()}
         self.units: dict[str, str] = about["units"]
         self.count: int = about["count"]
 

@@ -57,7 +57,8 @@ class Samples:
             faults.append(f"{where}: {sampling} needs a count, a whole number from 1 on, found {count!r}")
         elif not drawn and free:
             faults.append(f"{where}: {sampling} needs lists or {{from, to, count}}; {', '.join(free)} "
-                          f"{'have' if len(free) > 1 else 'has'} a distribution, which goes with random, latin_hypercube or sobol")
+                          f"{'have' if len(free) > 1 else 'has'} a distribution, for which there are random, latin_hypercube "
+                          "and sobol")
         if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
             faults.append(f"{where}: the seed must be a whole number from 0 on, found {seed!r}")
         lengths = {n: len(a.values) for n, a in axes.items() if a.values is not None and a.varies}
@@ -109,8 +110,10 @@ class Samples:
             from scipy.stats import qmc
 
             engine = qmc.Sobol(n, seed=self.seed)
-            engine.fast_forward(first)
-            return np.asarray(engine.random(len(k)))
+            if first:
+                engine.fast_forward(first)
+                return np.asarray(engine.random(len(k)))
+            return np.vstack([engine.random(1), engine.random(len(k) - 1)])  # so it does not ask for a power of two
         # Philox counts in fours of numbers: any of them is reached at once.
         generator = np.random.Philox(self.seed)
         generator.advance(first * n // 4)

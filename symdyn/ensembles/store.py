@@ -43,15 +43,18 @@ class Store:
             left.unlink(missing_ok=True)
         return {k for k in range(self.n_chunks) if self._is_whole(k)}
 
-    @property
     def complete(self) -> bool:
-        """Whether the run came to its end."""
-        return (self.folder / RESULT).is_file()
+        """Whether the run came to its end; then what it may have left is removed."""
+        if not (self.folder / RESULT).is_file():
+            return False
+        shutil.rmtree(self.chunks, ignore_errors=True)
+        return True
 
     def put(self, done: Done) -> None:
         """Keep a chunk. Raises OSError as the disk does."""
         failures = np.frombuffer(json.dumps(done.failures).encode(), dtype=np.uint8)
-        write_archive(self._path(done.index), [*(Entry.of(n, c) for n, c in done.columns.items()), Entry.of("(failures)", failures)])
+        columns = [Entry.of(label, column) for label, column in done.columns.items()]
+        write_archive(self._path(done.index), [*columns, Entry.of("(failures)", failures)])
 
     def samples_in(self, chunk: int) -> int:
         return min(self.size, self.count - chunk * self.size)
@@ -88,6 +91,7 @@ class Store:
                     file.write(json.dumps(line).encode() + b"\n")
 
         write_whole(self.folder / FAILURES, tell)
+        about = {**about, "n_failed": sum(len(self._failures(k)) for k in range(self.n_chunks))}
         write_archive(self.folder / RESULT, [
             Entry("samples", (self.count, len(names)), np.dtype(float), samples()),
             *(Entry(label, (self.count, *shape), np.dtype(float), column(label)) for label, shape in self.columns.items()),
@@ -118,7 +122,7 @@ def check_folder(folder: Path, resume: bool) -> dict[str, Any] | None:
     """The manifest in a folder; None if no run began there. Raises ArgumentError unless that is as it was asked for."""
     path = folder / MANIFEST
     if not path.is_file():
-        if folder.is_dir() and any(folder.iterdir()):
+        if folder.is_dir() and any(not p.name.startswith(".") for p in folder.iterdir()):  # what a kill left is hidden
             raise ArgumentError(f"{folder} is not empty, and holds no ensemble; name another folder")
         return None
     if not resume:
@@ -150,7 +154,7 @@ def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
 
 def read_failures(folder: Path, most: int | None = None) -> list[dict[str, Any]]:
     """Members that failed: index, values, message."""
-    found = []
+    found: list[dict[str, Any]] = []
     with (folder / FAILURES).open(encoding="utf-8") as file:
         for line in file:
             if most is not None and len(found) >= most:

@@ -33,7 +33,7 @@ class Beam:
     axis              "x", "y" or "z" of the frame, along the beam, clamp to tip; the transverse directions are the next two
                       in cyclic order: x and y for "z", y and z for "x"
     twist             rad at the stations: the principal axes of bending are turned by it about the axis
-    damping_ratio     of the clamped modes: one number, or one for each mode in the order of rising frequency. D is
+    damping_ratio     of the clamped modes, below 1: one number, or one for each mode in the order of rising frequency. D is
                       Me Phi diag(2 zeta omega) Phi^T Me with the modes Phi of (Me, K) of unit modal mass, no tip body
     integration       "exact": Gauss-Legendre between all stations, exact for piecewise polynomials, thus everything but the
                       twist's sines. "stations": mass and stiffness integrals on the table's stations alone, products of
@@ -149,6 +149,8 @@ def _ratios(value: Any, n: int, faults: list[str]) -> np.ndarray:
         faults.append(f"damping_ratio has {row.size} values for {n} modes; pass one number, or one for each mode")
     if (row < 0).any():
         faults.append(f"damping_ratio is {row.min():g}; it must not be negative")
+    if (row >= 1).any():
+        faults.append(f"damping_ratio is a fraction of critical damping below 1, {row.max():g} given; 5 % is 0.05")
     return row
 
 

@@ -25,6 +25,7 @@ class Symbols:
     """The symbols of the equations, in the order of the generated code's arguments, with numbers and units.
 
     reach   how far from zero a coordinate may sensibly be, where it must stay small: elastic ones
+    masses  parameters that stand alone as the mass of a body, with the name of one; point_units: outputs that are points
     """
 
     coordinates: tuple[sp.Symbol, ...]
@@ -37,6 +38,8 @@ class Symbols:
     units: Mapping[sp.Symbol, str] = field(default_factory=dict)
     duration: float = 10.0
     reach: Mapping[sp.Symbol, float] = field(default_factory=dict)
+    masses: Mapping[sp.Symbol, str] = field(default_factory=dict)
+    point_units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

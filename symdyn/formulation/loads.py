@@ -113,8 +113,8 @@ class Loads:
             away = exactly(body.beam.Psi_tip) @ body.eta / exact(body.beam.length)
             part = self.algebra.sqrt(dot(away, away))
         return Watch(f"deflection of {name}", part, -math.inf, FAR,
-                     f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to second "
-                     f"order, which is meant for deflections below {FAR:g}")
+                     f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to "
+                     f"second order, which is meant for deflections below {FAR:g}")
 
     # -- each kind
 

@@ -15,6 +15,7 @@ from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.provenance import OfBodies
 from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed, Joint, Modal
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.record import Model
@@ -48,11 +49,18 @@ def tree_of(model: Model, frames: str) -> Tree:
     return build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), frames == "parallel")
 
 
+def _point_units(model: Model) -> dict[str, str]:
+    """Outputs that are places, velocities and accelerations of points."""
+    units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+    return {o.name: units[o.value.quantity] for o in model.outputs if isinstance(o.value, Point) and o.value.quantity in units}
+
+
 def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], again: Callable[[], E], **more: Any) -> E:
     """The equations that hold the quantities of a tree; again: derives them anew."""
     model, tree, algebra = quantities.model, quantities.tree, quantities.algebra
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
-                      model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model))
+                      model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model),
+                      {b.mass: b.name for b in reversed(model.bodies) if b.mass in model.parameters}, _point_units(model))
     recorded = quantities.quantities()
     lengths = [e for shape in model.shapes for e in shape.expressions]
     if lengths:

@@ -19,11 +19,12 @@ from symdyn.model.elements import AddedMass, Element
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint, Modal
 from symdyn.model.loads import Force, JointForce
-from symdyn.model.loop_check import constraint_faults, idle_coordinate_faults, loop_faults, with_carriers
+from symdyn.model.loop_check import idle_coordinate_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
-from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, take_over, time
+from symdyn.model.record import Model
+from symdyn.model.symbol_check import check_coordinates, check_symbols, spelling, symbols_in
+from symdyn.model.symbols import take_over
 from symdyn.model.uses import units_of, uses
 
 if TYPE_CHECKING:
@@ -63,9 +64,9 @@ class _Checker:
         order = self._tree()
         if s.planar:
             self.faults += plane_faults([*self.joints, *(j for j in s.loops if isinstance(j, Joint))], s.ground_motion)
-        self._coordinates()
-        self._symbols()
-        elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in _symbols_in(expressions)]
+        self.coordinates, self.speeds = check_coordinates(s, self.joints, self.faults)
+        self.parameters, self.inputs = check_symbols(s, self.joints, self.loads, self.coordinates, self.speeds, self.faults)
+        elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in symbols_in(expressions)]
         self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
         self._loads()
         self._shapes()
@@ -104,19 +105,17 @@ class _Checker:
                 if count > 1 and kind != "loads":
                     self.faults.append(f"{count} {kind} are named {name!r}; give each a name of its own")
             if kind != "outputs":
-                self._spelling(f"the {kind}", names)
+                spelling(self.faults, f"the {kind}", names)
         for joint, count in Counter(s.joints).items():
             if count > 1:
                 self.faults.append(f"joint {joint.name!r} was added {count} times; add it once")
+        for load in {id(load): load for load in s.loads}.values():
+            count = sum(other is load for other in s.loads)
+            if count > 1:
+                self.faults.append(f"{load.label} was added {count} times; add it once, or make another one")
         for output in s.outputs:
             if not isinstance(output.name, str) or not output.name.isidentifier():
                 self.faults.append(f"an output is named {output.name!r}; pass an identifier such as 'tip'")
-
-    def _spelling(self, what: str, names: Iterable[Any]) -> None:
-        for name in names:
-            if not isinstance(name, str) or not NAME.fullmatch(name):
-                self.faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
-                                   "_ . , : + - * / ^ ' # % and brackets")
 
     # -- tree
 
@@ -189,113 +188,6 @@ class _Checker:
                 self.faults.append(f"body {body.name!r} has no joint; join it to a parent (a body that moves freely: Free)")
         return sorted(order, key=lambda e: self.joints.index(e[0])) if _sorted_is_tree(order, self.joints) else order
 
-    # -- coordinates and speeds
-
-    def _coordinates(self) -> None:
-        s = self.system
-        driver: dict[sp.Symbol, Joint] = {}
-        coordinates: list[sp.Symbol] = []
-        speeds: list[sp.Symbol] = []
-        for joint in self.joints:
-            independent = [isinstance(q, Coordinate) for q in joint.coordinates]
-            if joint.symbols_only and not all(independent) and not joint.faults:
-                self.faults.append(f"joint {joint.name!r}: {joint.symbols_only}")
-            for place, q in enumerate(joint.coordinates):
-                if not isinstance(q, Coordinate):
-                    continue
-                if q in driver:
-                    independent[place] = False
-                    self.faults.append(
-                        f"joints {driver[q].name!r} and {joint.name!r} both drive the coordinate {q}; give each its own, "
-                        f"or write one as an expression (gear: 2*{q}; mimic: sympy.UnevaluatedExpr({q}))")
-                    continue
-                driver[q] = joint
-                coordinates.append(q)
-            if not joint.symbols_only:
-                speeds += [u for u, free in zip(joint_speeds(joint), independent, strict=True) if free]
-            else:
-                speeds += [u for u in joint_speeds(joint) if u is not None]
-        for q in dict.fromkeys(s.extra_coordinates):
-            if q in driver:
-                self.faults.append(f"{q} was given to add_coordinate, but joint {driver[q].name!r} has it for its own; "
-                                   "leave out add_coordinate")
-            else:
-                coordinates.append(q)
-                speeds.append(q.dot)
-        for u, count in Counter(speeds).items():
-            if count > 1:
-                self.faults.append(f"the speed {u} belongs to {count} joints; give each a name of its own")
-        self.coordinates, self.speeds = tuple(dict.fromkeys(coordinates)), tuple(dict.fromkeys(speeds))
-        states = [z.symbol for z in s.states]
-        for symbol, count in Counter([*self.coordinates, *self.speeds, *dict.fromkeys(states)]).items():
-            if count > 1:
-                roles = [role for role, members in (("a coordinate", self.coordinates), ("a speed", self.speeds),
-                                                    ("a state", states)) if symbol in members]
-                self.faults.append(f"{symbol} is {' and '.join(roles)} at once; give each a symbol of its own")
-        if s.bodies and s.joints and not coordinates and not states and not any(j.faults for j in s.joints):
-            self.faults.append("no joint has a coordinate of its own, so nothing can move; give one a coordinate: "
-                               "sd.coordinates('q')")
-
-    # -- symbols and where they are used
-
-    def _symbols(self) -> None:
-        s = self.system
-        moving = {time, *self.coordinates, *[q.dot for q in self.coordinates], *self.speeds,
-                  *[z.symbol for z in s.states]}
-        parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
-        inputs: dict[sp.Symbol, None] = {}
-        for where, expressions, constant in uses(s, self.joints, self.loads):
-            for symbol in _symbols_in(expressions):
-                if isinstance(symbol, Acceleration):
-                    self.faults.append(f"{where} uses the acceleration {symbol}; loads and rates may use coordinates, "
-                                       "speeds, states, inputs and t")
-                elif symbol.name == "t" and symbol != time:
-                    self.faults.append(f"{where} uses a symbol t with assumptions, which is not the time; use symdyn.t")
-                elif constant and (symbol in moving or isinstance(symbol, (Coordinate, Rate, Input))):
-                    self.faults.append(f"{where} depends on {symbol}, but must be constant; use parameters and numbers")
-                elif symbol in moving:
-                    continue
-                elif isinstance(symbol, (Coordinate, Rate)):
-                    found = ", ".join(map(str, self.coordinates)) or "none"
-                    self.faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {found}; "
-                                       f"give {symbol} a joint, or use a parameter or input in its place")
-                elif isinstance(symbol, Input):
-                    inputs[symbol] = None
-                elif s.declared is not None and symbol not in s.declared:
-                    declared = ", ".join(map(str, s.declared)) or "none"
-                    self.faults.append(f"{where} uses the symbol {symbol}, not declared in the model; declared: {declared}; "
-                                       f"add {symbol} to the parameters or remove it")
-                else:
-                    parameters[symbol] = None
-        states = {z.symbol for z in s.states}
-        self.faults += constraint_faults(s.constraints, moving - states - {time}, states, self.speeds)
-        for joint in self.joints:
-            for q in joint.coordinates:
-                rates = [] if isinstance(q, Coordinate) else [
-                    a for a in _symbols_in([q]) if a in self.speeds or a in states or isinstance(a, (Rate, Input))]
-                if rates:
-                    self.faults.append(f"joint {joint.name!r}: its coordinate {q} uses {', '.join(map(str, rates))}; "
-                                       "a dependent coordinate may use coordinates, t and parameters")
-        if s.ground_motion is not None:
-            free = [a for a in _symbols_in(s.ground_motion.coordinates) if a in moving - {time} or isinstance(a, Input)]
-            if free:
-                self.faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t and parameters")
-        self.parameters, self.inputs = tuple(parameters), tuple(inputs)
-        everything = dict.fromkeys([*self.coordinates, *self.speeds, *[z.symbol for z in s.states], *self.parameters,
-                                    *self.inputs])
-        names = Counter(a.name for a in everything)
-        for name, count in names.items():
-            if count > 1:
-                self.faults.append(f"{count} different symbols are named {name!r} (by kind or assumptions); "
-                                   "make each symbol once, or give them different names")
-        if "t" in names:
-            self.faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
-        for u in self.speeds:
-            if f"{u.name}_dot" in names:
-                self.faults.append(f"the name {u.name + '_dot'!r} stands for the derivative of the speed {u}; "
-                                   "give the other symbol of this name another one")
-        self._spelling("the symbols", names)
-
     # -- loads, numbers, units
 
     def _loads(self) -> None:
@@ -303,6 +195,7 @@ class _Checker:
         for load in self.loads:
             if isinstance(load, (Element, AddedMass)):
                 self.faults.extend(load.faults)
+                self.doubts += load.doubts if isinstance(load, Element) else []
                 if load.body is self.system.ground or load.body == "ground":
                     self.faults.append(f"{load.label} acts on the ground, so that nothing comes of it; pass a body that moves")
             if isinstance(load, JointForce):
@@ -334,7 +227,7 @@ class _Checker:
             ends = [shape.about["to"]] if shape.about.get("to") is not None else []
             for body in (shape.body, *ends):
                 self._resolve(body, shape.what)
-            strange = [a for a in _symbols_in(shape.expressions) if a not in self.parameters]
+            strange = [a for a in symbols_in(shape.expressions) if a not in self.parameters]
             if strange:
                 self.faults.append(f"{shape.what} uses {', '.join(map(str, strange))}, which the mechanism does not have for a "
                                    f"parameter; there are {', '.join(map(str, self.parameters)) or 'none'}; pass numbers")
@@ -387,15 +280,6 @@ class _Checker:
             self.faults.append(f"{what} is {value!r}; pass a finite number")
             return None
         return number
-
-
-def _symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
-    """Free symbols in order of the expressions, by name within one expression."""
-    found: dict[sp.Symbol, None] = {}
-    for e in expressions:
-        for symbol in sorted(e.free_symbols, key=lambda a: a.name):
-            found[symbol] = None
-    return list(found)
 
 
 def _in_loop(body: int, edges: dict[int, tuple[Joint, int]]) -> bool:

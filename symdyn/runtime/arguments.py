@@ -76,6 +76,6 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
 
 
 def _finite(array: np.ndarray, names: Sequence[str], what: str, owner: str) -> None:
-    bad = [f"{n} = {v}" for n, v in zip(names, array, strict=True) if not np.isfinite(v)]
-    if bad:
+    if not np.isfinite(array).all():
+        bad = [f"{n} = {v}" for n, v in zip(names, array, strict=True) if not np.isfinite(v)]
         raise ArgumentError(f"{owner}: {what} must be finite, found {', '.join(bad)}")

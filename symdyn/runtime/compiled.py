@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, not_converged
@@ -173,12 +174,14 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _FIELD_FAILED:
         x_fail = report[8 + n:8 + 2 * n]
-        why = _dependent(module, run, report[7], x_fail)
+        why = _dependent(module, run, report[7], x_fail) + _inputs(module, run, report[7], x_fail)
         return describe_stop(metadata, report[7], x_fail, run.unit.reason(int(report[5])) + why)
     if status == _NOT_FINITE:
         bad = int(report[6])
         name = metadata["x"][bad] if 0 <= bad < n else "the state"
-        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], f"the derivative of {name} is not finite")
+        x_fail = report[8 + n:8 + 2 * n]
+        why = _inputs(module, run, report[7], x_fail)
+        return describe_stop(metadata, report[7], x_fail, f"the derivative of {name} is not finite{why}")
     if status == _PROJECTION_FAILED:
         x_fail = report[8 + n:8 + 2 * n]
         why = _dependent(module, run, report[7], x_fail)
@@ -193,6 +196,15 @@ def _dependent(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
     """What to add to a message where constraints depend on each other, unlike at the start."""
     n, request = module.metadata["sizes"]["x"], run.request
     return lost_rank(module, t, x[:n], request.p, request.x0[:n], request.span[0])
+
+
+def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
+    """What to add to a message where an input is not finite; a function of the user is asked once more."""
+    request = run.request
+    try:
+        return not_finite(module.metadata["inputs"], request.inputs.at(t, x[:request.n_state].copy()), t)
+    except Exception:
+        return ""
 
 
 def _off(module: Module, run: _Run, report: np.ndarray) -> str:

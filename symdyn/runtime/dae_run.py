@@ -15,6 +15,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
 from symdyn.runtime.constraints import names, rank
+from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import ProjectionFailed, Projector
 from symdyn.runtime.stops import describe_stop, lost_rank, with_last
@@ -73,7 +74,7 @@ def run_ggl(module: Module, request: Request, bar: Any = None) -> Outcome:
             return evaluator.one(t, state, inputs, yd)
         except EvaluationError as error:
             if np.isfinite(y).all() and np.isfinite(yd).all():
-                trouble.append(str(error).removeprefix(f"{module.name}: "))
+                trouble.append(str(error).removeprefix(f"{module.name}: ") + not_finite(module.metadata["inputs"], inputs, t))
             return np.full(len(y), np.nan)
 
     t0, t_end = request.span

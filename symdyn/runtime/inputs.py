@@ -46,6 +46,13 @@ class Inputs:
         return np.array([self.at(tk, xk) for tk, xk in zip(t, x, strict=True)]).reshape(len(t), len(self.constant))
 
 
+def not_finite(names: Sequence[str], values: Any, t: float) -> str:
+    """What to add to a message where a function failed: inputs that are not finite there."""
+    rows = () if values is None else values
+    wrong = [f"{name} is {value:g}" for name, value in zip(names, rows, strict=False) if not np.isfinite(value)]
+    return f"; the input {', '.join(wrong)} at t = {t:.6g}" if wrong else ""
+
+
 def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], owner: str) -> Inputs:
     """Inputs as the user gave them.
 

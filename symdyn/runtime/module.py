@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from symdyn.runtime.arguments import take
 from symdyn.runtime.unit import Evaluator, Unit
 
 if TYPE_CHECKING:
+    from symdyn.runtime.batch_solution import BatchSolution
     from symdyn.runtime.solution import Solution
     from symdyn.runtime.statics.campbell import Campbell
     from symdyn.runtime.statics.equilibria import Equilibria
@@ -79,6 +81,28 @@ class Module:
         except (TypeError, ValueError):  # rows of states or of times, or no numbers at all
             return self.evaluate("rhs", t, x, params, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
+
+    def rhs_batch(self, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
+        """x_dot (n, n_x) at rows of states x (n, n_x), with the C backend several at once on the processor's vectors.
+
+        t                one time or (n,)
+        params, inputs   as everywhere, or with an array (n,) for each name that varies, or (n, n_p), (n, n_in)
+        out              where the result goes, else a new array
+
+        Rows that cannot be evaluated are NaN, and an EvaluationWarning tells which and why. Values have the same bits as
+        those of `rhs`. Quickest with states entry by entry in memory (x = a.T of an array a (n_x, n)).
+        """
+        from symdyn.runtime.batch import rhs_batch
+
+        return rhs_batch(self, t, x, params, inputs, out)
+
+    @property
+    def batch_width(self) -> int:
+        """How many states one processor core computes at once in `rhs_batch` and `simulate_batch`; 1: the backend is NumPy, or
+        the C compiler has no vectors."""
+        from symdyn.runtime.batch import width
+
+        return width(self)
 
     def evaluate(self, name: str, t: Any, x: Any, params: Any = None, inputs: Any = (), ud: Any = ()) -> np.ndarray:
         """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
@@ -160,6 +184,11 @@ class Module:
         """Parameters in order, (n_p,)."""
         return take(params, self.metadata["parameters"], "parameters", self._defaults, self.name)
 
+    @functools.cached_property
+    def default_parameters(self) -> np.ndarray:
+        """Their defaults, (n_p,). Raises ArgumentError for those without one."""
+        return self.parameters()
+
     # -- constraints
 
     def consistent(self, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
@@ -198,6 +227,12 @@ class Module:
         from symdyn.runtime.simulate import simulate
 
         return simulate(self, t, q, u, params, **options)
+
+    def simulate_batch(self, q: Any = None, u: Any = None, params: Any = None, **options: Any) -> BatchSolution:
+        """Integrate many motions; see symdyn.runtime.batch_run.simulate_batch for all options."""
+        from symdyn.runtime.batch_run import simulate_batch
+
+        return simulate_batch(self, q, u, params, **options)
 
     # -- statics and linearization
 

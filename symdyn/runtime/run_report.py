@@ -11,6 +11,7 @@ import symdyn
 from symdyn.errors import ArgumentError
 from symdyn.folders import templates_folder
 from symdyn.runtime import run_tables
+from symdyn.runtime.paths import as_path
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -24,7 +25,7 @@ def write_report(solution: Solution, path: Any) -> Path:
 
     Raises ArgumentError for another ending than .html and where it cannot be written, MissingExtra without matplotlib.
     """
-    target = Path(path)
+    target = as_path(path, "where to write the report", "run.html")
     if target.suffix.lower() not in (".html", ".htm"):
         raise ArgumentError(f"cannot write the report to {target.name}: the ending must be .html")
     text = page(solution)

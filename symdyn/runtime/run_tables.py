@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.runtime.solution import REST
 from symdyn.runtime.watches import WATCHES, watched
 
 if TYPE_CHECKING:
@@ -122,8 +121,9 @@ def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
             flat = rows.reshape(len(solution.t), -1)
             point = points.get(name)
             for k, values in enumerate(flat.T):
-                place = "" if flat.shape[1] == 1 else f"[{k}]" if point is None else f" {'xyz'[k]}"
-                yield "output", name + place, "" if point is None else point.unit, values
+                told = metadata.get("output_units", {}).get(name, "") if point is None else point.unit
+                place = "" if flat.shape[1] == 1 else f" {'xyz'[k]}" if told else f"[{k}]"
+                yield "output", name + place, unit(told), values
 
 
 def _mean(t: np.ndarray, values: np.ndarray) -> float:
@@ -140,9 +140,7 @@ def energy(solution: Solution) -> Energy | None:
         return None
     change = solution.energy - solution.energy[0]
     difference = float(np.abs(change - solution.work).max())
-    kinetic, potential = solution.energies.T
-    rests = max(kinetic.max(), np.ptp(potential)) < REST * np.abs(potential).max()
-    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(), bool(rests),
+    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(), solution.energy_scale[1],
                   np.column_stack([solution.work, change]))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.inputs import Inputs, not_finite
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
@@ -91,7 +91,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
             return evaluator.one(s, x, inputs)
         except EvaluationError as error:
             if np.isfinite(x).all():
-                trouble.append(str(error).removeprefix(f"{module.name}: "))
+                trouble.append(str(error).removeprefix(f"{module.name}: ") + not_finite(module.metadata["inputs"], inputs, s))
                 failed[:] = [(s, x.copy())]
             return np.full(len(x), np.nan)
 

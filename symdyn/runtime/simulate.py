@@ -14,6 +14,7 @@ from symdyn.runtime.arguments import take
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.inputs import take_inputs
+from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
@@ -59,15 +60,15 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     Raises ArgumentError for values that do not fit.
     """
     metadata = module.metadata
-    p = module.parameters(params)
+    p = real_parameters(module, params)
     start = _start(module, q, u, z)
     free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name)
-    times, span, every = _times(module, t, steps)
+    times, span, every = checked_times(module, t, steps)
     if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and max_steps > 0)):
         raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, or None, found {max_steps!r}")
-    request = Request(span, None if every else times, start, p, free, *_tolerances(module, rtol, atol),
-                      _positive(module, max_step, "max_step"), _positive(module, first_step, "first_step"), max_steps,
-                      len(start))
+    request = Request(span, None if every else times, start, p, free, *checked_tolerances(module, rtol, atol),
+                      checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
+                      max_steps, len(start))
     if work and "power" not in metadata["functions"]:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or ("dop853" if module.backend == "c" else "DOP853")
@@ -137,7 +138,7 @@ def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
     return normalised(module, np.concatenate(parts))
 
 
-def _times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
+def checked_times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Output times, span, whether every step is stored."""
     if t is None:
         t = (0.0, module.metadata["duration"])
@@ -155,7 +156,7 @@ def _times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float
     return times, (times[0], times[-1]), False
 
 
-def _tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray]:
+def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray]:
     n = module.metadata["sizes"]["x"]
     absolute = rtol if atol is None else atol
     try:
@@ -171,7 +172,7 @@ def _tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray
     return max(relative, SMALLEST_RTOL), vector
 
 
-def _positive(module: Module, value: Any, what: str) -> float:
+def checked_positive(module: Module, value: Any, what: str) -> float:
     if not (isinstance(value, (int, float, np.number)) and value >= 0):
         raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {value!r}")
     return 0.0 if not np.isfinite(value) else float(value)

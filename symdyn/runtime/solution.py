@@ -6,6 +6,7 @@ import contextlib
 import csv
 import difflib
 import json
+import os
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +18,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome
+from symdyn.runtime.paths import as_path
 from symdyn.runtime.reactions import reaction, reactions, unique_reactions
 
 if TYPE_CHECKING:
@@ -200,11 +202,16 @@ class Solution:
 
         Raises ArgumentError as `work` does.
         """
-        kinetic, potential = self.energies.T
-        scale = max(kinetic.max(), np.ptp(potential))
-        if scale < REST * np.abs(potential).max():
-            scale = np.abs(potential).max()
+        scale, _ = self.energy_scale
         return float(np.abs(self.energy - self.energy[0] - self.work).max() / scale) if scale > 0 else 0.0
+
+    @property
+    def energy_scale(self) -> tuple[float, bool]:
+        """What errors of energy are measured by, J, see `energy_error`; and whether the mechanism rests."""
+        kinetic, potential = self.energies.T
+        moving, whole = float(max(kinetic.max(), np.ptp(potential))), float(np.abs(potential).max())
+        rests = moving < REST * whole
+        return whole if rests else moving, rests
 
     # -- pictures and files
 
@@ -219,13 +226,15 @@ class Solution:
 
     def picture(self, t: Any = None, path: Any = None, view: Any = None) -> Any:
         """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
-        it if a path is given.
+        it if a path is given, which may also stand alone: picture("rest.png").
 
         view   as for `plot`, or one for each picture
         Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
         """
         from symdyn.runtime.pictures import picture
 
+        if path is None and isinstance(t, (str, os.PathLike)):
+            t, path = None, t
         return picture(self, t, path, view)
 
     def animate(self, path: Any = None, fps: int = 25, speed: float = 1.0, view: Any = None) -> Any:
@@ -249,7 +258,7 @@ class Solution:
 
         Raises ArgumentError for another ending.
         """
-        path = Path(path)
+        path = as_path(path, "where to save the motion", "run.npz")
         if path.suffix in (".npz", ".csv"):
             path.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix == ".npz":

@@ -174,6 +174,19 @@ class PythonUnit:
     def evaluator(self, name: str) -> PythonEvaluator:
         return PythonEvaluator(self, name)
 
+    def broadcast(self, name: str, t: np.ndarray, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """A function that gives rows, at t (n,), x (n, n_x), parameters (n, n_p) and inputs (n, n_in): (n, n_out).
+
+        Raises ArithmeticError or ValueError where a single state cannot be evaluated.
+        """
+        sizes = self.metadata["sizes"]
+        x, p, inputs = (a.T for a in (x, p, inputs))
+        q, u, z = np.split(x, np.cumsum([sizes["q"], sizes["u"]]))
+        many = self.module._MANY
+        with np.errstate(all="ignore"):
+            result = many[name](t, q, u, z, np.zeros((sizes["ud"], 1)), inputs, p, many["prologue"](p))
+            return np.stack([np.broadcast_to(r, t.shape) for r in result], axis=-1)
+
 
 class PythonEvaluator:
     """One function of a generated Python module."""

@@ -71,7 +71,7 @@ def get(name: str, **options: Any) -> System:
 
     Raises SymdynError for a name that the catalogue does not have.
     """
-    if name not in _CATALOGUE:
+    if not isinstance(name, str) or name not in _CATALOGUE:
         near = difflib.get_close_matches(str(name), _CATALOGUE, n=3, cutoff=0.5)
         hint = f"did you mean {' or '.join(near)}? It has" if near else "it has"
         raise SymdynError(f"the catalogue has no system {name!r}; {hint} {', '.join(_CATALOGUE)}")

@@ -56,7 +56,7 @@ def floating_crane(cargo: str = "hook") -> System:
     bottom; the cargo on deck in the middle, 14 m above the bottom.
     Source: lecture, chapter 6.1.
     """
-    if cargo not in _LOADS:
+    if not isinstance(cargo, str) or cargo not in _LOADS:
         raise ModelError([f"floating_crane has no cargo {cargo!r}; pass {' or '.join(map(repr, _LOADS))}"])
     g, rho = parameters("g rho")
     system = System("floating_crane" if cargo == "hook" else f"floating_crane_{cargo}", gravity=[0, 0, -g])

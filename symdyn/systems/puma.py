@@ -79,7 +79,7 @@ def puma560(convention: str = "standard", general: bool = False, motors: bool = 
     Source: P. Corke, Robotics Toolbox (inertial data after B. Armstrong, O. Khatib, J. Burdick, 1986); modified
     convention: test data of C. D. Sousa's SymPyBotics, computed with the same toolbox.
     """
-    if convention not in _CONVENTIONS:
+    if not isinstance(convention, str) or convention not in _CONVENTIONS:
         raise ModelError([f"puma560 has no convention {convention!r}; pass {' or '.join(map(repr, _CONVENTIONS))}"])
     q = coordinates("q1:7")
     g = parameters("g")

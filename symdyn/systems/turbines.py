@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from typing import Any
 
 from symdyn.errors import ModelError
@@ -130,8 +131,8 @@ def land_wind_turbine(rotor: str = "free", blades: str = "three", wind: bool = T
 def _system(name: str, options: dict[str, Any]) -> System:
     """An empty system with gravity, named after its variant. Raises ModelError for options that there are not."""
     faults = [f"{name} has no {option} {value!r}; pass {' or '.join(map(repr, _CHOICES[option]))}"
-              for option, value in options.items() if value not in _CHOICES[option]]
-    if options["flexible"] in (True, "blades") and options["blades"] == "lumped":
+              for option, value in options.items() if not isinstance(value, Hashable) or value not in _CHOICES[option]]
+    if not faults and options["flexible"] in (True, "blades") and options["blades"] == "lumped":
         faults.append(f"{name}: blades are lumped, but flexible is {options['flexible']!r}; pass blades='three' or "
                       "flexible='tower'")
     if faults:

@@ -270,6 +270,7 @@ GOOD = {"stations": STATIONS, "mass_per_length": MASS, "stiffness": EI, "shapes"
     ({"draw": 1}, "draw is 1; pass a whole number"),
     ({"damping_ratio": [0.1, 0.2]}, "damping_ratio has 2 values for 1 modes"),
     ({"damping_ratio": -0.1}, "damping_ratio is -0.1; it must not be negative"),
+    ({"damping_ratio": 5}, "damping_ratio is a fraction of critical damping below 1, 5 given; 5 % is 0.05"),
     ({"damping_ratio": "none"}, "damping_ratio is .*; pass a list of numbers"),
     ({"shapes": []}, "shapes is .*; pass a list of sd.Shape"),
     ({"shapes": 0}, "shapes is 0; pass a list of sd.Shape"),

@@ -277,6 +277,22 @@ def test_a_free_end_that_carries_nothing() -> None:
     np.testing.assert_allclose(matrices[0], matrices[1], rtol=1e-14)
 
 
+FACTORS = {"no stiffness": ({"stiffness": 0}, "stiffness is 0; pass a number above 0"),
+           "negative stiffness": ({"stiffness": -1}, "stiffness is -1; pass a number above 0"),
+           "negative damping": ({"damping": -0.5}, "damping is -0.5; pass a number that is not below 0"),
+           "carries": ({"carries": "no"}, "carries is 'no'; pass True or False")}
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_what_a_flexible_body_cannot_have(name: str) -> None:
+    options, message = FACTORS[name]
+    system = sd.System("clamped", gravity=[0, 0, 0])
+    beam = system.add_flexible_body("beam", sd.Beam([0, 1], 1.0, 1.0, in_both(1)), **options)
+    system.add_joint(sd.Fixed("clamp", system.ground, beam.root))
+    with pytest.raises(sd.ModelError, match=f"joint 'beam_bends': {message}"):
+        system.check()
+
+
 def test_a_free_end_that_does_not_follow_carries_nothing() -> None:
     system = sd.System("clamped", gravity=[0, 0, 0])
     beam = system.add_flexible_body("beam", sd.Beam([0, 1], 1.0, 1.0, in_both(1)), carries=False)

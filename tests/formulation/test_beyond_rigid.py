@@ -134,6 +134,30 @@ def test_unsymmetric_added_mass() -> None:
         system.check()
 
 
+ADDED_MASS_FAULTS: dict[str, tuple[Any, dict[str, Any], str]] = {
+    "negative": ([1, 2, -3, 4, 5, 6], {}, "A has the eigenvalue -3, so that the water would have a negative kinetic energy"),
+    "coupled too strongly": (np.eye(6) + 2 * (np.eye(6, k=4) + np.eye(6, k=-4)), {}, "A has the eigenvalue -1, so that"),
+    "point in a plane": ([1] * 6, {"point": [1, 2]}, "point has 2 components; pass 3$"),
+}
+
+
+@pytest.mark.parametrize("name", ADDED_MASS_FAULTS)
+def test_added_mass_that_cannot_be(name: str) -> None:
+    A, options, message = ADDED_MASS_FAULTS[name]
+    system = ship(water=False)
+    system.add_load(sd.AddedMass("hull", A, **options))
+    with pytest.raises(ModelError, match=f"added mass on hull: {message}"):
+        system.check()
+
+
+def test_a_load_that_is_added_twice() -> None:
+    system = ship(water=False)
+    water = system.add_load(sd.AddedMass("hull", [1, 2, 0, 4, 5, 6]))
+    system.add_load(water)
+    with pytest.raises(ModelError, match=f"{water.label} was added 2 times; add it once"):
+        system.check()
+
+
 def test_added_mass_of_the_wrong_size() -> None:
     system = ship(water=False)
     system.add_load(sd.AddedMass("hull", [1, 2, 3]))

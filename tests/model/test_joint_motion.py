@@ -56,7 +56,8 @@ def test_motion_is_the_derivative_of_the_transform(name: str, seed: int) -> None
 
 
 def test_every_joint_is_among_them() -> None:
-    assert {make().__class__.__name__ for make in JOINTS.values()} == set(joints.__all__) - {"Joint", "JointMotion"}
+    """But the elastic one, which moves by the modes of a beam."""
+    assert {make().__class__.__name__ for make in JOINTS.values()} == set(joints.__all__) - {"Joint", "JointMotion", "Modal"}
 
 
 def test_a_wrong_motion_is_found() -> None:

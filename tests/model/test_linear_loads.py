@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from typing import Any
 
 import mpmath
@@ -256,3 +257,20 @@ def test_faults(name: str) -> None:
     s.add_load(make())
     with pytest.raises(sd.ModelError, match=f"(linear (stiffness|damping) on float: |linear stiffness_3 ){message}"):
         s.check()
+
+
+def test_damping_that_feeds_energy_is_told() -> None:
+    """Skew parts do no work; a symmetric part [[1, 2], [2, 1]] has the eigenvalue -1."""
+    def checked(b: float, sign: int) -> None:
+        B = np.eye(6)
+        B[0, 1], B[1, 0] = b, sign * b
+        s = floating(sd.EulerParameters())
+        s.add_load(sd.LinearDamping("float", B, name="radiation"))
+        s.check()
+
+    with pytest.warns(sd.ModelWarning, match="radiation: the symmetric part of B has the eigenvalue -1, so that it feeds energy"):
+        checked(2.0, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked(2.0, -1)
+        checked(1.0, 1)

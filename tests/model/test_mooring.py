@@ -141,7 +141,6 @@ def test_parameters_have_units() -> None:
 
 
 STOPS = {
-    "straight above": (state(x=366.92, y=151.985), {}, "straight above or below the anchor"),
     "below the seabed": (state(z=-150.0), {}, "not above the seabed"),
     "no length": (state(), {"L": -1.0}, "the length of the line is not above zero"),
     "no weight": (state(), {"w": 0.0}, "the weight of the line is not above zero"),
@@ -156,6 +155,38 @@ def test_what_stops_a_run(name: str) -> None:
     for backend in ("numpy", "c"):
         with pytest.raises(sd.EvaluationError, match=f"bow line: .*{message}"):
             module(backend).rhs(0.0, x, given)
+
+
+@pytest.mark.parametrize("seabed", [True, False])
+def test_a_tension_leg_is_pulled_back_by_its_tension_over_its_length(seabed: bool) -> None:
+    """Straight, but for its weight: H = T_mean x / z to first order in x, none and no NaN at x = 0."""
+    depth, weight = 146.0, 40.0
+    leg = line(fairlead=(0, 0, -4), anchor=(0, 0, -150), length=145.8, weight=weight, seabed=seabed)
+    tape = tape_of(leg)
+    at = [evaluate_rows(tape, pose(0, **{**dict.fromkeys(("y", "z", "phi", "theta", "psi"), 0.0), "x": x}), 1)
+          for x in (0.0, 1e-8, 1e-5, 0.1)]
+    forces = np.array([found["f"][0] for found in at])
+    assert not forces[0, :2].any()
+    strain = (depth - 145.8) / 145.8
+    np.testing.assert_allclose(-forces[0, 2], EA * strain + weight * 145.8 / 2, rtol=1e-9)
+    # the cable of tension T(s) pulls back with x over the integral of ds (1 / T + 1 / EA)
+    tensions = EA * strain + weight * 145.8 * (np.linspace(0, 1, 20001) - 0.5)
+    compliance = 145.8 * (np.mean(1 / tensions) + 1 / EA)
+    np.testing.assert_allclose(-forces[1:3, 0], np.array([1e-8, 1e-5]) / compliance, rtol=1e-4)
+    np.testing.assert_allclose(-forces[3, 0], 0.1 / compliance, rtol=1e-2)
+    for found in at:
+        np.testing.assert_allclose(found["elastic"], found["gradient"], rtol=1e-6, atol=1e-3)
+
+
+def test_a_strain_that_no_line_bears_is_told() -> None:
+    short = line(length=430.0, name="bow line")
+    run = buoy(0, short).recursive().compile(backend="numpy")
+    with pytest.warns(sd.SimulationWarning, match="bow line: it is stretched by") as told:
+        run.simulate(t=(0, 1e-3), q=[-60, -30, 0, 0, 0, 0])
+    strain = float(str(told[0].message).split("stretched by ")[1].split(" ")[0])
+    f = evaluate_rows(tape_of(short), AT_REST | {"x": np.array([-60.0]), "y": np.array([-30.0])}, 1)["f"][0]
+    assert strain == pytest.approx(np.linalg.norm(f) / EA, rel=1e-3)
+    assert strain > 0.1 and "that part of EA of 5.89e+08 N" in str(told[0].message)
 
 
 def test_energy_is_kept_without_friction() -> None:

@@ -14,6 +14,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.runtime.statics.campbell import Campbell
 from symdyn.runtime.statics.multiblade import Rotor
 
 HALF, ROOT = sp.Rational(1, 2), sp.sqrt(3) / 2
@@ -179,10 +180,49 @@ def test_picture(tmp_path: Any) -> None:
     ({"blades": [("a", "b", "b")]}, "a coordinate is named for two blades"),
     ({"blades": [("a", "b", "phi")]}, "phi is kept, but a coordinate of a blade has to be free"),
     ({"blades": [("a", "b", "c")]}, "blades: there is no 'c'"),
+    ({"blades": 3}, "blades must be a list of sets of coordinates, found 3"),
+    ({"azimuths": "x"}, "azimuths must be a whole number, found 'x'"),
+    ({"foo": 3}, "options: there is no 'foo'; there are free, fixed, start"),
+    ({"speed": None}, "speed must be one name or symbol, found None"),
+    ({"max_iterations": 0}, "max_iterations must be a whole number of at least 1, found 0"),
 ])
 def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ArgumentError, match=re.escape(message)):
         disc().campbell(**{"speed": "phi_dot", "values": [1.0, 2.0], **arguments})
+
+
+def test_sets_hold_the_same_coordinate_of_every_blade() -> None:
+    """The hub's ways in place of blades; equal blades pass with gravity on them."""
+    with pytest.raises(ArgumentError, match=r"rotor: blades: a set holds the same coordinate of every blade, one set per shape"
+                                            r", .* but these differ in inertia: x: 14\.5, y: 14\.5, b1: 2\.16; group them"):
+        rotor().campbell("psi_dot", [3.0], blades=[("x", "y", "b1")])
+    with pytest.raises(ArgumentError, match="but these differ in stiffness: x: 900, b1: "):
+        rotor().campbell("psi_dot", [3.0], blades=[("x", "b1", "b2")], params={"r": np.sqrt(14.5 / 1.5)})
+    assert len(rotor().campbell("psi_dot", [3.0], blades=[("b1", "b2", "b3")], params={"g": 0.1}).names) == 5
+
+
+def test_picture_of_many_modes() -> None:
+    """One colour for each part, a name at every right end; what lies far above is left out and told; rpm above."""
+    pytest.importorskip("matplotlib")
+    from symdyn.runtime.pictures.campbell import part
+
+    names = [*[f"blade1_{n} {w}" for n in ("flap1", "edge1", "flap2") for w in ("backward", "collective", "forward")],
+             "tower_fa1", "tower_ss1", "x", "y", "yaw"]
+    frequencies = np.array([*np.linspace(0.6, 2.0, 9), 0.45, 0.46, 0.01, 0.02, 6.0])
+    speeds = np.array([0.0, 1.5])
+    diagram = Campbell("turbine", "azimuth_dot", speeds, 2j * np.pi * np.tile(frequencies, (2, 1)), tuple(names), (), ())
+    axes = diagram.plot().axes[0]
+    drawn = {line.get_label(): line for line in axes.lines if line.get_label() in names}
+    assert set(drawn) == set(names) - {"yaw"} and axes.get_ylim()[1] == pytest.approx(1.08 * 2.0)
+    texts = [t.get_text() for t in axes.texts]
+    assert set(drawn) <= set(texts) and "not shown, above: yaw (6 Hz)" in texts
+    colors = {part(name): line.get_color() for name, line in drawn.items()}
+    assert set(colors) == {"blade", "tower", ""} and len(set(map(str, colors.values()))) == 3
+    assert all(line.get_color() == colors[part(name)] for name, line in drawn.items())
+    (rpm,) = axes.child_axes
+    assert rpm.get_xlabel() == "[rpm]" and len(diagram.plot(highest=7.0).axes[0].lines) == len(names) + 3
+    heights = sorted(t.get_position()[1] for t in axes.texts if t.get_text() in names)
+    assert np.diff(heights).min() > 0.03
 
 
 def test_multi_blade_coordinates_take_no_constraints() -> None:

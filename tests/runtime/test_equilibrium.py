@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+import warnings
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,11 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium, SimulationWarning
-from symdyn.runtime.statics.equilibria import same
+from symdyn.runtime.statics.equilibria import _turn, same
+from symdyn.runtime.statics.equilibrium import begin
+from symdyn.runtime.statics.gimbal import lock
+from symdyn.runtime.statics.search import Search
+from symdyn.runtime.statics.selection import select
 
 
 @functools.cache
@@ -213,7 +218,8 @@ def test_no_stiffness_names_the_direction() -> None:
 
 def test_what_is_too_heavy_sinks() -> None:
     with pytest.raises(NoEquilibrium, match=r"floater: no equilibrium found: .* forces left are 50 N along z; nothing holds z: "
-                                            r"it has no stiffness there, so it sinks.*the last state is z = -"):
+                                            r"it has no stiffness there, so it sinks.*the last state is z = -.*"
+                                            r"check the weight and the loads: another start hardly helps$"):
         floater().equilibrium(params={"m": 20.0}, start={"z": -0.5})
 
 
@@ -259,6 +265,121 @@ def test_constraints_that_move_by_themselves_leave_no_rest() -> None:
         s.augmented().compile(backend="numpy").equilibrium()
 
 
+def heavy_top(attitude: Any, names: str) -> Any:
+    """A free body with its own moments about axes fixed in it, held in place by springs."""
+    s = sd.System("hung", gravity=[0, 0, -9.81])
+    k = sd.parameters("k", positive=True)
+    body = s.add_body("body", mass=2, inertia=[0.3, 0.2, 0.1], com=[0, 0, -0.5])
+    q = sd.coordinates(names)
+    s.add_joint(sd.Free("free", s.ground, body, q, orientation=attitude))
+    for place in ([3, 0, 0], [-3, 0, 0], [0, 3, 0], [0, -3, 0]):
+        s.add_spring_damper(s.ground, body, point_a=place, point_b=[c / 10 for c in place], stiffness=k, length=1)
+    s.defaults = {k: 400.0}
+    return s
+
+
+@functools.cache
+def hung_by_angles() -> Any:
+    return heavy_top(sd.EulerAngles("ZYX"), "x y z psi theta phi").embedding().compile(backend="numpy")
+
+
+def test_forces_along_the_angles_do_not_balance_at_gimbal_lock() -> None:
+    """Turned by 90 degrees about y two of its three angles are one: a balance there need be none."""
+    module = hung_by_angles()
+    locked = {"theta": np.pi / 2, "psi": 0.3, "phi": -0.2}
+    with pytest.raises(NoEquilibrium, match=r"gimbal lock: theta = 90 deg; .* use Euler parameters \(orientation='parameters'"):
+        module.equilibrium(free=["x"], start=locked)
+    assert module.equilibrium(start={"theta": 0.2, "phi": 0.1}).stable
+    found = module.equilibria([locked, {"theta": 0.1}], free=["x"])
+    assert len(found) == 1 and len(found.failures) == 1 and "gimbal lock" in found.failures[0][1]
+    straight = begin(module, select(module, None, None, None), {"theta": 0.2}, None, 0.0, None)
+    assert lock(straight) == "" and lock(straight.at(x=np.r_[straight.x[:4], -np.pi / 2, straight.x[5:]])) == "theta = -90 deg"
+
+
+def test_attitudes_tell_equilibria_apart_and_coordinates_have_ranges() -> None:
+    """A body on a spring, hanging or standing on its head."""
+    module = hanging()
+    found = module.equilibria([{"z": 0.5, "p0": 1.0}, {"z": 1.5, "p0": 0.0, "p1": 1.0}], fixed={"omega_z_free": 0.0})
+    names = sorted(e.name.partition(" ")[2] for e in found)
+    assert names[0] == "stable at not turned" and re.fullmatch(r"unstable at turned by 180 deg about x", names[1])
+    ranged = module.equilibria(3, ranges={"z": 0.2, "omega_x_free": 0.1}, start={"z": 0.5}, fixed={"omega_z_free": 0.0})
+    assert len(ranged) == 1 and ranged.counts == (3,) and np.isclose(ranged[0]["z"], 2 - 1 - 2 * 9.81 / 400, rtol=1e-12)
+    with pytest.raises(ArgumentError, match="ranges: there is no 'p1'; there are ") as told:
+        module.equilibria(3, ranges={"p1": 1})
+    listed = str(told.value).rpartition("there are ")[2].split(", ")
+    assert len(set(listed)) == len(listed) and {"z", "omega_x_free"} <= set(listed)
+    assert _turn(np.zeros(3)) == "not turned" and _turn(np.array([0, 0, -np.pi / 2])) == "turned by -90 deg about z"
+    assert _turn(np.array([1.0, 1.0, 0])) == "turned by 81.03 deg about (0.707, 0.707, 0)"
+
+
+@functools.cache
+def table() -> Any:
+    """A plate on a springy leg, tilting about x and y, with a small mass to be shifted across along each and an idle moment."""
+    z, a, b = sd.coordinates("z a b")
+    m, X, Y, k, c, idle, M, N = sd.parameters("m X Y k c idle M N", real=True)
+    s = sd.System("table", gravity=[0, 0, -10])
+    leg, cross, plate = s.add_body("leg", mass=1), s.add_body("cross", mass=1), s.add_body("plate", mass=m, inertia=[5, 5, idle])
+    lift = s.add_joint(sd.Prismatic("lift", s.ground, leg, z, axis=[0, 0, 1]))
+    roll = s.add_joint(sd.Revolute("roll", leg, cross, a, axis=[1, 0, 0]))
+    tilt = s.add_joint(sd.Revolute("tilt", cross, plate, b, axis=[0, 1, 0]))
+    s.add_joint_force(lift, -k * z)
+    s.add_joint_force(roll, M - c * a)
+    s.add_joint_force(tilt, N - c * b)
+    for at in ([X, 0, 0], [0, Y, 0]):
+        shifted = s.add_body(f"at_{len(s.bodies)}", mass=1)
+        s.add_joint(sd.Fixed(f"held_{len(s.bodies)}", plate, shifted, parent_point=at))
+    s.defaults = {m: 1e6, X: 0.0, Y: 0.0, k: 1e9, c: 1e9, idle: 4.0, M: 0.0, N: 20.0}
+    return s.embedding().compile(backend="numpy")
+
+
+@pytest.mark.parametrize("free", [["z", "a", "b", "X", "Y"], ["a", "b", "X", "Y"], None])
+def test_small_masses_balance_what_is_stiff(free: Any) -> None:
+    """m g X = N, though the stiffness is a hundred million times what a metre of them does; the conditions are told by effect."""
+    e = table().equilibrium(free=free, unknown_params=None if free else ["X", "Y"], fixed={"a": 0.0, "b": 0.0})
+    assert np.isclose(e["X"], -2.0, rtol=1e-12) and abs(e["Y"]) < 1e-12 and np.isclose(e["z"], -(1e6 + 4) * 10 / 1e9, rtol=1e-12)
+    assert e.residual_norm < 1e-7
+
+
+def test_conditions_among_more_that_stay_are_those_that_are_affected() -> None:
+    e = table().equilibrium(unknown_params="X", fixed={"a": 0.0, "b": 0.0})
+    assert np.isclose(e["X"], -2.0, rtol=1e-12) and e.selection.conditions == ("b",)
+    with pytest.raises(ArgumentError, match=r"1 values are to be found \(idle\), which takes as many conditions, but fixed gives "
+                                            r"2 \(a, b\); name in free .* such as free=\['z', 'a', 'idle'\]"):
+        table().equilibrium(unknown_params="idle", fixed={"a": 0.0, "b": 0.0})
+
+
+def test_a_parameter_without_effect_is_named() -> None:
+    with pytest.raises(ArgumentError, match="table: idle has no effect on b there: no value of it balances the forces"):
+        table().equilibrium(unknown_params="idle", fixed={"b": 0.0})
+
+
+def test_large_forces_are_never_left() -> None:
+    """A moment of 20 N m is nothing beside the stiffness of 1e9 N m, but no equilibrium where nothing takes it."""
+    module = table()
+    selection = select(module, None, {"z": 0.0}, None)
+    search = Search(begin(module, selection, {"a": 0.0, "b": 2e-8}, None, 0.0, None), selection)
+    assert search.balanced(search.best)
+    assert not search.balanced(Search(begin(module, selection, {"a": 0.0, "b": 3e-8}, None, 0.0, None), selection).best)
+
+
+def test_forces_that_depend_on_time_are_told() -> None:
+    q = sd.coordinates("q")
+    A, w = sd.parameters("A w", real=True)
+    s = sd.System("shaken")
+    body = s.add_body("body", mass=1)
+    slide = s.add_joint(sd.Prismatic("slide", s.ground, body, q, axis=[1, 0]))
+    s.add_joint_force(slide, -5 * q + A * sp.sin(w * sd.t))
+    s.defaults = {A: 2.0, w: 1.0}
+    module = s.embedding().compile(backend="numpy")
+    with pytest.warns(SimulationWarning, match=r"shaken: in equilibrium: forces depend on time, which stands still at t = 0\.5 "
+                                               r"s: that along q changes by .* N within 7\.3 s") as told:
+        assert np.isclose(module.equilibrium(t=0.5)["q"], 2 * np.sin(0.5) / 5, rtol=1e-13)
+    assert told[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert module.equilibrium(t=0.5, params={"A": 0.0})["q"] == 0.0
+
+
 def test_elements_that_watch_warn_in_numbers() -> None:
     """A box held above the water by a stiff spring."""
     z = sd.coordinates("z")
@@ -283,6 +404,8 @@ def test_elements_that_watch_warn_in_numbers() -> None:
     ({"start": {"q1": "x"}}, "the value of q1 is 'x', not a number"),
     ({"t": np.inf}, "pass a finite number of seconds as t"),
     ({"unknown_params": "q1"}, "unknown_params: there is no 'q1'"),
+    ({"max_iterations": "x"}, "max_iterations must be a whole number of at least 1, found 'x'"),
+    ({"max_iterations": -3}, "max_iterations must be a whole number of at least 1, found -3"),
 ])
 def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ArgumentError, match=re.escape(message)):
@@ -294,6 +417,10 @@ def test_bad_arguments(arguments: dict[str, Any], message: str) -> None:
     ({"starts": 3, "ranges": {"q1": (2, 1)}}, "the range of q1 is (2, 1); pass (least, most)"),
     ({"starts": 3, "ranges": {"q1": "wide"}}, "the range of q1 is 'wide'"),
     ({"starts": 3, "ranges": [1]}, "ranges must be a mapping"),
+    ({"starts": 3, "ranges": {"q1": "12"}}, "the range of q1 is '12'; pass (least, most)"),
+    ({"starts": "3"}, "starts must be a number of them, or a list of starts, found '3'"),
+    ({"seed": "a"}, "the seed must be a whole number of at least 0, found 'a'"),
+    ({"sartts": 3}, "options: there is no 'sartts', did you mean starts"),
     ({"starts": [{"q1": 0}], "ranges": {"q1": 1}}, "leave one of them out"),
 ])
 def test_bad_arguments_of_many_starts(arguments: dict[str, Any], message: str) -> None:

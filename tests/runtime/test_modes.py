@@ -262,8 +262,11 @@ def test_double_eigenvalues_have_no_derivative() -> None:
     (9, "k", "mode 9 asked for; there are 5, numbered from 0"),
     ("q9", "k", "0 modes are named 'q9'; there are 0: q3, q2, q4 (1); 1: "),
     (0, "w", "parameter: there is no 'w'; there are m, k"),
+    (0, None, "parameter must be one name or symbol, found None"),
+    (None, ["m", "k"], "parameter must be one name or symbol, found ['m', 'k']"),
+    (None, "k", "0 modes are named 'None'"),
 ])
-def test_bad_arguments(mode: Any, parameter: str, message: str) -> None:
+def test_bad_arguments(mode: Any, parameter: Any, message: str) -> None:
     with pytest.raises(ArgumentError, match=re.escape(message)):
         chain().linearize().derivative(mode, parameter)
 

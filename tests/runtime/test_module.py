@@ -29,6 +29,16 @@ X = [0.3, -0.8, 1.5, 0.4]
 # -- parameters
 
 
+def test_no_body_has_a_negative_mass(double: Any) -> None:
+    message = "double_pendulum: the parameter m1, the mass of body 'rod1', is -1e\\+06 kg; pass a number that is not below zero"
+    given = {"m1": -1e6}
+    for run in (lambda: double.simulate((0, 1), params=given), lambda: double.equilibrium(params=given),
+                lambda: double.linearize(X, params=given)):
+        with pytest.raises(ArgumentError, match=message):
+            run()
+    assert double.simulate((0, 0.1), params={"g": -9.81}).success
+
+
 def test_parameters_in_every_form(double: Any) -> None:
     m1, g = sp.symbols("m1 g")
     names = double.metadata["parameters"]

@@ -415,6 +415,25 @@ def test_films_that_cannot_be_are_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_picture_takes_its_path_alone(tmp_path: Path) -> None:
+    solution = motion("pendulum")
+    assert len(solution.picture(str(tmp_path / "a.png")).axes) == len(solution.picture(path=tmp_path / "b.png").axes) == 2
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_pictures_that_cannot_be_written_are_refused(tmp_path: Path) -> None:
+    solution = motion("pendulum")
+    for give, message in (
+            (lambda: solution.picture(0.5, tmp_path / "p.xyz"), r"cannot save the picture to p\.xyz: the ending must be \.png, "),
+            (lambda: solution.plot(3), "the path of the picture is 3; pass text or a Path, such as 'motion.png'"),
+            (lambda: solution.plot(tmp_path / "none" / "p.png"), "the picture cannot be written to .*: No such file"),
+            (lambda: solution.animate(3), "the path of the animation is 3; pass text or a Path"),
+            (lambda: solution.save(3), "the path where to save the motion is 3; pass text or a Path"),
+            (lambda: solution.report(3), "the path where to write the report is 3; pass text or a Path")):
+        with pytest.raises(ArgumentError, match=message):
+            give()
+
+
 # -- places they are shown in
 
 

@@ -15,6 +15,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli import main
+from symdyn.cli.summary import summarize
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime import run_report, run_tables
 from symdyn.runtime.module import Module
@@ -39,6 +40,7 @@ def module() -> Module:
     system = sd.systems.cart_pole()
     system.draw("cart", sd.shapes.Box([0.5, 0.25, 0.3]))
     system.add_output("tip", sd.position(system.bodies[1], [1, 0]))
+    system.add_output("pull", sd.acceleration(system.bodies[1], [1, 0]))
     return system.embedding().compile("numpy")
 
 
@@ -86,8 +88,8 @@ def test_one_file_holds_everything(report: Path, solution: Solution) -> None:
 
 def test_extremes_are_those_of_the_motion(report: Path, solution: Solution) -> None:
     found = {row[0]: row for row in rows(report.read_text(encoding="utf-8"), "extremes")}
-    assert list(found) == ["q1", "q2", "q1_dot", "q2_dot", "F", "tip x", "tip y"]
-    assert [found[name][2] for name in found] == ["m", "rad", "m/s", "rad/s", "N", "m", "m"]
+    assert list(found) == ["q1", "q2", "q1_dot", "q2_dot", "F", "tip x", "tip y", "pull x", "pull y"]
+    assert [found[name][2] for name in found] == ["m", "rad", "m/s", "rad/s", "N", "m", "m", "m/s²", "m/s²"]
     columns = {"q1": solution["q1"], "q2_dot": solution["q2_dot"], "F": 2 * np.sin(solution.t), "tip y": solution["tip"][:, 1]}
     for name, curve in columns.items():
         least, at_least, most, at_most, mean, deviation = map(value, found[name][3:])
@@ -119,7 +121,8 @@ def test_changed_parameters_are_marked(report: Path, solution: Solution) -> None
     assert starts == pytest.approx(dict(zip(metadata["x"], solution.x[0], strict=True)))
 
 
-def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Solution, module: Module) -> None:
+def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Solution, module: Module,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
     balance = run_tables.energy(solution)
     assert balance is not None and abs(balance.work) > 0.1 and not balance.doubtful
     assert balance.work == solution.work[-1] and balance.change == solution.energy[-1] - solution.energy[0]
@@ -130,6 +133,9 @@ def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Soluti
     rest = sd.systems.pendulum().embedding().compile("numpy").simulate((0.0, 1.0), q=[1e-14], u=[0.0])
     still = run_tables.energy(rest)
     assert still is not None and still.rests and not still.doubtful and still.relative < 1e-14 and not balance.rests
+    summarize(rest)
+    said = re.search(r"energy is kept to (\S+) of its potential energy: it rests", capsys.readouterr().out)
+    assert said is not None and float(said[1]) == pytest.approx(still.relative, rel=0.1)
     wrong = module.simulate((0.0, 0.5), inputs={"F": 1.0}, rtol=1e-3, work=True)
     wrong._work = wrong._work + np.linspace(0, 1e-3, len(wrong.t))  # type: ignore[operator]
     told = run_tables.energy(wrong)

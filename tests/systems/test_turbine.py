@@ -21,6 +21,7 @@ from symdyn.bench.turbine import (
     turbine,
     values,
 )
+from symdyn.errors import NoEquilibrium
 from symdyn.systems import nrel_5mw as nrel
 from symdyn.systems import nrel_5mw_tower
 from symdyn.systems.turbine_parts import BLADE_MODES, TOWER_MODES
@@ -130,7 +131,7 @@ def test_flexible_turbine_that_does_not_bend_is_the_rigid_one() -> None:
     columns = [q.name for q in flexible.symbols.coordinates]
     places = [columns.index(q.name) for q in rigid.symbols.coordinates]
     q, u = np.zeros((5, len(columns))), np.zeros((5, len(columns)))
-    q[:, places], u[:, places] = states
+    q[:, places], u[:, places] = states.q, states.u
     names = ("M_tilde", "k_tilde", "F_tilde")
     wanted, found = values(rigid, states, *names), values(flexible, States(q, u), *names)
     inertia = found["M_tilde"][:, places][:, :, places] - wanted["M_tilde"]
@@ -154,6 +155,8 @@ def test_order_of_coordinates() -> None:
     (sd.systems.floating_wind_turbine, {"rotor": "loose", "mooring": "chain"},
      r"has no rotor 'loose'; pass 'free' or 'fixed' or 'prescribed'(.|\n)*no mooring 'chain'"),
     (sd.systems.land_wind_turbine, {"blades": "lumped", "flexible": "blades"}, "blades are lumped, but flexible is 'blades'"),
+    (sd.systems.floating_wind_turbine, {"flexible": np.array([1.0, 2.0])}, r"has no flexible array\(\[1., 2.\]\); pass False"),
+    (sd.systems.floating_wind_turbine, {"flexible": ["tower"]}, r"has no flexible \['tower'\]; pass False or True"),
 ])
 def test_options_that_there_are_not(make: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(sd.ModelError, match=message):
@@ -164,7 +167,8 @@ def test_options_that_there_are_not(make: Any, options: dict[str, Any], message:
 
 
 def test_three_formulations_agree() -> None:
-    found = formulations(50, drives=False)
+    """With drives, wind and waves."""
+    found = formulations(50, waves=True)
     assert len(found) == 5 and max(found.values()) < 1e-12
 
 
@@ -216,3 +220,33 @@ def test_ballast_that_keeps_it_upright_in_the_wind(moored: Any) -> None:
     assert np.abs(upright[[0, 2, 4]]).max() < 1e-3
     without = moored.F_tilde(found.q, np.zeros(8), inputs=[0.0, 0.0, 0.0, 8.0])
     assert without[4] - upright[4] == pytest.approx(-found.solved["m_x"] * nrel.BALLAST_WAY * nrel.GRAVITY, rel=1e-6)
+
+
+@pytest.mark.parametrize("wind", [0.0, 1.0, 4.0, 6.0, 8.0, 10.0, 11.0])
+def test_two_ballasts_keep_pitch_and_roll_at_zero(moored: Any, wind: float) -> None:
+    """Without wind nothing is to be balanced in roll; the conditions may be named, or told by what the ballasts act on."""
+    fixed = {"theta": 0.0, "phi": 0.0, "azimuth": 0.0}
+    free = ["x", "y", "z", "psi", "theta", "phi", "yaw", "m_x", "m_y"]
+    found = moored.equilibrium(free=free, fixed=fixed, inputs={"v_w": wind})
+    assert found.residual_norm < 1e-6 and found["theta"] == found["phi"] == 0.0
+    left = moored.F_tilde(found.q, np.zeros(8), found.params, inputs=[0.0, 0.0, 0.0, wind])
+    assert np.abs(left[:7]).max() < 1e-6 and (abs(found["m_y"]) < 1e-9) == (wind == 0.0)
+    told = moored.equilibrium(unknown_params=["m_x", "m_y"], fixed=fixed, inputs={"v_w": wind}, start={"x": 5.0})
+    assert told.selection.conditions == ("theta", "phi") and told.params == pytest.approx(found.params, rel=1e-9, abs=1e-9)
+
+
+def test_no_equilibrium_at_gimbal_lock(moored: Any) -> None:
+    with pytest.raises(NoEquilibrium, match="at gimbal lock: theta = 90 deg"):
+        moored.equilibrium(fixed={"azimuth": 0.0}, start={"z": -30.0, "theta": 2.5, "phi": 1.0})
+
+
+def test_shapes_of_the_freely_turning_rotor_and_the_others_solve_the_equations(moored: Any) -> None:
+    """(lambda^2 M + lambda C + K) v = 0 at a state, no rotor held; each mode is named by what moves."""
+    lin = moored.linearize(moored.equilibrium(fixed={"azimuth": 0.0}).x)
+    names = [mode.name for mode in lin.modes()]
+    assert sorted(names) == ["azimuth", "phi", "psi", "theta", "x", "y", "yaw", "z"]
+    for mode in lin.modes():
+        value, v = mode.eigenvalue, mode.right[:8]
+        terms = np.array([value**2 * lin.M, value * lin.C, lin.K])
+        size = (np.abs(terms).sum(axis=0) @ np.abs(v)).max() if mode.kind != "zero" else 1e-3
+        assert np.abs(terms.sum(axis=0) @ v).max() < 1e-7 * size, mode.name

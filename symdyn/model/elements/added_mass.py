@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+from symdyn.model.elements.checks import least_eigenvalue
 from symdyn.model.faults import Faults
 
 
@@ -14,7 +15,7 @@ class AddedMass:
     """The kinetic energy T = 1/2 v^T A v of the water around a body, v = [surge, sway, heave; roll, pitch, yaw] rates of a
     point of the body in body axes.
 
-    A       (6, 6) symmetric: kg, kg m, kg m^2; a list of 6 stands for its diagonal
+    A       (6, 6) symmetric, no eigenvalue below zero: kg, kg m, kg m^2; a list of 6 stands for its diagonal
     point   (3,) of the body, body axes, m
 
     The forces are those of an ideal fluid that is at rest far away (Kirchhoff's equations): n = -d/dt(A v)_n - omega x (A v)_n -
@@ -31,12 +32,16 @@ class AddedMass:
         self.faults = Faults()
         where = name or f"added mass on {getattr(body, 'name', body)}"
         self.A = self.faults.square(A, 6, f"{where}: A")
-        self.point = self.faults.vector(point, f"{where}: point", planar=True)
+        self.point = self.faults.vector(point, f"{where}: point")
         uneven = [(i + 1, j + 1) for i in range(6) for j in range(i) if not _equal(self.A[i, j], self.A[j, i])]
         if uneven and not self.faults:
             i, j = uneven[0]
             self.faults.append(f"{where}: A is not symmetric: A[{i}, {j}] = {self.A[i - 1, j - 1]}, A[{j}, {i}] = "
                                f"{self.A[j - 1, i - 1]}; pass a symmetric matrix, which has a kinetic energy")
+        least = 0.0 if self.faults else least_eigenvalue(self.A)
+        if least < 0:
+            self.faults.append(f"{where}: A has the eigenvalue {least:.4g}, so that the water would have a negative kinetic "
+                               "energy; pass a matrix without eigenvalues below zero; look at its signs")
 
     @property
     def constants(self) -> Sequence[sp.Expr]:

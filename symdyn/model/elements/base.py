@@ -15,7 +15,8 @@ class Element:
     """A load on one body, given by what it does with the body's pose and motion; see Site and Action.
 
     body    the body it acts on, or its name; label: names the load in generated code and in messages
-    A subclass checks what it is given with `self.faults`, which end in the model's one ModelError.
+    A subclass checks what it is given with `self.faults`, which end in the model's one ModelError, and `self.doubts`, which are
+    warnings.
     """
 
     kind = "load"
@@ -24,6 +25,7 @@ class Element:
         self.body = body
         self.label = name
         self.faults = Faults()
+        self.doubts: list[str] = []
 
     @property
     def where(self) -> str:

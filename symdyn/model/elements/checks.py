@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.model.faults import Faults
+
+# An eigenvalue below this part of the largest one is a rounding error of published numbers.
+ROUNDING = 1e-6
 
 
 def six(faults: Faults, value: Any, what: str) -> tuple[sp.Expr, ...]:
@@ -18,7 +22,7 @@ def six(faults: Faults, value: Any, what: str) -> tuple[sp.Expr, ...]:
     return taken
 
 
-def positive(faults: Faults, value: Any, what: str, unit: str) -> sp.Expr:
+def positive(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Expr:
     """An expression; a number must be above zero."""
     taken = faults.expression(value, what)
     if not taken.free_symbols and not taken > 0 and not any(fault.startswith(what) for fault in faults):
@@ -32,3 +36,14 @@ def not_negative(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Ex
     if not taken.free_symbols and taken < 0:
         faults.append(f"{what} is {float(taken):g}; pass a number that is not below 0 {unit}".rstrip())
     return taken
+
+
+def least_eigenvalue(matrix: sp.MatrixBase) -> float:
+    """Of a symmetric matrix of numbers; zero where it is negative by rounding alone, and for one with symbols."""
+    if matrix.free_symbols:
+        return 0.0
+    values = np.array(matrix.tolist(), dtype=float)
+    size = np.sqrt(np.abs(np.diag(values)))
+    size[size == 0] = 1.0  # entries of translation and rotation have other units: they are judged relative to the diagonal
+    scaled = np.linalg.eigvalsh(values / np.outer(size, size))
+    return float(np.linalg.eigvalsh(values)[0]) if scaled[0] < -ROUNDING * np.abs(scaled).max() else 0.0

@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.model.elements.base import Element
-from symdyn.model.elements.checks import six
+from symdyn.model.elements.checks import least_eigenvalue, six
 from symdyn.model.elements.site import Action, Site, Watch
 from symdyn.spatial.vectors import cross, dot, inner, vector
 
@@ -134,6 +134,7 @@ class LinearDamping(Element):
 
     B       (6, 6): N s/m, N s, N m s; a list of 6 stands for its diagonal
     point   (3,) body axes, m
+    A matrix of numbers whose symmetric part has a negative eigenvalue feeds energy into some motions: it gives a ModelWarning.
     """
 
     kind = "linear damping"
@@ -142,6 +143,10 @@ class LinearDamping(Element):
         super().__init__(body, name)
         self.B = self.faults.square(B, 6, f"{self.where}: B")
         self.point = self.faults.vector(point, f"{self.where}: point")
+        least = least_eigenvalue((self.B + self.B.T) / 2)
+        if least < 0:
+            self.doubts.append(f"{self.where}: the symmetric part of B has the eigenvalue {least:.4g}, so that it feeds energy "
+                               "into some motions; damping has none below zero; look at its signs")
 
     @property
     def constants(self) -> Sequence[sp.Expr]:

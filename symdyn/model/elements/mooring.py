@@ -9,10 +9,13 @@ import sympy as sp
 
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import not_negative, positive
-from symdyn.model.elements.site import Action, Site
+from symdyn.model.elements.site import Action, Site, Watch
 from symdyn.spatial.vectors import cross, vector
 from symdyn.tape.catenary import NEAREST, Catenary, potential
 from symdyn.tape.node import is_zero
+
+# Largest strain that is meant: steel is torn at less, and ropes of fibres do not follow Hooke's law as far.
+STRAIN = 0.05
 
 
 class MooringLine(Element):
@@ -29,7 +32,9 @@ class MooringLine(Element):
     level of the anchor. With friction the force still follows from the place alone, but is no gradient (dH/dz and dV/dx differ,
     by 2.5e-4 for the lines of a barge), so that it counts as one that does work. A line that is longer than what hangs
     and what lies on the seabed is slack: it hangs straight down, without horizontal force.
-    The run stops, and tells why, where the fairlead is straight above or below the anchor, or not above the seabed.
+    A fairlead may be straight above or below its anchor, as that of a tension leg is: horizontal distances below 2e-9 of the
+    length count as such. The run stops, and tells why, where the fairlead is not above the seabed; a strain at the fairlead
+    above 5 % gives a warning.
     Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.tape.catenary for the equations.
     """
 
@@ -67,10 +72,9 @@ class MooringLine(Element):
         friction = a.expression(self.friction)
         fairlead = a.constants(self.fairlead)
         d = site.p + site.R @ fairlead - a.constants(self.anchor)
-        square = d[0] * d[0] + d[1] * d[1]
-        nearest = length * NEAREST
-        distance = a.sqrt(recorder.guard(square, square - nearest * nearest, f"{self.where}: the fairlead is straight above or "
-                                         "below the anchor, so that the line has no direction; move the anchor"))
+        # H / distance has a limit where the distance vanishes; the root keeps away from it, and the force stays the gradient.
+        nearest = 2 * length * NEAREST
+        distance = a.sqrt(d[0] * d[0] + d[1] * d[1] + nearest * nearest)
         height = d[2]
         if self.seabed:
             height = recorder.guard(height, height, f"{self.where}: the fairlead is not above the seabed, on which the anchor "
@@ -83,6 +87,14 @@ class MooringLine(Element):
         pull = total * h / distance
         f = -(site.R.T @ vector(pull * d[0], pull * d[1], total * v))
         wrench = f, cross(fairlead, f)
+        watches = (self._strain(site, total / stiffness * a.sqrt(h * h + v * v)),)
         if not is_zero(friction):
-            return Action(other=wrench)
-        return Action(elastic=wrench, potential=total * length * potential(recorder, self.seabed, (h, v), values))
+            return Action(other=wrench, watches=watches)
+        return Action(elastic=wrench, potential=total * length * potential(recorder, self.seabed, (h, v), values),
+                      watches=watches)
+
+    def _strain(self, site: Site, strain: Any) -> Watch:
+        unit = "" if self.stiffness.free_symbols else f" of {float(self.stiffness):.4g} N"
+        return Watch(f"strain of {self.where}", strain, -1.0, STRAIN,
+                     f"{self.where}: it is stretched by {{value}} of its length, with that part of EA{unit} as its tension; "
+                     f"lines are meant up to {STRAIN:g}; look at its length, its stiffness and its places")

@@ -25,7 +25,9 @@ class Site(Protocol):
     """
 
     algebra: Any
-    angles_given: bool
+
+    @property
+    def angles_given(self) -> bool: ...
 
     @property
     def R(self) -> np.ndarray: ...

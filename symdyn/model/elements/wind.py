@@ -78,8 +78,7 @@ class Thrust(Element):
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.speed = sp.Dummy("v_r", real=True)
-        given = force(self.speed) if callable(force) and not isinstance(force, sp.Basic) else force
-        self.force = faults.expression(given, f"{where}: force")
+        self.force = self._force(force)
         self.axis = faults.vector(axis, f"{where}: axis")
         self.point = faults.vector(point, f"{where}: point")
         self.wind = faults.vector(wind, f"{where}: wind")
@@ -88,6 +87,18 @@ class Thrust(Element):
                 faults.append(f"{where}: axis is (0, 0, 0); pass a direction in body axes")
         else:
             self.axis = self.axis / sp.sqrt(sum(e**2 for e in self.axis))
+
+    def _force(self, force: Any) -> sp.Expr:
+        what = f"{self.where}: force"
+        if callable(force) and not isinstance(force, sp.Basic):
+            try:
+                force = force(self.speed)
+            except Exception as error:
+                self.faults.append(f"{what} is a function that failed with a symbol for the speed of the air "
+                                   f"({type(error).__name__}: {error}); pass a function of this one argument that returns an "
+                                   "expression of SymPy, with sympy.sin and the like, not those of NumPy")
+                return sp.S.Zero
+        return self.faults.expression(force, what)
 
     @property
     def constants(self) -> Sequence[sp.Expr]:

@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.flexible.modal_body import ModalBody
+from symdyn.model.elements.checks import not_negative, positive
 from symdyn.model.joints.base import Joint, JointMotion
 from symdyn.spatial.sixvectors import skew
 from symdyn.spatial.vectors import dot, identity, inner, vector, zeros
@@ -38,8 +39,10 @@ class Modal(Joint):
         self.carries = carries
         self.coordinate_units = ("m",) * beam.n
         super().__init__(name, parent, child, coordinates, speeds, (0, 0, 0), (0, 0, 0), None, None)
-        self.stiffness = self.faults.expression(stiffness, f"joint {name!r}: stiffness")
-        self.damping = self.faults.expression(damping, f"joint {name!r}: damping")
+        self.stiffness = positive(self.faults, stiffness, f"joint {name!r}: stiffness")
+        self.damping = not_negative(self.faults, damping, f"joint {name!r}: damping")
+        if not isinstance(carries, (bool, np.bool_)):
+            self.faults.append(f"joint {name!r}: carries is {carries!r}; pass True or False")
 
     @property
     def reach(self) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.paths import as_path
 from symdyn.runtime.pictures.bodies import ABOVE, make_artists, make_axes, move, show
 from symdyn.runtime.pictures.drawing import Drawing
 from symdyn.runtime.pictures.figure import Picture
@@ -31,8 +31,9 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     Returns the animation; a notebook shows it with buttons. Raises ArgumentError if the module gives no positions, if
     nothing can be drawn, or for another ending than .gif.
     """
-    if path is not None and Path(path).suffix.lower() != ".gif":
-        raise ArgumentError(f"cannot save the animation to {Path(path).name}: the ending must be .gif")
+    target = None if path is None else as_path(path, "of the animation", "motion.gif")
+    if target is not None and target.suffix.lower() != ".gif":
+        raise ArgumentError(f"cannot save the animation to {target.name}: the ending must be .gif")
     if not (fps > 0 and speed > 0):
         raise ArgumentError(f"fps and speed must be positive, found fps = {fps}, speed = {speed}")
     whole = Drawing.of(solution) if len(solution.t) > 1 else None
@@ -65,8 +66,11 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     figure.canvas.draw()
     figure.set_layout_engine("none")
     film = Film(figure, draw, count, fps)
-    if path is not None:
-        Path(path).write_bytes(film.gif())
+    if target is not None:
+        try:
+            target.write_bytes(film.gif())
+        except OSError as error:
+            raise ArgumentError(f"the animation cannot be written to {target}: {error.strerror}") from None
     return film
 
 

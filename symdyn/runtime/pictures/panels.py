@@ -53,8 +53,10 @@ def _outputs(solution: Solution) -> Iterator[Panel]:
             labels = [f"{name} {axis}" for axis in "xyz"[:flat.shape[1]]]
             yield Panel(points[name].quantity, points[name].unit, labels, flat)
         else:
-            labels = [name] if flat.shape[1] == 1 else [f"{name}[{k}]" for k in range(flat.shape[1])]
-            yield Panel("output", "", labels, flat)
+            unit = solution.module.metadata.get("output_units", {}).get(name, "")
+            labels = [name] if flat.shape[1] == 1 else [f"{name} {'xyz'[k]}" if unit else f"{name}[{k}]"
+                                                        for k in range(flat.shape[1])]
+            yield Panel("output", unit, labels, flat)
 
 
 def _energy(solution: Solution) -> Iterator[Panel]:

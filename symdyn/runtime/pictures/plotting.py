@@ -47,7 +47,7 @@ def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
         draw_path(figure, grid[:, columns], drawing, view)
     figure.suptitle(_title(solution), fontsize=11)
     if path is not None:
-        figure.savefig(path, dpi=110)
+        figure.save(path)
     return figure
 
 

@@ -48,7 +48,7 @@ def picture(solution: Solution, t: Any = None, path: Any = None, view: Any = Non
     if drawing.spatial:
         _close_up(figure, rows, columns)
     if path is not None:
-        figure.savefig(path, dpi=110)
+        figure.save(path)
     return figure
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.optimize
 
 from symdyn.errors import ArgumentError
-from symdyn.runtime.statics.equilibrium import begin, find
+from symdyn.runtime.statics.equilibrium import begin, find, settled, steps
 from symdyn.runtime.statics.linear import Reduced
 from symdyn.runtime.statics.modes import Linear, Mode, Modes, dominant, modes_of
 from symdyn.runtime.statics.multiblade import Steady, rotor_of, steady
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 # A pattern of blades goes round if its cosine and sine are out of phase by so much: 1 is a round whirl, 0 a standing wave.
 LEAST_WHIRL = 0.2
+OPTIONS = ("free", "fixed", "start", "params", "t", "inputs", "blades", "azimuth", "azimuths", "max_iterations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +67,10 @@ class Campbell:
         return np.asarray(self.frequencies[:, self.names.index(name)])
 
     def plot(self, path: Any = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Any:
-        """The diagram up to a frequency (Hz; default: all), with lines of multiples of the rotor's speed, as a figure; saved if a
-        path is given. Needs matplotlib."""
+        """The diagram up to a frequency (Hz), with lines of multiples of the rotor's speed, as a figure; saved to a path.
+
+        By default modes that are far above the others and the lines are left out, which the legend tells. Needs matplotlib.
+        """
         from symdyn.runtime.pictures.campbell import plot
 
         return plot(self, path, harmonics, highest)
@@ -83,25 +86,34 @@ class Campbell:
 
 def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None,
              t: float = 0.0, inputs: Any = None, blades: Sequence[Sequence[Any]] = (), azimuth: Any = None,
-             azimuths: int = 12, max_iterations: int = 100) -> Campbell:
+             azimuths: int = 12, max_iterations: int = 100, **others: Any) -> Campbell:
     """Natural frequencies over a rotor's speed.
 
     speed      name or symbol; values: rad/s. At each the equilibrium with this speed is found, then its modes
     free, fixed, start, params, t, inputs   as for Module.equilibrium
-    blades     sets of coordinates of the blades of a rotor, each in the order in which blades lie ahead of each other in the
-               sense of the azimuth, such as [("flap1", "flap2", "flap3")]: modes in the fixed frame by multi-blade coordinates,
-               averaged over `azimuths` positions; accelerations of blades that the rotation brings about are in the steady state
+    blades     sets of coordinates of the blades of a rotor, one set per shape: the same coordinate of every blade, in the order
+               in which blades lie ahead of each other in the sense of the azimuth, such as [("flap1", "flap2", "flap3")]: modes
+               in the fixed frame by multi-blade coordinates, averaged over `azimuths` positions; accelerations of blades that
+               the rotation brings about are in the steady state
     azimuth    the coordinate whose rate the speed is, where the names do not tell
     Without blades the azimuth stays where it is at the start: enough for rotors that look the same at every azimuth.
     Raises NoEquilibrium, ArgumentError.
     """
     metadata, owner = module.metadata, module.name
-    (name,) = listed(speed, metadata["u"], "speed", owner)
-    numbers = _values(values, owner)
+    listed(list(others), OPTIONS, "options", owner)
+    named = listed(speed, metadata["u"], "speed", owner)
+    if len(named) != 1:
+        raise ArgumentError(f"{owner}: speed must be one name or symbol, found {speed!r}")
+    (name,) = named
+    numbers, limit = _values(values, owner), steps(max_iterations, owner)
     given = dict(fixed or {})
     if name in {str(getattr(k, "name", k)) for k in given}:
         raise ArgumentError(f"{owner}: {name} is in fixed, too; leave it out there")
+    if isinstance(blades, str) or not isinstance(blades, Iterable):
+        raise ArgumentError(f"{owner}: blades must be a list of sets of coordinates, found {blades!r}")
     groups = [listed(group, metadata["q"], "blades", owner) for group in blades]
+    if isinstance(azimuths, bool) or not isinstance(azimuths, (int, np.integer)):
+        raise ArgumentError(f"{owner}: azimuths must be a whole number, found {azimuths!r}")
     turned = listed(azimuth if azimuth is not None else name.removesuffix("_dot"), metadata["q"], "azimuth", owner)[0] \
         if groups or azimuth is not None else None
     found: list[tuple[Linear, Any]] = []
@@ -109,11 +121,12 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
     for value in numbers:
         selection = select(module, free, {**given, name: value}, None)
         place = begin(module, selection, None if isinstance(last, Steady) else last, params, t, inputs)
+        selection = settled(place, selection)
         if groups:
             assert turned is not None
             linear, last = _in_fixed_frame(module, place, selection, (name, turned, groups), int(azimuths), last)
         else:
-            last = find(place, selection, max_iterations)
+            last = find(place, selection, limit)
             linear = Reduced(last.place, selection)
         found.append((linear, last))
     sets = [modes_of(linear, f"{owner} at {name} = {value:g}") for (linear, _), value in zip(found, numbers, strict=True)]

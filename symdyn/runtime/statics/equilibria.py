@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
-from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find
+from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find, settled, steps
 from symdyn.runtime.statics.linear import natural_length
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.terms import Place, coordinate_names
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 APART = 1e-6
 # Names tell them by coordinates that differ by more, in rad or lengths of the mechanism: if these do not do, by the second.
 CLEARLY = (0.1, 1e-3)
+OPTIONS = ("starts", "ranges", "seed", "start", "free", "fixed", "params", "t", "inputs", "unknown_params", "max_iterations")
 # Random starts differ by so much unless ranges are given: in rad, and in what is no angle.
 TURNS, LENGTHS = np.pi, 1.0
 
@@ -66,18 +67,22 @@ class Equilibria:
 
 def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int = 0, start: Any = None, free: Any = None,
                fixed: Any = None, params: Any = None, t: float = 0.0, inputs: Any = None, unknown_params: Any = None,
-               max_iterations: int = 100) -> Equilibria:
+               max_iterations: int = 100, **others: Any) -> Equilibria:
     """Equilibria from many starts.
 
     starts   how many random ones, or the starts themselves, each as for Module.equilibrium
     ranges   coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`; a speed stands for
              the motion along it (rotations in Euler parameters: about that axis). Default: half a turn, 1 m
+    seed     of the random numbers, a whole number of at least 0
     The others as for Module.equilibrium. Two are the same if coordinates differ by less than 1e-6, angles of joints that turn
     all the way by whole turns, Euler parameters by their sign. A start that leads to none is told in `failures`; raises
     NoEquilibrium with the first message if none of them leads anywhere.
     """
     selection = select(module, free, fixed, unknown_params)
+    listed(list(others), OPTIONS, "options", module.name)
+    limit = steps(max_iterations, module.name)
     first = begin(module, selection, start, params, t, inputs)
+    selection = settled(first, selection)
     if isinstance(starts, (int, np.integer)) and not isinstance(starts, bool):
         if starts < 1:
             raise ArgumentError(f"{module.name}: {starts} starts asked for; at least 1 is needed")
@@ -85,6 +90,8 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
     else:
         if ranges is not None:
             raise ArgumentError(f"{module.name}: ranges are given, but so are the starts themselves; leave one of them out")
+        if isinstance(starts, (str, bytes, Mapping)) or not isinstance(starts, Iterable):
+            raise ArgumentError(f"{module.name}: starts must be a number of them, or a list of starts, found {starts!r}")
         places = [begin(module, selection, each, params, t, inputs) for each in starts]
     found: list[Equilibrium] = []
     counts: list[int] = []
@@ -94,7 +101,7 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore" if found else "default")  # what is watched over is told once
-                new = find(place, selection, max_iterations)
+                new = find(place, selection, limit)
         except (NoEquilibrium, EvaluationError, ArgumentError) as error:  # also from a start where nothing can be evaluated
             failures.append((place.x, str(error)))
             iterations.append(-1)
@@ -135,11 +142,14 @@ def _turned(angle: float) -> float:
     return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
-def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: int) -> list[Place]:
+def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: Any) -> list[Place]:
     """Starts around the first one."""
-    metadata = first.module.metadata
+    module, metadata = first.module, first.module.metadata
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ArgumentError(f"{module.name}: the seed must be a whole number of at least 0, found {seed!r}")
     labels = coordinate_names(metadata)
     spans = _spans(first, ranges)
+    direct = [n for n in spans if n not in labels and n not in selection.kept]
     stream = np.random.default_rng(seed)
     B = selection.directions(first)
     places = []
@@ -147,11 +157,14 @@ def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: i
         v = np.array([stream.uniform(*spans[label]) for label in labels])
         x = first.x.copy()
         x[:len(first.q)] = first.moved(B @ (np.linalg.pinv(B) @ v))
+        for name in direct:
+            x[metadata["q"].index(name)] += stream.uniform(*spans[name])
         places.append(first.at(x=selection.apply(x)))
     return places
 
 
 def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
+    """Of what moves along each speed; and of coordinates whose rates are no speeds, where they are named."""
     module = first.module
     metadata = module.metadata
     labels = coordinate_names(metadata)
@@ -161,16 +174,20 @@ def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
         return spans
     if not isinstance(ranges, Mapping):
         raise ArgumentError(f"{module.name}: ranges must be a mapping from coordinates to (least, most), found {ranges!r}")
-    names = listed(list(ranges), [*labels, *metadata["u"]], "ranges", module.name)
+    turned = {n for group in metadata.get("unit_groups", ()) for n in group}
+    known = dict.fromkeys([*labels, *[n for n in metadata["q"] if n not in turned], *metadata["u"]])
+    names = listed(list(ranges), known, "ranges", module.name)
     given = {labels[metadata["u"].index(n)] if n in metadata["u"] else n: _span(value, n, module.name)
              for n, value in zip(names, ranges.values(), strict=True)}
     return {**dict.fromkeys(labels, (0.0, 0.0)), **given}
 
 
 def _span(value: Any, name: str, owner: str) -> tuple[float, float]:
+    if isinstance(value, (str, bytes)):
+        raise ArgumentError(f"{owner}: the range of {name} is {value!r}; pass (least, most), or one number r for (-r, r)")
     try:
         pair = (-abs(float(value)), abs(float(value))) if np.ndim(value) == 0 else (float(value[0]), float(value[1]))
-    except (TypeError, ValueError, IndexError):
+    except (TypeError, ValueError, IndexError, KeyError):
         pair = (np.nan, np.nan)
     if not (np.isfinite(pair).all() and pair[0] <= pair[1]) or (np.ndim(value) and len(value) != 2):
         raise ArgumentError(f"{owner}: the range of {name} is {value!r}; pass (least, most), or one number r for (-r, r)")
@@ -178,28 +195,63 @@ def _span(value: Any, name: str, owner: str) -> tuple[float, float]:
 
 
 def _named(found: list[Equilibrium]) -> list[Equilibrium]:
-    """Each with its number, its stability, and the coordinates that tell it from the others."""
+    """Each with its number, its stability, and what tells it from the others: coordinates, attitudes."""
     if not found:
         return []
     metadata = found[0].module.metadata
-    names = metadata["q"]
-    lengths = np.array([metadata["units"].get(n) == "m" for n in names], dtype=bool)
-    rows = np.array([e.q for e in found]) / np.where(lengths, natural_length(found[0].place), 1.0)
-    telling = sorted(_telling(rows))
+    turned = [[metadata["q"].index(n) for n in group] for group in metadata.get("unit_groups", ())]
+    single = [k for k in range(len(metadata["q"])) if not any(k in group for group in turned)]
+    sizes = np.where([metadata["units"].get(metadata["q"][k]) == "m" for k in single], natural_length(found[0].place), 1.0)
+    columns = [np.array([e.q[single] / sizes for e in found])]
+    columns += [np.array([_attitude(e.q[group]) for e in found]) for group in turned]
+    # Each entry a column, an attitude three in one.
+    parts = [np.hstack(columns)[:, k:k + 1] for k in range(len(single))] + columns[1:]
+    telling = sorted(_telling(parts))
     result = []
     for k, e in enumerate(found):
         kind = {True: "stable", False: "unstable", None: "rigid"}[e.stable]
-        where = ", ".join(f"{names[i]} = {e.q[i] if abs(e.q[i]) > APART else 0:.4g}" for i in telling)
-        result.append(replace(e, name=f"{k + 1}: {kind}" + (f" at {where}" if where else "")))
+        words = []
+        for i in telling:
+            if i < len(single):
+                value = e.q[single[i]]
+                words.append(f"{metadata['q'][single[i]]} = {value if abs(value) > APART else 0:.4g}")
+            else:
+                of = f" ({metadata['q'][turned[i - len(single)][0]]} ...)" if len(turned) > 1 else ""
+                words.append(_turn(parts[i][k]) + of)
+        result.append(replace(e, name=f"{k + 1}: {kind}" + (f" at {', '.join(words)}" if words else "")))
     return result
 
 
-def _telling(rows: np.ndarray) -> list[int]:
-    """Columns in which all rows differ, as few as can be found one by one: those that part most pairs, then those that part them
-    furthest."""
-    if len(rows) < 2:
+def _attitude(parameters: np.ndarray) -> np.ndarray:
+    """The rotation vector of Euler parameters (scalar first), of at most half a turn, rad, (3,)."""
+    e = parameters * np.sign(parameters[0] or 1.0)
+    size = float(np.linalg.norm(e[1:]))
+    vector: np.ndarray = np.zeros(3) if size < APART else 2 * np.arctan2(size, e[0]) / size * e[1:]
+    if abs(e[0]) < APART:  # half a turn: the axis with its first entry positive
+        vector = vector * np.sign(vector[np.flatnonzero(np.abs(vector) > 1e-3)[0]])
+    return vector
+
+
+def _turn(vector: np.ndarray) -> str:
+    """A rotation vector in words."""
+    angle = float(np.linalg.norm(vector))
+    if angle <= 10 * APART:
+        return "not turned"
+    axis = vector / angle
+    k = int(np.argmax(np.abs(axis)))
+    if abs(axis[k]) > 1 - 1e-6:
+        return f"turned by {np.degrees(angle * np.sign(axis[k])):.4g} deg about {'xyz'[k]}"
+    about = ", ".join(f"{v if abs(v) > 1e-4 else 0:.3g}" for v in axis)
+    return f"turned by {np.degrees(angle):.4g} deg about ({about})"
+
+
+def _telling(parts: list[np.ndarray]) -> list[int]:
+    """Parts (n, m) in which all rows differ, as few as can be found one by one: those that part most pairs, then those that part
+    them furthest."""
+    count = len(parts[0]) if parts else 0
+    if count < 2:
         return []
-    gaps = np.array([np.abs(a - b) for k, a in enumerate(rows) for b in rows[:k]])
+    gaps = np.array([[np.linalg.norm(part[k] - part[j]) for part in parts] for k in range(count) for j in range(k)])
     chosen: list[int] = []
     open_ = np.ones(len(gaps), dtype=bool)
     for clear in CLEARLY:

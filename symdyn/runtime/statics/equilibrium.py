@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium
+from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import normalised, number
+from symdyn.runtime.masses import real_parameters
+from symdyn.runtime.statics.gimbal import lock
 from symdyn.runtime.statics.linear import Reduced
 from symdyn.runtime.statics.modes import eigen, stable
 from symdyn.runtime.statics.search import Search, Trial
@@ -28,6 +31,10 @@ LOOSE = 1e-11
 STEADY = 1e-9
 # Residuals that a message names, at most.
 TOLD = 4
+# Whether forces depend on time is asked so many seconds later.
+LATER = (0.37, 1.7, 7.3)
+LOCKED = ("there forces along its angles do not tell whether it is at rest; use Euler parameters (orientation='parameters' of a "
+          "catalogued system, orientation=EulerParameters() of a joint), or another order of the angles")
 _FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
@@ -145,7 +152,33 @@ def equilibrium(module: Module, free: Any = None, fixed: Any = None, start: Any 
     """See Module.equilibrium."""
     selection = select(module, free, fixed, unknown_params)
     place = begin(module, selection, start, params, t, inputs)
-    return find(place, selection, max_iterations)
+    return find(place, settled(place, selection), steps(max_iterations, module.name))
+
+
+def steps(limit: Any, owner: str) -> int:
+    """A number of iterations. Raises ArgumentError for anything else."""
+    if isinstance(limit, bool) or not isinstance(limit, (int, np.integer)) or limit < 1:
+        raise ArgumentError(f"{owner}: max_iterations must be a whole number of at least 1, found {limit!r}")
+    return int(limit)
+
+
+def settled(place: Place, selection: Selection) -> Selection:
+    """With the conditions among more candidates than are needed: those on whose forces what is solved for has an effect."""
+    if not selection.candidates:
+        return selection
+    metadata, labels = place.module.metadata, coordinate_names(place.module.metadata)
+    columns = np.sqrt(1 / np.maximum(np.abs(np.diag(place.M)), 1e-300))
+    by = np.abs(place.by(selection.unknown)[:len(labels)]) * columns[:, None]
+    told = by > 1e-9 * by.max(axis=0, initial=0.0)
+    found = [n for n in selection.candidates if n in labels and told[labels.index(n)].any()]
+    if len(found) != len(selection.unknown):
+        free = [*[n for n in metadata["q"] if n not in selection.kept], *selection.candidates[:len(selection.unknown)]]
+        raise ArgumentError(
+            f"{place.module.name}: {len(selection.unknown)} values are to be found ({', '.join(selection.unknown)}), which takes "
+            f"as many conditions, but fixed gives {len(selection.values)} ({', '.join(selection.values)}); name in free the "
+            "conditions among them, and the coordinates that are found, too, such as "
+            f"free=[{', '.join(repr(n) for n in [*free, *selection.unknown])}]")
+    return replace(selection, conditions=tuple(found), candidates=())
 
 
 def begin(module: Module, selection: Selection, start: Any, params: Any, t: float, inputs: Any) -> Place:
@@ -168,7 +201,7 @@ def begin(module: Module, selection: Selection, start: Any, params: Any, t: floa
         params = {**dict.fromkeys([n for n in selection.parameters if n not in given and known[n] is None], 0.0), **params}
     free = take(inputs if inputs is not None else {}, metadata["inputs"], "inputs", dict.fromkeys(metadata["inputs"], 0.0),
                 module.name)
-    return rest(module, time, x, module.parameters(params), free)
+    return rest(module, time, x, real_parameters(module, params), free)
 
 
 def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
@@ -186,30 +219,35 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     trial = search.best
     if not good:
         _refuse(search, reason)
+    locked = lock(trial.place)
+    if locked:
+        raise NoEquilibrium(f"{owner}: no equilibrium found: the state reached is at gimbal lock: {locked}; {LOCKED}")
+    _demand_effect(search)
     _demand_stiffness(search)
     _demand_steady(trial)
-    _look(trial.place)
+    _look(search)
     return Equilibrium(trial.place, selection, _left(trial), search.steps)
 
 
 def _left(trial: Trial) -> dict[str, float]:
     """Forces that are left, by the coordinate they work along; what is kept bears anything."""
-    Q = trial.tested @ np.linalg.pinv(trial.tested)
     labels = coordinate_names(trial.place.module.metadata)
-    return {name: float(v) for name, v in zip(labels, Q @ trial.place.forces, strict=True)}
+    return {name: float(v) for name, v in zip(labels, _along(trial, trial.place.forces), strict=True)}
 
 
 def _refuse(search: Search, reason: str) -> NoReturn:
     """Raises NoEquilibrium with what is left, and where."""
     trial, module = search.best, search.module
     metadata = module.metadata
+    _demand_effect(search)
     labels = coordinate_names(metadata)
     forces = _left(trial)
     weighed = np.abs(np.array(list(forces.values()))) * search.columns
     order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:TOLD]
     left = ", ".join(f"{forces[labels[k]]:.6g} {_FORCES.get(metadata['units'].get(metadata['u'][k], ''), '')}".strip()
                      + f" along {labels[k]}" for k in order)
-    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"]], [*trial.place.q, *trial.place.z],
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"], *trial.selection.unknown],
+                                                       [*trial.place.q, *trial.place.z, *trial.selection.amounts(trial.place)],
                                                        strict=True))
     rates = ", ".join(f"{metadata['z'][k]} by {trial.place.rates_z[k]:.3g} a second" for k in trial.selection.states
                       if abs(trial.place.rates_z[k]) > 1e-9)
@@ -222,7 +260,11 @@ def _refuse(search: Search, reason: str) -> NoReturn:
     parts += [f"forces left are {left}"] if left else []
     parts += [f"constraints are open: {open_}"] if open_ else []
     parts += [f"extra states change: {rates}"] if rates else []
-    parts += [*loose, f"the last state is {where}; begin elsewhere with start={{...}}, or check the loads"]
+    locked = lock(trial.place)
+    parts += [f"the last state is at gimbal lock: {locked}; {LOCKED}"] if locked else []
+    advice = "check the weight and the loads: another start hardly helps" if loose else \
+        "begin elsewhere with start={...}, or check the loads"
+    parts += [*loose, f"the last state is {where}; {advice}"]
     raise NoEquilibrium(f"{module.name}: " + "; ".join(parts))
 
 
@@ -230,6 +272,24 @@ def _slack(trial: Trial, k: int, columns: np.ndarray) -> bool:
     """Whether a force along speed k meets (almost) no stiffness."""
     K = trial.place.by_v[:trial.place.sizes[1]] * np.outer(columns, columns)
     return bool(np.abs(K[k]).max(initial=0.0) <= 1e-6 * np.abs(K).max(initial=0.0) or not K.any())
+
+
+def _demand_effect(search: Search) -> None:
+    """Raises ArgumentError for a parameter or an input that is solved for but changes nothing."""
+    trial, unknown = search.best, search.selection.unknown
+    if not unknown:
+        return
+    labels = coordinate_names(search.module.metadata)
+    allowed, n_u = search.allowed(trial), trial.place.sizes[1]
+    idle = []
+    for name, value, column in zip(unknown, search.selection.amounts(trial.place), trial.by_unknown(), strict=True):
+        along = np.abs(_along(trial, column[:n_u])) * max(abs(value), 1.0)
+        if not column[n_u:].any() and (along <= 1e-6 * allowed).all():
+            idle.append(name)
+    if idle:
+        conditions = [n for n in search.selection.conditions if n in labels]
+        raise ArgumentError(f"{search.module.name}: {', '.join(idle)} has no effect on {', '.join(conditions) or 'any force'} "
+                            "there: no value of it balances the forces; solve for another parameter, or fix another coordinate")
 
 
 def _demand_stiffness(search: Search) -> None:
@@ -299,7 +359,28 @@ def _demand_steady(trial: Trial) -> None:
                                 "rest there; give speeds that fit them, or simulate the motion")
 
 
-def _look(place: Place) -> None:
-    """Warn of what elements watch over."""
+def _look(search: Search) -> None:
+    """Warn of what elements watch over, and of forces that depend on time."""
+    trial = search.best
+    place, name = trial.place, trial.place.module.name
     if place.module.metadata.get(WATCHES, ()):
         warn(place.module, place.evaluate(WATCHES), "in equilibrium", 5)
+    if "t" not in place.module.unit("balance").metadata["arguments"].get("balance", ()):
+        return
+    labels, allowed = coordinate_names(place.module.metadata), search.allowed(trial)
+    try:
+        changes = np.array([_along(trial, trial.place.at(t=place.t + later).forces - place.forces) for later in LATER])
+    except EvaluationError:
+        return
+    k = int(np.argmax((np.abs(changes) / np.maximum(allowed, 1e-300)).max(axis=0)))
+    if (np.abs(changes[:, k]) > allowed[k]).any():
+        unit = _FORCES.get(place.module.metadata["units"].get(place.module.metadata["u"][k], ""), "")
+        warnings.warn(f"{name}: in equilibrium: forces depend on time, which stands still at t = {place.t:g} s: that along "
+                      f"{labels[k]} changes by {np.abs(changes[:, k]).max():.3g} {unit}".rstrip() + f" within {LATER[-1]:g} s; "
+                      "this is no state that lasts", SimulationWarning, stacklevel=5)
+
+
+def _along(trial: Trial, forces: np.ndarray) -> np.ndarray:
+    """The part of forces that must balance, by speeds, (n_u,)."""
+    found: np.ndarray = trial.tested @ np.linalg.pinv(trial.tested) @ forces
+    return found

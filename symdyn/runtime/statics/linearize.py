@@ -11,6 +11,7 @@ import numpy as np
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import normalised, number
+from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.statics.equilibrium import Equilibrium
 from symdyn.runtime.statics.linear import Reduced
 from symdyn.runtime.statics.modes import Modes, eigen, modes_of
@@ -120,7 +121,10 @@ class Linearization:
         """
         place, selection = self._reduced.place, self._reduced.selection
         owner = self.module.name
-        (name,) = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
+        named = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
+        if len(named) != 1:
+            raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {parameter!r}")
+        (name,) = named
         rows = selection.rows(place)
         if (self.equilibrium is None and not self._at_rest()) or self.G.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues hold at a state of rest or of steady motion; linearize at "
@@ -186,7 +190,7 @@ def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -
     x = take(at, metadata["x"], "at", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
     free = take(inputs if inputs is not None else {}, metadata["inputs"], "inputs", dict.fromkeys(metadata["inputs"], 0.0),
                 module.name)
-    return rest(module, time, normalised(module, x), module.parameters(params), free)
+    return rest(module, time, normalised(module, x), real_parameters(module, params), free)
 
 
 def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:

@@ -3,7 +3,7 @@
 q_k = a_0 + a_c cos psi_k + a_s sin psi_k + ..., psi_k = psi + 2 pi k / N. With q = T(psi) a and psi_dot = Omega:
     q_dot = T a_dot + Omega T' a,  q_ddot = T a_ddot + 2 Omega T' a_dot + Omega^2 T'' a,
 so the matrices in a are T^T M T, T^T (2 Omega M T' + C T), T^T (Omega^2 M T'' + Omega C T' + K T), averaged over azimuths:
-what is left of the rotation (gravity on two blades, or a rotor of unequal ones) averages out. The steady state is the a that
+what is left of the rotation (gravity on the blades) averages out. The steady state is the a that
 balances the averaged forces, blades moving with its harmonics.
 Source: Coleman and Feingold, NACA Report 1351 (1958); Bir, Multi-blade coordinate transformation and its application to wind
 turbine analysis, AIAA 2008-1300.
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 ITERATIONS = 50
+# Inertia and stiffness of blades, averaged over the azimuths, may differ by this part. Over fewer than three azimuths weight
+# does not average out.
+EQUAL, LEAST_AZIMUTHS = 1e-3, 3
 SOLVED = 1e-11
 
 
@@ -170,8 +173,28 @@ class Steady:
         return Steady(rotor, place.at(x=x), self.a + step, self.omega, self.azimuths, iterations)
 
 
+def demand_equal_blades(state: Steady) -> None:
+    """Raises ArgumentError for a set whose members do not have the same inertia and stiffness."""
+    rotor, name = state.rotor, state.place.module.name
+    if len(state.azimuths) < LEAST_AZIMUTHS:
+        return
+    places = [state.at(float(psi))[0] for psi in state.azimuths]
+    M = np.mean([np.diag(place.M) for place in places], axis=0)
+    K = np.mean([np.diag(place.by_v[:len(M)]) for place in places], axis=0)
+    size = np.abs(K) + state.omega**2 * M
+    labels = coordinate_names(state.place.module.metadata)
+    for group in (list(g) for g in rotor.blades):
+        for what, values, sizes in (("inertia", M[group], M[group]), ("stiffness", K[group], size[group])):
+            if np.ptp(values) > EQUAL * sizes.max():
+                found = ", ".join(f"{labels[k]}: {v:.6g}" for k, v in zip(group, values, strict=True))
+                raise ArgumentError(f"{name}: blades: a set holds the same coordinate of every blade, one set per shape, such as "
+                                    f"[('flap1', 'flap2', 'flap3'), ('edge1', 'edge2', 'edge3')], but these differ in {what}: "
+                                    f"{found}; group them by shape")
+
+
 def steady(start: Steady) -> tuple[Steady, Averaged]:
-    """The steady state near a start, by Newton's method. Raises NoEquilibrium."""
+    """The steady state near a start, by Newton's method. Raises NoEquilibrium, ArgumentError."""
+    demand_equal_blades(start)
     name, turns = start.place.module.name, turning(start.place.module)[list(start.rotor.free)]
     found = start
     try:

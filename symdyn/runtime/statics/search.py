@@ -31,6 +31,8 @@ ROUNDED = 1e-15
 FLOOR, CONSTRAINED_FLOOR = 1e-9, 1e-3
 # Singular values below this part of the largest, divided by the floor, are rounding: no step is taken along them.
 CUT = 1e-15
+# Forces that are left may be this part of those that act, or that of rounding in the largest.
+LEFT, ROUNDING = 1e-9, 1e-13
 # A coordinate that is further than this many times the largest length or radius of inertia of the start has run away.
 FAR = 1e6
 # After every step at most so many more bring the state onto the constraints, to this part of a metre.
@@ -114,10 +116,11 @@ class Search:
         self.columns = columns
         trial = self._closed(trial)
         trial = trial.with_multipliers(np.sqrt(np.sum((trial.tested * columns[:, None])**2, axis=0)))
-        J = np.abs(trial.derivative() * self.widths(trial))
-        largest = J.max(axis=1, initial=0.0)
         n_e, n_c = trial.tested.shape[1], place.sizes[3]
         least = CONSTRAINED_FLOOR if n_c else FLOOR
+        self.unknown = self._unknown_widths(trial)
+        J = np.abs(trial.derivative() * self.widths(trial))
+        largest = J.max(axis=1, initial=0.0)
         floor = np.ones(len(largest))
         for part in (slice(0, n_e), slice(n_e, n_e + n_c), slice(n_e + n_c, None)):
             floor[part] = least * largest[part].max(initial=0.0) or 1.0
@@ -130,12 +133,45 @@ class Search:
 
     def widths(self, trial: Trial) -> np.ndarray:
         """Scales of the unknowns: what one unit of the scaled ones is."""
-        place, selection = trial.place, self.selection
-        names = self.module.metadata
         along = 1 / np.sqrt(np.sum((trial.directions / self.columns[:, None])**2, axis=0))
-        sizes = [*place.z[selection.states], *[place.p[names["parameters"].index(n)] for n in selection.parameters],
-                 *[place.inputs[names["inputs"].index(n)] for n in selection.inputs]]
-        return np.concatenate([along, [abs(v) or 1.0 for v in sizes]])
+        return np.concatenate([along, [abs(v) or 1.0 for v in trial.place.z[self.selection.states]], self.unknown])
+
+    def _unknown_widths(self, trial: Trial) -> np.ndarray:
+        """Of parameters and inputs: what acts like one unit of motion against the stiffness, that of what is kept included; their
+        own size, or 1, where there is none."""
+        place, n_u = trial.place, trial.place.sizes[1]
+        stiffness = np.abs((trial.tested.T @ place.by_v[:n_u]) * self.columns).max(axis=1, initial=0.0)
+        stiff = stiffness > FLOOR * stiffness.max(initial=0.0)
+        widths = []
+        for size, column in zip(self.selection.amounts(place), trial.by_unknown(), strict=True):
+            effect = np.abs(trial.tested.T @ column[:n_u])[stiff] / stiffness[stiff]
+            largest = effect.max(initial=0.0)
+            widths.append(1 / largest if largest > 0 else abs(size) or 1.0)
+        return np.array(widths)
+
+    def allowed(self, trial: Trial) -> np.ndarray:
+        """How much force may be left along each speed, (n_u,): a small part of the forces that act there, taken one by one.
+
+        What acts is measured by the change of the forces with the logarithm of every parameter, by pulls of constraints, and,
+        for rounding, by the stiffness.
+        """
+        place, names = trial.place, self.module.metadata
+        n_u = place.sizes[1]
+        values = np.concatenate([place.p, place.inputs])
+        by = place.by([*names["parameters"], *names["inputs"]])[:n_u]
+        acting = np.abs(by) @ np.abs(values)
+        if place.sizes[3]:
+            acting += np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
+        whole = self.columns * (acting + np.abs(place.by_v[:n_u]) @ self.columns)
+        found: np.ndarray = LEFT * acting + ROUNDING * whole.max(initial=0.0) / self.columns
+        return found
+
+    def balanced(self, trial: Trial) -> bool:
+        """Whether the forces that are left are small beside those that act."""
+        if not trial.tested.shape[1]:
+            return True
+        Q = trial.tested @ np.linalg.pinv(trial.tested)
+        return bool((np.abs(Q @ trial.place.forces) <= np.abs(Q) @ self.allowed(trial)).all())
 
     def run(self, limit: int) -> tuple[bool, str]:
         """Whether an equilibrium was found, and else why not; `best` holds the last state, `steps` their number.
@@ -169,7 +205,7 @@ class Search:
             newton = _length(along[kept] / values[kept])
             left = _length(F - U[:, kept] @ along[kept])
             if newton <= STEP and _length(F) <= SOLVED + left and (newton <= ROUNDED or newton > last / 4):
-                balanced = left <= max(self.cut, SOLVED)
+                balanced = left <= max(self.cut, SOLVED) and self.balanced(trial)
                 return balanced, "" if balanced else "forces are left that nothing balances"
             last = newton
             self.steps += 1

@@ -24,6 +24,7 @@ class Selection:
 
     values       of what stays at a given number
     conditions   names among `values` whose equations hold nevertheless: one for each parameter or input solved for
+    candidates   where there are more than are needed: names among which the conditions are still to be found
     """
 
     module: Module
@@ -32,6 +33,7 @@ class Selection:
     parameters: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ()
+    candidates: tuple[str, ...] = ()
 
     @cached_property
     def states(self) -> list[int]:
@@ -41,6 +43,12 @@ class Selection:
     @property
     def unknown(self) -> tuple[str, ...]:
         return (*self.parameters, *self.inputs)
+
+    def amounts(self, place: Place) -> np.ndarray:
+        """The values of what is solved for, (n,)."""
+        metadata = self.module.metadata
+        return np.array([*[place.p[metadata["parameters"].index(n)] for n in self.parameters],
+                         *[place.inputs[metadata["inputs"].index(n)] for n in self.inputs]])
 
     def rows(self, place: Place, equations: bool = False) -> np.ndarray:
         """R with R v = 0 for what stays, (n, n_u); equations: only for those whose equations do not hold."""
@@ -92,27 +100,32 @@ def select(module: Module, free: Any, fixed: Any, unknown: Any) -> Selection:
         if wrong:
             raise ArgumentError(f"{owner}: free names the speeds {', '.join(wrong)}; name coordinates, and give speeds their "
                                 "values in fixed")
-        kept |= {n for n in metadata["q"] if n not in moving}
-    conditions = _conditions(module, solved, values, moving or ())
+        if not (solved and set(moving) <= set(values)):  # conditions alone leave the others free
+            kept |= {n for n in metadata["q"] if n not in moving}
+    conditions, candidates = _conditions(module, solved, values, moving or ())
     order = [n for n in metadata["x"] if n in kept]
     return Selection(module, tuple(order), values, tuple(n for n in solved if owners[n] == "parameter"),
-                     tuple(n for n in solved if owners[n] == "input"), tuple(conditions))
+                     tuple(n for n in solved if owners[n] == "input"), tuple(conditions), tuple(candidates))
 
 
-def _conditions(module: Module, solved: list[str], values: Mapping[str, float], free: Iterable[str]) -> list[str]:
+def _conditions(module: Module, solved: list[str], values: Mapping[str, float], free: Iterable[str]
+                ) -> tuple[list[str], list[str]]:
+    """Conditions, and where there are too many to tell what they are among."""
     if not solved:
         both = [n for n in values if n in free]
         if both:
             raise ArgumentError(f"{module.name}: {', '.join(both)} is both free and fixed; leave it out of one of them, or name "
                                 "in free the parameter that makes it take its value")
-        return []
+        return [], []
     coordinates = [n for n in values if n in module.metadata["q"]]
     for candidates in ([n for n in values if n in free], coordinates, list(values)):
         if len(candidates) == len(solved):
-            return candidates
+            return candidates, []
+    if len(coordinates) > len(solved):
+        return [], coordinates
     raise ArgumentError(f"{module.name}: {len(solved)} values are to be found ({', '.join(solved)}), which takes as many "
                         f"conditions, but fixed gives {len(values)} ({', '.join(values) or 'none'}); give one value in fixed "
-                        "for each, or, where more have to stay, name those that are the conditions in free, too")
+                        "for each")
 
 
 def _numbers(fixed: Any, names: list[str], owner: str) -> dict[str, float]:

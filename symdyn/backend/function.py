@@ -1,0 +1,73 @@
+"""The functions of a program: straight-line statements in one dialect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symdyn.tape.node import Node
+
+ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
+
+
+@dataclass(frozen=True)
+class Section:
+    """Statements under one heading."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch of a long function, a function of its own: compilers take more than linear time for one function.
+
+    arguments   groups it reads, of t q u z ud inputs p c, in this order; it also gets w, which holds what parts hand on
+    results     statements that keep values in w; of the last part, those that store the function's result
+    """
+
+    arguments: tuple[str, ...]
+    loads: tuple[str, ...]
+    sections: tuple[Section, ...]
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Function:
+    """One function of the generated module.
+
+    arguments   groups it reads, of t q u z ud inputs p c, in this order
+    shape       of its result; loads, sections, results: statements in the dialect
+    parts       what a long function consists of, instead of statements; n_w: size of what the parts hand on
+    regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
+                statements of its own
+    inlined     steps that are written where they are used: which products and sums become one depends on it
+    """
+
+    name: str
+    title: str
+    shape: tuple[int, ...]
+    arguments: tuple[str, ...]
+    loads: tuple[str, ...]
+    sections: tuple[Section, ...]
+    results: tuple[str, ...]
+    operations: Mapping[str, int]
+    longest_chain: int
+    parts: tuple[Part, ...] = ()
+    n_w: int = 0
+    regular: Function | None = None
+    otherwise: Function | None = None
+    inlined: frozenset[Node] = frozenset()
+
+    @property
+    def size(self) -> int:
+        """Number of entries of the result."""
+        total = 1
+        for k in self.shape:
+            total *= k
+        return total
+
+    @property
+    def count(self) -> int:
+        """Operations of one evaluation."""
+        return sum(self.operations.values())

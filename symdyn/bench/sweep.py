@@ -1,0 +1,78 @@
+"""`python -m symdyn.bench.sweep`: a sweep of a million short motions: rate, memory, and a run that is killed and goes on."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time as clock
+from pathlib import Path
+
+SWEEP = """
+system = "double_pendulum"
+t = [0, 1]
+sampling = "latin_hypercube"
+count = {count}
+seed = 1
+outcomes = ["end q1", "end q2"]
+[parameters]
+l1 = {{from = 0.8, to = 1.2}}
+m2 = {{distribution = "lognormal", median = 1.0, sigma = 0.1}}
+[initial]
+q1 = {{from = -1, to = 1}}
+q2 = {{from = -1, to = 1}}
+"""
+
+
+def start(folder: Path, count: int, out: str, *more: str) -> subprocess.Popen[str]:
+    """A sweep in a process of its own."""
+    file = folder / f"{count}.toml"
+    file.write_text(SWEEP.format(count=count), encoding="utf-8")
+    return subprocess.Popen([sys.executable, "-m", "symdyn", "sweep", str(file), "--no-picture", "--output", str(folder / out),
+                             *more], stdout=subprocess.PIPE, text=True)
+
+
+def measured(folder: Path, count: int, out: str) -> tuple[float, float, float]:
+    """Wall time, processor time, s, and largest memory, MB, of a sweep."""
+    begun = clock.perf_counter()
+    run = start(folder, count, out)
+    _, status, used = os.wait4(run.pid, 0)
+    if status:
+        raise SystemExit(f"the sweep ended with status {status}")
+    return clock.perf_counter() - begun, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+
+
+def main() -> int:
+    """Measure and print; returns 0 if the killed run ended with the same file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, help="of the moment of the kill (default: another one every time)")
+    arguments = parser.parse_args()
+    count = arguments.count
+    with tempfile.TemporaryDirectory(prefix="symdyn-bench-") as name:
+        folder = Path(name)
+        start(folder, 2000, "first").communicate()  # derives and compiles
+        for n in (count // 10, count):
+            seconds, used, memory = measured(folder, n, f"whole{n}")
+            size = (folder / f"whole{n}" / "ensemble.npz").stat().st_size / 2**20
+            print(f"{n} motions of 1 s: {seconds:.1f} s, {n / seconds:.0f} a second, processor {used:.1f} s, "
+                  f"memory {memory:.0f} MB, file {size:.1f} MB", flush=True)
+        moment = random.Random(arguments.seed).uniform(0.1, 0.9) * seconds
+        run = start(folder, count, "killed")
+        clock.sleep(moment)
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        kept = len(list((folder / "killed" / "chunks").glob("0*.npz")))
+        told, _ = start(folder, count, "killed", "--resume").communicate()
+        same = (folder / "killed" / "ensemble.npz").read_bytes() == (folder / f"whole{count}" / "ensemble.npz").read_bytes()
+        print(f"killed after {moment:.1f} s with {kept} chunks done; gone on: {told.splitlines()[0]}")
+        print("the file is the same, to the byte" if same else "THE FILE DIFFERS")
+    return 0 if same else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""`symdyn sweep`: many motions, as a TOML file tells."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import time as clock
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symdyn.cli.find import find_module
+from symdyn.cli.messages import FAILED, INTERRUPTED, WRONG, Stop, complain
+from symdyn.errors import ArgumentError, EnsembleStopped, MissingExtra, SymdynError
+
+if TYPE_CHECKING:
+    from symdyn.ensembles.result import Ensemble
+    from symdyn.ensembles.sweep_file import Sweep
+    from symdyn.runtime.module import Module
+
+# Messages of failed members that are printed; all of them are in the file.
+SHOWN = 3
+# Of more samples every so-many-th is summarized, so that memory does not grow with their number.
+SUMMARIZED = 100_000
+
+
+def sweep(arguments: argparse.Namespace) -> int:
+    """Read the file, simulate, tell, draw."""
+    from symdyn.ensembles.run import ensemble
+    from symdyn.ensembles.sweep_file import read_sweep
+
+    if arguments.jobs is not None and arguments.jobs < 1:
+        raise Stop(f"--jobs must be 1 or more, found {arguments.jobs}")
+    if arguments.jobs is not None and arguments.dask is not None:
+        raise Stop("--jobs is for this machine, --dask for a cluster; give one of them")
+    faults: list[str] = []
+    asked = read_sweep(arguments.file, faults)
+    module = _checked(arguments, asked, faults)
+    folder = arguments.output or Path(asked.values.get("output", Path("generated") / arguments.file.stem))
+    begun = clock.perf_counter()
+    with _executor(arguments, module) as executor:
+        try:
+            done = ensemble(module, **asked.arguments(module), path=folder, resume=arguments.resume, executor=executor,
+                            progress=arguments.progress)
+        except EnsembleStopped as stop:
+            return complain(str(stop), FAILED)
+        except KeyboardInterrupt as stop:
+            return complain(str(stop) or "interrupted", INTERRUPTED)
+    _tell(done, clock.perf_counter() - begun)
+    if not arguments.no_picture:
+        try:
+            done.plot(folder / "ensemble.png", asked.values.get("scatter"))
+            print(f"wrote {folder / 'ensemble.png'}")
+        except MissingExtra as missing:
+            print(f"no picture: {missing}")
+    return 0
+
+
+def _checked(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> Module:
+    """The module, if there is no fault in the file. Raises Stop with all of them."""
+    from symdyn.ensembles.measures import output_times, read_measures
+
+    name = arguments.system or asked.values.get("system")
+    module = None
+    if name is None and not any(f.startswith(("system", "not TOML", "there is no such", "cannot be read")) for f in faults):
+        faults.append("system: is missing; name one of the catalogue, or give a Python file by --system")
+    if name is not None:
+        options = asked.values.get("options", {})
+        try:
+            module = find_module(argparse.Namespace(
+                system=str(name), option=[f"{k}={v}" for k, v in options.items()], backend=arguments.backend,
+                formulation=asked.values.get("formulation", "auto"), coordinates=asked.values.get("coordinates", "relative")))
+            faults += asked.unknown_names(module.metadata)
+        except (Stop, SymdynError) as error:
+            faults.append(f"system: {error}")
+    if module is not None:
+        before = len(faults)
+        measures = read_measures(asked.values.get("outcomes"), module, faults)
+        if len(faults) == before:
+            _check_scatter(asked, [m.label for m in measures], faults)
+        try:
+            output_times(asked.values.get("t"), measures, module)
+        except ArgumentError as error:
+            faults.append(f"t: {str(error).removeprefix(module.name + ': ')}")
+    if faults or module is None:
+        several = len(faults) > 1
+        head = f"{arguments.file} has {len(faults)} faults:\n  - " if several else f"{arguments.file}: "
+        raise Stop(head + "\n  - ".join(faults), WRONG)
+    return module
+
+
+def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:
+    names = asked.samples.names if asked.samples is not None else ()
+    for k, (x, y) in enumerate(asked.values.get("scatter", [])):
+        if asked.samples is not None and x not in (*names, *labels):
+            faults.append(f"scatter[{k + 1}]: {x!r} is neither varied nor an outcome")
+        if y not in labels:
+            faults.append(f"scatter[{k + 1}]: {y!r} is no outcome")
+
+
+@contextlib.contextmanager
+def _executor(arguments: argparse.Namespace, module: Module) -> Iterator[Any]:
+    """What --jobs and --dask name: a cluster; threads where code is compiled, else processes, which do not wait
+    for each other."""
+    if arguments.dask is not None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise MissingExtra("--dask needs Dask: pip install 'symdyn[dask]'") from None
+        try:
+            client = Client(arguments.dask, timeout=arguments.dask_timeout)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise Stop(f"--dask {arguments.dask}: no scheduler there ({error})", FAILED) from None
+        with client:
+            yield client.get_executor()
+        return
+    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+    from multiprocessing import get_context
+
+    jobs = arguments.jobs or os.cpu_count() or 1
+    if module.backend == "c" or jobs == 1:
+        yield lambda: ThreadPoolExecutor(jobs)
+    else:
+        yield lambda: ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
+
+
+def _tell(done: Ensemble, seconds: float) -> None:
+    fresh = done.count - done.n_resumed
+    print(f"{done.name}: {done.count} samples of {', '.join(done.names)}"
+          + (f", {done.n_resumed} of them computed before" if done.n_resumed else "")
+          + (f", {fresh} in {seconds:.3g} s ({fresh / seconds:.0f} a second)" if fresh else ""))
+    for label in done.labels:
+        if label not in done.traces:
+            _tell_outcome(done, label)
+    if done.n_failed:
+        print(f"{done.n_failed} samples failed:")
+        for failure in done.failures(SHOWN):
+            values = ", ".join(f"{n} = {float(v):.6g}" for n, v in failure["values"].items())
+            print(f"  sample {failure['index']} ({values}): {failure['message']}")
+        if done.n_failed > SHOWN:
+            print(f"  and {done.n_failed - SHOWN} more, see {done.path / 'failures.jsonl'}")
+    print(f"wrote {done.file}")
+
+
+def _tell_outcome(done: Ensemble, label: str) -> None:
+    import numpy as np
+
+    from symdyn.ensembles.archive import thinned
+
+    if done.shapes[label]:
+        return
+    step = max(1, -(-done.count // SUMMARIZED))
+    values = thinned(done.file, label, step)
+    values = values[np.isfinite(values)]  # of members that failed there are none
+    if not len(values):
+        return
+    low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
+    print(f"  {label}: mean {values.mean():.6g}, 5 % {low:.6g}, median {middle:.6g}, 95 % {high:.6g}, from {values.min():.6g} to "
+          f"{values.max():.6g}" + (f" (of every {step}th sample)" if step > 1 else ""))

@@ -1,0 +1,91 @@
+"""Hands chunks to an executor and takes their outcomes, a bounded number at a time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from typing import Any
+
+from symdyn.ensembles.chunk import Chunk, Done, run_chunk
+from symdyn.errors import SymdynError
+
+# How often a chunk is tried before the run stops.
+ATTEMPTS = 3
+# Chunks that wait for every worker, so that none is ever idle.
+AHEAD = 3
+
+
+class ExecutorFailed(SymdynError):
+    """An executor died, or cannot do a chunk; the message tells which and why."""
+
+
+def run_chunks(todo: Iterator[Chunk], make: Callable[[], Executor], again: bool,
+               outstanding: int | None = None) -> Iterator[Done]:
+    """Outcomes of the chunks, in the order in which they are done.
+
+    make          gives the executor; after it has died it is asked for another one if `again`
+    outstanding   chunks that are handed over at a time; default: three for every worker
+    Raises ExecutorFailed where there is no other executor, and where a chunk has failed ATTEMPTS times.
+    """
+    executor, born = make(), 0
+    limit = outstanding or AHEAD * _workers(executor)
+    back: list[Chunk] = []
+    attempts: dict[int, int] = {}
+    pending: dict[Future[Done], tuple[Chunk, int]] = {}
+    try:
+        while True:
+            chunk, of = None, born
+            try:
+                while len(pending) < limit and (chunk := back.pop() if back else next(todo, None)) is not None:
+                    pending[executor.submit(run_chunk, chunk)] = chunk, born
+                chunk = None
+                if not pending:
+                    return
+                for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                    chunk, of = pending.pop(future)
+                    result = future.result()
+                    chunk = None
+                    yield result
+            except Exception as error:
+                if chunk is None:
+                    raise
+                back.append(chunk)
+                dead = isinstance(error, BrokenExecutor) or _is_shut(error)
+                if dead and not again:
+                    yield from _done(pending)
+                    raise ExecutorFailed(f"the executor died: {error or type(error).__name__}") from error
+                # A worker may have been killed, or a machine be short of memory: that is no fault of the chunk, at first.
+                attempts[chunk.index] = attempts.get(chunk.index, 0) + 1
+                if attempts[chunk.index] == ATTEMPTS:
+                    yield from _done(pending)
+                    raise ExecutorFailed(f"samples {chunk.first} to {chunk.first + len(chunk.values) - 1} cannot be computed, "
+                                         f"tried {ATTEMPTS} times: {type(error).__name__}: {error}") from error
+                if dead and of == born:  # not of one that was replaced already
+                    executor, born = make(), born + 1
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _done(pending: Mapping[Future[Done], Any]) -> Iterator[Done]:
+    """What is there already when the run stops."""
+    for future in pending:
+        if future.done() and not future.cancelled() and future.exception() is None:
+            yield future.result()
+
+
+def _is_shut(error: Exception) -> bool:
+    """What `submit` of an executor that was shut down raises has no class of its own."""
+    return isinstance(error, RuntimeError) and ("shutdown" in str(error) or "closed" in str(error).lower())
+
+
+def _workers(executor: Any) -> int:
+    """How many tasks an executor does at a time, as far as it tells."""
+    told = getattr(executor, "_max_workers", None)
+    if isinstance(told, int):
+        return max(1, told)
+    client = getattr(executor, "_client", None)
+    if client is not None and hasattr(client, "nthreads"):  # Dask's
+        return max(1, sum(client.nthreads().values()))
+    return os.cpu_count() or 1

@@ -1,0 +1,245 @@
+"""Ensembles: the same mechanism with many parameters and initial states, over all cores or machines."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+import time as clock
+import weakref
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symdyn.ensembles.chunk import Chunk, Setting, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
+from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
+from symdyn.ensembles.portable import PortableModule
+from symdyn.ensembles.result import Ensemble
+from symdyn.ensembles.samples import Samples
+from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
+from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped, MissingExtra
+from symdyn.runtime.batch import UNIT
+from symdyn.runtime.module import Module
+
+# Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
+CHUNK, PARTS = 1000, 16
+# Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
+TRIED = 8
+# From so many samples on it is worth compiling code that integrates several motions at once.
+VECTORS_FROM = 2000
+
+
+def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: Any = None, u: Any = None, z: Any = None,
+             params: Any = None, inputs: Any = None, executor: Any = None, chunk: int | None = None, path: Any = None,
+             resume: bool = False, progress: bool = False, consistent: bool = False, outstanding: int | None = None,
+             functions: tuple[str, ...] = (), **options: Any) -> Ensemble:
+    """Simulate a mechanism for every sample, and keep some numbers of each motion.
+
+    system      a Module, or a System, which is compiled
+    samples     Samples, or a mapping from names or symbols of parameters, initial coordinates, speeds, extra states and inputs
+                to arrays of one length: the k-th values belong to member k
+    t           as for `simulate`
+    outcomes    a list of texts "end q1", or start, min, max, mean, rms (both over time), trace (all times) of a coordinate,
+                speed, input, output or "energy", and "q1 at 2.5"; or a mapping from labels to these or to functions of a
+                Solution, which return a number or an array. Default: the end of all coordinates and speeds
+    q, u, z, params, inputs   what is the same for all members, as for `simulate`; inputs are numbers
+    executor    any concurrent.futures.Executor, or a function that makes one, which is called again if it dies. Processes and
+                machines get the generated code as text and compile it once. Default: a thread for every core; compiled code lets
+                others run meanwhile
+    chunk       samples that are computed together, and written together; default: 1000, of few samples a sixteenth
+    path        folder for results, written as they come; default: a temporary one, removed with the result
+    resume      go on with a run that was stopped, whatever stopped it; the result is the same, to the byte
+    progress    show a bar (needs tqdm)
+    consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
+    outstanding chunks that are handed to the executor at a time; default: three for every worker
+    functions   of the module that functions of a Solution call in other processes only
+    options     of `simulate`: rtol, atol, method, max_step, max_steps, stabilization
+
+    From 2000 samples on motions are integrated several at once on the processor's vectors, where `simulate_batch` does so.
+    A member that fails has no numbers in its row, and is told in `failures`. Returns an Ensemble. Raises ArgumentError for what
+    does not fit, EnsembleStopped where an executor died or the disk is full: what was done is kept, if there is a path.
+    """
+    module = system if isinstance(system, Module) else system.compile() if hasattr(system, "compile") else None
+    if module is None:
+        raise ArgumentError(f"an ensemble needs a Module or a System, found {system!r:.80}")
+    drawn = samples if isinstance(samples, Samples) else Samples(samples, "paired")
+    unknown = [o for o in options if o not in ("rtol", "atol", "method", "max_step", "first_step", "max_steps", "stabilization")]
+    if unknown:
+        raise ArgumentError(f"{module.name}: an ensemble has no option {', '.join(unknown)}")
+    measures = take_measures(outcomes, module)
+    times = output_times(t, measures, module)
+    vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
+    portable = PortableModule(module, [*functions_of(module, measures), *functions, *[UNIT] * vectors])
+    given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
+    setting = setting_of(portable, drawn.names, times, measures, given, consistent, options)
+    setting = replace(setting, vectors=vectors)
+    size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)
+    if path is not None:
+        return _in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True)
+    folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
+    try:
+        result = _in_folder(folder, setting, drawn, executor, size, ahead, False, progress, False)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)
+    return result
+
+
+def _in_folder(folder: Path, setting: Setting, samples: Samples, executor: Any, size: int | None, ahead: int | None,
+               resume: bool, progress: bool, lasting: bool) -> Ensemble:
+    found = check_folder(folder, resume)
+    size = size or (found or {}).get("chunk") or min(CHUNK, -(-samples.count // PARTS))
+    with quiet():
+        setting = _tried(setting, samples)
+        manifest = _manifest(setting, samples, size)
+        if found is not None:
+            check_same(folder, found, manifest)
+        store = Store(folder, samples.count, size, dict(zip([m.label for m in setting.measures], setting.shapes)))
+        run = _Run(store, setting, samples, executor, ahead, progress, lasting)
+        if found is None:
+            run.kept(lambda: write_manifest(folder, manifest))
+        return run.go()
+
+
+class _Run:
+    """One run, with all that it needs to go on."""
+
+    def __init__(self, store: Store, setting: Setting, samples: Samples, executor: Any, outstanding: int | None,
+                 progress: bool, lasting: bool) -> None:
+        self.store, self.setting, self.samples = store, setting, samples
+        self.executor, self.outstanding, self.progress, self.lasting = executor, outstanding, progress, lasting
+        self.n_done = 0
+
+    def go(self) -> Ensemble:
+        begun, store = clock.perf_counter(), self.store
+        if store.complete():
+            return Ensemble(store.folder, store.count)
+        there = self.kept(store.begin)
+        self.n_done = n_before = sum(store.samples_in(k) for k in there)
+        todo = (self._chunk(k) for k in range(store.n_chunks) if k not in there)
+        make, again, own = self._executors()
+        bar = _bar(self.setting.system.module.name, store.count, n_before) if self.progress else None
+        arriving = run_chunks(todo, make, again, self.outstanding)
+        try:
+            for done in arriving:
+                self.kept(lambda done=done: store.put(done))  # type: ignore[misc]
+                self.n_done += store.samples_in(done.index)
+                if bar is not None:
+                    bar.update(store.samples_in(done.index))
+        except ExecutorFailed as error:
+            raise self._stopped(str(error)) from error
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"interrupted; {self._what_is_kept()}") from None
+        finally:
+            arriving.close()  # type: ignore[attr-defined]
+            for made in own:
+                made.shutdown(wait=True, cancel_futures=True)
+            if bar is not None:
+                bar.close()
+        self.kept(lambda: store.finish(self._about(), self.setting.times, self.samples.block))
+        return Ensemble(store.folder, n_before, clock.perf_counter() - begun)
+
+    def kept(self, write: Callable[[], Any]) -> Any:
+        """Do what writes to the disk; if the disk refuses, tell what is there."""
+        try:
+            return write()
+        except OSError as error:
+            why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "results cannot be written"
+            raise self._stopped(f"{why} ({error})") from error
+
+    def _stopped(self, why: str) -> EnsembleStopped:
+        return EnsembleStopped(f"{self.setting.system.module.name}: the ensemble stopped: {why}; {self._what_is_kept()}",
+                               self.n_done, self.store.count)
+
+    def _what_is_kept(self) -> str:
+        if not self.lasting:
+            return f"{self.n_done} of {self.store.count} samples were done; with a path they would be kept"
+        return (f"{self.n_done} of {self.store.count} samples are kept in {self.store.folder}; "
+                "pass resume=True (--resume) to go on from there")
+
+    def _chunk(self, k: int) -> Chunk:
+        first = k * self.store.size
+        return Chunk(self.setting, k, first, self.samples.block(first, first + self.store.samples_in(k)))
+
+    def _executors(self) -> tuple[Callable[[], Executor], bool, list[Executor]]:
+        """What gives executors, whether it gives another one, and those that are ours to end."""
+        own: list[Executor] = []
+        given = self.executor
+        if given is not None and hasattr(given, "submit"):
+            return (lambda: given), False, own
+        if given is not None and not callable(given):
+            raise ArgumentError("an executor must be a concurrent.futures.Executor, or a function that makes one, "
+                                f"found {given!r}")
+
+        def make() -> Executor:
+            own.append(ThreadPoolExecutor(os.cpu_count() or 1) if given is None else given())
+            return own[-1]
+
+        return make, True, own
+
+    def _about(self) -> dict[str, Any]:
+        module, measures = self.setting.system.module, self.setting.measures
+        return {"system": module.name, "names": list(self.samples.names), "varied": list(self.samples.varied),
+                "outcomes": [m.label for m in measures], "count": self.store.count,
+                "shapes": {m.label: s for m, s in zip(measures, self.setting.shapes)},
+                "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata["units"]},
+                "about": {m.label: m.told() for m in measures}, "rtol": self.setting.options.get("rtol", 1e-8)}
+
+
+def _tried(setting: Setting, samples: Samples) -> Setting:
+    """The setting with the shapes of outcomes. Raises ArgumentError where all that was tried is asked for wrongly."""
+    module: Module = setting.system.module
+    places = sorted({int(k) for k in np.linspace(0, samples.count - 1, TRIED)})
+    wrong: list[ArgumentError] = []
+    for k in places:
+        try:
+            solution = motion(setting, samples.block(k, k + 1)[0])
+            return replace(setting, shapes=tuple(m.of(solution).shape for m in setting.measures))
+        except ArgumentError as error:
+            wrong.append(error)
+        except (CompileError, CompilerNotFound):
+            raise
+        except Exception:  # it will stand among the failures
+            continue
+    if len(wrong) == len(places):
+        raise ArgumentError(f"none of {len(places)} samples that were tried can be simulated; the first: {wrong[0]}")
+    return replace(setting, shapes=tuple(_shape(m, setting, module) for m in setting.measures))
+
+
+def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...]:
+    """The shape of an outcome where no motion tells it; of a function a number."""
+    own = tuple(dict(map(tuple, module.metadata["outputs"])).get(measure.name, ()))  # type: ignore[arg-type]
+    return (len(setting.times), *own) if measure.kind == "trace" else own
+
+
+def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:
+    portable: PortableModule = setting.system
+    return {"system": portable.module.name, "code": portable.key(), "backend": portable.module.backend, "chunk": size,
+            "samples": samples.told(), "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
+            "outcomes": {m.label: m.told() for m in setting.measures}, "consistent": setting.consistent,
+            "vectors": setting.vectors,
+            "base": {k: v.tolist() for k, v in setting.base.items()},
+            "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}
+
+
+def _whole(value: Any, what: str, module: Module) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise ArgumentError(f"{module.name}: {what} must be a whole number from 1 on, found {value!r}")
+    return int(value)
+
+
+def _bar(name: str, count: int, before: int) -> Any:
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
+    return tqdm(total=count, initial=before, desc=name, unit=" samples")

@@ -1,0 +1,143 @@
+"""Checks the symbols of a description: what is a coordinate, a speed, a parameter or an input, and where each may be used."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.faults import NAME, Faults
+from symdyn.model.joints import Joint
+from symdyn.model.loop_check import constraint_faults
+from symdyn.model.record import joint_speeds
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, time
+from symdyn.model.uses import uses
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+Symbols = tuple[sp.Symbol, ...]
+
+
+def check_coordinates(s: System, joints: Sequence[Joint], faults: Faults) -> tuple[Symbols, Symbols]:
+    """Coordinates and speeds of a system, in order; what is wrong with them is added to the faults."""
+    driver: dict[sp.Symbol, Joint] = {}
+    coordinates: list[sp.Symbol] = []
+    speeds: list[sp.Symbol] = []
+    for joint in joints:
+        independent = [isinstance(q, Coordinate) for q in joint.coordinates]
+        if joint.symbols_only and not all(independent) and not joint.faults:
+            faults.append(f"joint {joint.name!r}: {joint.symbols_only}")
+        for place, q in enumerate(joint.coordinates):
+            if not isinstance(q, Coordinate):
+                continue
+            if q in driver:
+                independent[place] = False
+                faults.append(
+                    f"joints {driver[q].name!r} and {joint.name!r} both drive the coordinate {q}; give each its own, "
+                    f"or write one as an expression (gear: 2*{q}; mimic: sympy.UnevaluatedExpr({q}))")
+                continue
+            driver[q] = joint
+            coordinates.append(q)
+        if not joint.symbols_only:
+            speeds += [u for u, free in zip(joint_speeds(joint), independent, strict=True) if free]
+        else:
+            speeds += [u for u in joint_speeds(joint) if u is not None]
+    for q in dict.fromkeys(s.extra_coordinates):
+        if q in driver:
+            faults.append(f"{q} was given to add_coordinate, but joint {driver[q].name!r} has it for its own; "
+                          "leave out add_coordinate")
+        else:
+            coordinates.append(q)
+            speeds.append(q.dot)
+    for u, count in Counter(speeds).items():
+        if count > 1:
+            faults.append(f"the speed {u} belongs to {count} joints; give each a name of its own")
+    distinct = tuple(dict.fromkeys(coordinates)), tuple(dict.fromkeys(speeds))
+    states = [z.symbol for z in s.states]
+    for symbol, count in Counter([*distinct[0], *distinct[1], *dict.fromkeys(states)]).items():
+        if count > 1:
+            roles = [role for role, members in (("a coordinate", distinct[0]), ("a speed", distinct[1]),
+                                                ("a state", states)) if symbol in members]
+            faults.append(f"{symbol} is {' and '.join(roles)} at once; give each a symbol of its own")
+    if s.bodies and s.joints and not coordinates and not states and not any(j.faults for j in s.joints):
+        faults.append("no joint has a coordinate of its own, so nothing can move; give one a coordinate: "
+                      "sd.coordinates('q')")
+    return distinct
+
+
+def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coordinates: Symbols, speeds: Symbols,
+                  faults: Faults) -> tuple[Symbols, Symbols]:
+    """Parameters and inputs in order of their use; symbols that stand where they must not are added to the faults."""
+    moving = {time, *coordinates, *[q.dot for q in coordinates], *speeds, *[z.symbol for z in s.states]}
+    parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
+    inputs: dict[sp.Symbol, None] = {}
+    for where, expressions, constant in uses(s, joints, loads):
+        for symbol in symbols_in(expressions):
+            if isinstance(symbol, Acceleration):
+                faults.append(f"{where} uses the acceleration {symbol}; loads and rates may use coordinates, "
+                              "speeds, states, inputs and t")
+            elif symbol.name == "t" and symbol != time:
+                faults.append(f"{where} uses a symbol t with assumptions, which is not the time; use symdyn.t")
+            elif constant and (symbol in moving or isinstance(symbol, (Coordinate, Rate, Input))):
+                faults.append(f"{where} depends on {symbol}, but must be constant; use parameters and numbers")
+            elif symbol in moving:
+                continue
+            elif isinstance(symbol, (Coordinate, Rate)):
+                found = ", ".join(map(str, coordinates)) or "none"
+                faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {found}; "
+                              f"give {symbol} a joint, or use a parameter or input in its place")
+            elif isinstance(symbol, Input):
+                inputs[symbol] = None
+            elif s.declared is not None and symbol not in s.declared:
+                declared = ", ".join(map(str, s.declared)) or "none"
+                faults.append(f"{where} uses the symbol {symbol}, not declared in the model; declared: {declared}; "
+                              f"add {symbol} to the parameters or remove it")
+            else:
+                parameters[symbol] = None
+    states = {z.symbol for z in s.states}
+    faults += constraint_faults(s.constraints, moving - states - {time}, states, speeds)
+    for joint in joints:
+        for q in joint.coordinates:
+            rates = [] if isinstance(q, Coordinate) else [
+                a for a in symbols_in([q]) if a in speeds or a in states or isinstance(a, (Rate, Input))]
+            if rates:
+                faults.append(f"joint {joint.name!r}: its coordinate {q} uses {', '.join(map(str, rates))}; "
+                              "a dependent coordinate may use coordinates, t and parameters")
+    if s.ground_motion is not None:
+        free = [a for a in symbols_in(s.ground_motion.coordinates) if a in moving - {time} or isinstance(a, Input)]
+        if free:
+            faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t and parameters")
+    everything = dict.fromkeys([*coordinates, *speeds, *[z.symbol for z in s.states], *parameters, *inputs])
+    names = Counter(a.name for a in everything)
+    for name, count in names.items():
+        if count > 1:
+            faults.append(f"{count} different symbols are named {name!r} (by kind or assumptions); "
+                          "make each symbol once, or give them different names")
+    if "t" in names:
+        faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
+    for u in speeds:
+        if f"{u.name}_dot" in names:
+            faults.append(f"the name {u.name + '_dot'!r} stands for the derivative of the speed {u}; "
+                          "give the other symbol of this name another one")
+    spelling(faults, "the symbols", names)
+    return tuple(parameters), tuple(inputs)
+
+
+def spelling(faults: Faults, what: str, names: Iterable[Any]) -> None:
+    """Names must be text that can stand in the comments of generated code."""
+    for name in names:
+        if not isinstance(name, str) or not NAME.fullmatch(name):
+            faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
+                          "_ . , : + - * / ^ ' # % and brackets")
+
+
+def symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
+    """Free symbols in order of the expressions, by name within one expression."""
+    found: dict[sp.Symbol, None] = {}
+    for e in expressions:
+        for symbol in sorted(e.free_symbols, key=lambda a: a.name):
+            found[symbol] = None
+    return list(found)

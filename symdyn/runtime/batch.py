@@ -1,0 +1,142 @@
+"""Right-hand sides of many states at once: on the processor's vectors with the C backend, by broadcasting with NumPy."""
+
+from __future__ import annotations
+
+import ctypes
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError, EvaluationWarning
+from symdyn.runtime.batch_arguments import take_rows, together
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+UNIT = "rhs_batch"
+# Of so many rows a warning tells the numbers.
+TOLD = 8
+
+
+class Table(ctypes.Structure):
+    """Numbers with a row for each trajectory, or one for all; see `table` in the generated source."""
+
+    _fields_ = [("at", ctypes.c_void_p), ("row", ctypes.c_long), ("entry", ctypes.c_long)]
+
+
+def tables_of(arrays: list[np.ndarray]) -> Any:
+    """Tables of arrays (n, n_names) of doubles, which have to stay; one row holds for all."""
+    return (Table * len(arrays))(*[
+        Table(a.ctypes.data, a.strides[0] // a.itemsize if len(a) > 1 else 0, a.strides[1] // a.itemsize) for a in arrays])
+
+
+def width(module: Module) -> int:
+    """How many states are computed at once on one processor core."""
+    unit: Any = module.unit(UNIT) if module.backend == "c" else None
+    return 1 if unit is None else int(unit.function("batch_width")())
+
+
+def parameter_rows(module: Module, params: Any) -> np.ndarray:
+    """Parameters, (n, n_p), or (1, n_p) where none varies."""
+    if params is None:  # looking at every one of them takes longer than some hundred states
+        return module.default_parameters[None, :]
+    defaults = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
+    return take_rows(params, module.metadata["parameters"], "parameters", defaults, module.name)
+
+
+def input_rows(module: Module, inputs: Any, defaults: Mapping[str, float]) -> np.ndarray:
+    """Constant inputs, (n, n_in), or (1, n_in) where none varies."""
+    names = module.metadata["inputs"]
+    given = None if inputs is None or (not isinstance(inputs, Mapping) and np.size(inputs) == 0) else inputs
+    return take_rows(given, names, "inputs", {n: defaults.get(n, 0.0) for n in names}, module.name)
+
+
+def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
+    """x_dot (n, n_x); see Module.rhs_batch."""
+    states, times = _numbers(module, x, "x"), _numbers(module, t, "t")
+    n_x = module.metadata["sizes"]["x"]
+    if states.ndim == 1:
+        states = states[None, :]
+    if states.ndim != 2 or states.shape[1] != n_x:
+        raise ArgumentError(f"{module.name}: x has the shape {np.shape(x)}, needed is (n, {n_x}): "
+                            f"{', '.join(module.metadata['x'])}")
+    if times.ndim > 1:
+        raise ArgumentError(f"{module.name}: t has the shape {times.shape}; give one time, or one for each state")
+    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, {}),
+              "params": parameter_rows(module, params)}
+    n = together(arrays, module.name)
+    xd = _result(module, states, (n, n_x), out)
+    reasons = (_on_vectors if module.backend == "c" else _broadcast)(module, n, arrays, xd)
+    if reasons:
+        told = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)])}"
+                for k, why in list(reasons.items())[:TOLD]]
+        more = f"; and {len(reasons) - TOLD} more" if len(reasons) > TOLD else ""
+        warnings.warn(f"{module.name}: rhs cannot be evaluated in {len(reasons)} of {n} rows, which are NaN: "
+                      f"{'; '.join(told)}{more}", EvaluationWarning, stacklevel=3)
+    return xd
+
+
+def _result(module: Module, states: np.ndarray, shape: tuple[int, int], out: np.ndarray | None) -> np.ndarray:
+    if out is None:  # laid out as the states are: entry by entry is quicker to load into vectors
+        by_entry = len(states) == shape[0] > 1 and states.strides[0] < states.strides[1]
+        return np.empty(shape[::-1]).T if by_entry else np.empty(shape)
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64 or not out.flags.behaved:
+        raise ArgumentError(f"{module.name}: out must be a writable array of doubles of the shape {shape}, found "
+                            f"{getattr(out, 'shape', out)!r} of {getattr(out, 'dtype', type(out).__name__)}")
+    return out
+
+
+def _on_vectors(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray) -> dict[int, str]:
+    """Fill xd; returns why, for rows that fail."""
+    unit: Any = module.unit(UNIT)
+    codes = np.zeros(n, dtype=np.intc)
+    steps = (ctypes.c_long * 2)(*[s // xd.itemsize for s in xd.strides])
+    call = unit.function("rhs_batch")
+    call.restype = ctypes.c_long
+    tables = tables_of([arrays[k] for k in ("t", "x", "inputs", "params")])
+    failed = call(ctypes.c_long(n), tables, ctypes.c_void_p(xd.ctypes.data), steps, ctypes.c_void_p(codes.ctypes.data))
+    return {int(k): unit.reason(int(codes[k])) for k in np.flatnonzero(codes)} if failed else {}
+
+
+def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray) -> dict[int, str]:
+    """The same with NumPy: all at once, and one by one where that fails."""
+    unit: Any = module.unit("rhs")
+    sizes = module.metadata["sizes"]
+    t, x, inputs, p = (np.broadcast_to(arrays[k], (n, arrays[k].shape[1])) for k in ("t", "x", "inputs", "params"))
+    try:
+        xd[:] = unit.broadcast("rhs", t[:, 0], x, p, inputs)
+    except (ArithmeticError, ValueError):
+        xd[:] = np.nan
+        evaluator = unit.evaluator("rhs")
+        for k in range(n):
+            try:
+                evaluator.set_params(p[k])
+                xd[k] = evaluator.one(t[k, 0], x[k], inputs[k], [0.0] * sizes["ud"])
+            except EvaluationError:
+                continue
+    bad = np.flatnonzero(~np.isfinite(xd).all(axis=1))
+    return {int(k): _reason(unit, t[k, 0], x[k], p[k], inputs[k], xd[k]) for k in bad}
+
+
+def _reason(unit: Any, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray, row: np.ndarray) -> str:
+    row[:] = np.nan
+    try:
+        unit.module.evaluate("rhs", float(t), x, tuple(p.tolist()), inputs)
+    except (ArithmeticError, ValueError) as error:
+        return str(error)
+    return "the result is not finite"
+
+
+def _numbers(module: Module, values: Any, what: str) -> np.ndarray:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{module.name}: {what} must be numbers, found {values!r}") from None
+    return array if array.dtype.isnative else array.astype(float)
+
+
+def _given_not_finite(module: Module, x: np.ndarray) -> str:
+    bad = [name for name, value in zip(module.metadata["x"], x, strict=True) if not np.isfinite(value)]
+    return f" ({', '.join(bad)} given not finite)" if bad else ""

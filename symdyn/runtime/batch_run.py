@@ -1,0 +1,205 @@
+"""Integrates many motions: on the processor's vectors with the C backend, each with its own steps, else one by one."""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
+from symdyn.runtime.batch import UNIT, input_rows, parameter_rows, tables_of, width
+from symdyn.runtime.batch_arguments import take_rows, together
+from symdyn.runtime.batch_solution import BatchSolution
+from symdyn.runtime.simulate import checked_positive, checked_times, checked_tolerances
+from symdyn.runtime.stops import describe_stop
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Steps of every lane in one call: a fraction of a second, so that Ctrl-C is heard.
+PIECE = 5_000
+TOLD = 3
+_DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
+_STATUS, _REASON, _BAD, _T, _H, _T_FAIL, _STEPS, _REJECTED, _X = range(9)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies."""
+
+    n: int
+    starts: np.ndarray
+    params: np.ndarray
+    inputs: np.ndarray
+    times: np.ndarray
+    span: tuple[float, float]
+    rtol: float
+    atol: np.ndarray
+    max_step: float
+    first_step: float
+
+
+def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
+                   inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
+                   first_step: float = 0.0) -> BatchSolution:
+    """Integrate many motions of one mechanism, each with its own steps.
+
+    q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
+                left out takes the system's initial value, else 0
+    params      (n_p,), (n, n_p), or by name or symbol, each a number or an array (n,)
+    inputs      constants, in the same ways; or what `simulate` takes, the same for all
+    t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
+    rtol, atol, max_step, first_step   as for `simulate`
+
+    With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
+    `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints or Euler parameters,
+    inputs that vary over time and the NumPy backend run one by one through `simulate`; `note` of the solution says so.
+
+    A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
+    raises SimulationInterrupted, whose `solution` holds what was finished. What loads want to be looked at after a run
+    (watches) is not looked at here. Raises ArgumentError for what does not fit.
+    """
+    metadata = module.metadata
+    initial = metadata["initial"]
+    groups = [take_rows(values, metadata[what], f"initial {what}", {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
+              for what, values in (("q", q), ("u", u), ("z", z))]
+    by_time = _varies_over_time(inputs)
+    fixed = input_rows(module, None if by_time else inputs, initial)
+    rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
+    n = together(rows, module.name)
+    n_starts = max(len(g) for g in groups)
+    starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
+    times, span = _times(module, t)
+    asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
+                   checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
+    note = _why_one_by_one(module, by_time)
+    solution = _one_by_one(module, asked, inputs if by_time else None, note) if note else _on_vectors(module, asked)
+    if solution.messages:
+        told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
+        more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
+        warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
+    return solution
+
+
+def _varies_over_time(inputs: Any) -> bool:
+    def by_time(value: Any) -> bool:
+        return callable(value) or (isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1)
+
+    return by_time(inputs) or (isinstance(inputs, Mapping) and any(by_time(v) for v in inputs.values()))
+
+
+def _times(module: Module, t: Any) -> tuple[np.ndarray, tuple[float, float]]:
+    times, span, _ = checked_times(module, t, False)
+    pair = t is None or (isinstance(t, (tuple, list)) and len(t) == 2)
+    return (np.array([span[1]]) if pair else times), span
+
+
+def _why_one_by_one(module: Module, by_time: bool) -> str:
+    if module.backend != "c":
+        return f"one by one: the backend is {module.backend}"
+    if module.metadata["constraints"]:
+        return "one by one: the mechanism has constraints, which states are projected onto"
+    if module.metadata["unit_groups"]:
+        return "one by one: the mechanism has Euler parameters, which are normalised after every step"
+    if by_time:
+        return "one by one: inputs vary over time"
+    return "" if module.metadata["sizes"]["x"] else "one by one: the mechanism has no state"
+
+
+# -- on vectors
+
+
+def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
+    unit: Any = module.unit(UNIT)
+    n, n_x = asked.n, module.metadata["sizes"]["x"]
+    x = np.full((n, len(asked.times), n_x), np.nan)
+    report = np.full((n, _X + n_x), np.nan)
+    size = unit.function("batch_size")
+    size.restype = ctypes.c_long
+    memory = ctypes.create_string_buffer(size() + 64)
+    batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
+    span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
+    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
+    out = (ctypes.c_void_p * 2)(x.ctypes.data, report.ctypes.data)
+    tables = tables_of([asked.starts, asked.inputs, asked.params])
+    go = unit.function("batch_go")
+    go.restype = ctypes.c_long
+    begun = clock.perf_counter()
+    interrupted = False
+    try:
+        unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out)
+        while go(batch, ctypes.c_long(PIECE)) < n:
+            pass
+    except KeyboardInterrupt:
+        interrupted = True
+    seconds = clock.perf_counter() - begun
+    success = report[:, _STATUS] == _DONE
+    messages = {int(k): _message(unit, report[k]) for k in np.flatnonzero(~success)}
+    counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
+    solution = BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], width(module),
+                             "" if width(module) > 1 else "the C compiler has no vectors", seconds)
+    if interrupted:
+        raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
+    return solution
+
+
+def _message(unit: Any, row: np.ndarray) -> str:
+    status, metadata = row[_STATUS], unit.metadata
+    if np.isnan(status):
+        return f"{metadata['name']}: not finished"
+    reason, bad = unit.reason(int(row[_REASON])), int(row[_BAD])
+    if status == _NO_CONSTANTS:
+        return f"{metadata['name']}: {reason}; check the parameters"
+    x = row[_X:]
+    if status == _BAD_START:
+        wrong = [name for name, value in zip(metadata["x"], x, strict=True) if not np.isfinite(value)]
+        return f"{metadata['name']}: the start is not finite: {', '.join(wrong)}"
+    why = {_FIELD_FAILED: reason, _STEP_TOO_SMALL: f"the step became too small ({row[_H]:.3g} s) for the tolerances",
+           _NOT_FINITE: f"the derivative of {metadata['x'][bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
+    return describe_stop(metadata, row[_T_FAIL], x, why.get(int(status), f"the integrator refused (status {int(status)})"))
+
+
+# -- one by one
+
+
+def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str) -> BatchSolution:
+    n, n_x, sizes = asked.n, module.metadata["sizes"]["x"], module.metadata["sizes"]
+    x = np.full((n, len(asked.times), n_x), np.nan)
+    success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
+    messages: dict[int, str] = {}
+    times = asked.times if len(asked.times) > 1 else np.array(asked.span)
+    begun = clock.perf_counter()
+
+    def solution() -> BatchSolution:
+        return BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], 1, note,
+                             clock.perf_counter() - begun)
+
+    for k in range(n):
+        start, p, given = (a[k if len(a) > 1 else 0] for a in (asked.starts, asked.params, asked.inputs))
+        q, u, z = np.split(start, np.cumsum([sizes["q"], sizes["u"]]))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SimulationWarning)
+                done = module.simulate(times, q, u, p, z=z, inputs=given if inputs is None else inputs, rtol=asked.rtol,
+                                       atol=asked.atol, max_step=asked.max_step, first_step=asked.first_step)
+        except SimulationInterrupted:
+            for late in range(k, n):
+                messages[late] = f"{module.name}: not finished"
+            told = f"{module.name}: interrupted after {int(success.sum())} of {n} motions"
+            raise SimulationInterrupted(solution(), told) from None
+        except SymdynError as error:
+            messages[k] = str(error)
+            continue
+        success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
+        kept = np.isin(times, done.t)
+        states = np.full((len(times), n_x), np.nan)
+        states[kept] = done.x[np.isin(done.t, times)]
+        x[k] = states[-len(asked.times):]
+        if not done.success:
+            messages[k] = done.message
+    return solution()

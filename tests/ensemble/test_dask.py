@@ -1,0 +1,94 @@
+"""Ensembles on clusters: Dask with a worker that is killed, and the executor of mpi4py."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.cli import main
+from symdyn.runtime.recall import recall
+
+COUNT = 400
+
+
+def samples():
+    return sd.Samples({"q1": {"from": -1, "to": 1}, "l1": {"from": 0.5, "to": 1.5}}, "latin_hypercube", COUNT, 2)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+                                  silence_logs=50) as local:
+        yield local
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 is of POSIX")
+def test_dask_loses_nothing_when_a_worker_is_killed(cluster, tmp_path):
+    module = recall("double_pendulum", {})
+    here = sd.ensemble(module, samples(), (0, 1), chunk=10)
+    killed = []
+
+    def kill():
+        while len(list((tmp_path / "chunks").glob("0*.npz"))) < 10:
+            time.sleep(0.002)
+        worker = next(iter(cluster.workers.values()))
+        killed.append(len(list((tmp_path / "chunks").glob("0*.npz"))))
+        os.kill(worker.pid, signal.SIGKILL)
+
+    with cluster.get_client() as client:
+        killer = threading.Thread(target=kill)
+        killer.start()
+        done = sd.ensemble(module, samples(), (0, 1), chunk=10, path=tmp_path, executor=client.get_executor())
+        killer.join()
+    assert 10 <= killed[0] < 40
+    assert done.n_failed == 0 and np.isfinite(done["end q1"]).all()
+    assert np.array_equal(done.samples, samples().block(0, COUNT))  # all of them, each once
+    assert done.file.read_bytes() == here.file.read_bytes()
+
+
+def test_sweep_on_a_cluster(cluster, tmp_path, capsys):
+    (tmp_path / "a.toml").write_text('system = "double_pendulum"\nt = [0, 0.1]\n[initial]\nq1 = [0.1, 0.2]\n')
+    asked = ["sweep", str(tmp_path / "a.toml"), "--no-picture", "--output", str(tmp_path / "out"), "--dask"]
+    assert main([*asked, cluster.scheduler_address]) == 0
+    assert "2 samples of q1, 2 in" in capsys.readouterr().out
+    assert main([*asked, "tcp://127.0.0.1:9", "--dask-timeout", "0.2"]) == 1
+    assert "--dask tcp://127.0.0.1:9: no scheduler there" in capsys.readouterr().err
+
+
+SCRIPT = """
+import sys
+from mpi4py.futures import MPIPoolExecutor
+import symdyn as sd
+from symdyn.runtime.recall import recall
+
+if __name__ == "__main__":
+    drawn = sd.Samples({"q1": {"from": -1, "to": 1}}, "random", 40, 2)
+    with MPIPoolExecutor() as pool:
+        sd.ensemble(recall("double_pendulum", {}), drawn, (0, 0.2), chunk=5, path=sys.argv[1], executor=pool)
+        print(pool.num_workers, "workers")
+"""
+
+
+def test_the_executor_of_mpi4py(tmp_path):
+    pytest.importorskip("mpi4py")
+    launcher = shutil.which("mpiexec", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    if launcher is None:
+        pytest.skip("there is no mpiexec")
+    (tmp_path / "script.py").write_text(SCRIPT)
+    run = subprocess.run([launcher, "-n", "2", sys.executable, "-m", "mpi4py.futures", str(tmp_path / "script.py"),
+                          str(tmp_path / "out")], capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0 and "1 workers" in run.stdout, run.stderr[-2000:]
+    drawn = sd.Samples({"q1": {"from": -1, "to": 1}}, "random", 40, 2)
+    here = sd.ensemble(recall("double_pendulum", {}), drawn, (0, 0.2), chunk=5)
+    assert (tmp_path / "out" / "ensemble.npz").read_bytes() == here.file.read_bytes()
