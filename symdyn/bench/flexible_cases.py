@@ -329,7 +329,8 @@ def agreement(system: System, quasi: System, n: int) -> dict[str, float]:
     errors = {}
     for name, form in forms.items():
         s = form.symbols
-        here = States(*[np.column_stack([given[a.name] for a in group]) for group in (s.coordinates, s.speeds)])
+        q, u = (np.column_stack([given[a.name] for a in group]) for group in (s.coordinates, s.speeds))
+        here = States(q, u)
         found = accelerations(form, here)
         common = [u for u in wanted if u in found]
         a, b = (np.stack([row[u] for u in common]) for row in (found, wanted))

@@ -188,4 +188,4 @@ def test_pictures_leave_matrices_out() -> None:
     assert sol["tip_J"].shape[1:] == (3, 2)
     assert {name: p.quantity for name, p in points_of(sol).items()} == {"tip": "position"}
     outputs = [panel.names[0] for panel in panels_of(sol) if panel.title == "output"]
-    assert outputs == ["tip_a[0]", "tip_bias[0]"]
+    assert outputs == ["tip_a x", "tip_bias[0]"]
