@@ -131,7 +131,7 @@ def test_kinematics_and_energy_of_random_trees(seed: int, formulation: str) -> N
 
 
 def test_random_trees_have_everything() -> None:
-    """Every joint type of rigid bodies but the one that is a formula, every kind of speeds, branches, bodies fixed to the ground."""
+    """Every joint type of rigid bodies but the one that is a formula, every kind of speeds, branches, bodies on the ground."""
     trees = [random_tree(seed) for seed in range(TREES)]
     found = [joint for tree in trees for joint in tree.joints]
     types = {getattr(joints, name) for name in joints.__all__}
