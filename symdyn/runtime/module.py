@@ -246,7 +246,8 @@ class Module:
         fixed     coordinates, speeds and extra states with the numbers they have; forces along them may be anything. The
                   coordinate of a speed that is given stays at its start (the azimuth of a rotor that spins steadily)
         start     by name or symbol, in order (q, or x), or an Equilibrium; default: the system's initial values, speeds zero
-        unknown_params   parameters that are found, in place of naming them in `free`
+        unknown_params   parameters that are found, in place of naming them in `free`; which values in `fixed` are their
+                  conditions is then told by their effect
 
         Constraints are fulfilled at the same time. Raises NoEquilibrium with the forces that are left,
         EquilibriumNotUnique with the direction that has no stiffness, ArgumentError for what does not fit.
