@@ -21,7 +21,7 @@ from symdyn.formulation.link_motion import LinkMotion, Wrench, inertial_wrench
 from symdyn.model.joints.modal import exactly
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.rotation import rotated_symmetric
-from symdyn.spatial.vectors import cross, dot, inner, zeros
+from symdyn.spatial.vectors import cross, dot, identity, inner, zeros
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,11 @@ class FlexibleLink:
     @cached_property
     def I(self) -> np.ndarray:  # noqa: E743 the letter of the inertia everywhere
         """Inertia less that of the straight beam, (3, 3)."""
+        I1, I2 = exactly(self.beam.I1), exactly(self.beam.I2)
         total = zeros(3, 3)
         for i, eta in enumerate(self.eta):
-            half = np.tensordot(self.eta, exactly(self.beam.I2)[i], 1) / 2
-            total = total + rotated_symmetric(self.R, exactly(self.beam.I1)[i] + half) * eta
+            half = np.tensordot(self.eta, I2[i], 1) / 2
+            total = total + rotated_symmetric(self.R, I1[i] + half) * eta
         return total
 
     @cached_property
@@ -96,7 +97,7 @@ class FlexibleLink:
     @property
     def inertia(self) -> Inertia:
         """What the deflection adds to the link's inertia, about the link's origin."""
-        return Inertia(0, self.h, self.I).moved(np.array(np.eye(3, dtype=int), dtype=object), self.p)
+        return Inertia(0, self.h, self.I).moved(identity(), self.p)
 
     def coupling(self, column: int) -> Wrench:
         """Force and moment about the link's origin by eta_ddot of one mode."""

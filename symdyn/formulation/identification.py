@@ -126,7 +126,7 @@ def base_parameters(equations: Equations) -> BaseParameters:
 
     Raises SymdynError for equations without bodies, and where double precision does not tell what is independent.
     """
-    if equations.identification is None and any("no regressor" in note for note in equations.notes):
+    if equations.identification is None and equations.bodies:
         raise SymdynError(f"{equations.name} has added mass or elastic bodies, which are no inertias of rigid bodies; leave them "
                           "out for base parameters")
     if equations.identification is None:

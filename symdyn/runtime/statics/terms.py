@@ -68,16 +68,14 @@ class Place:
         vary, along   mappings from the names of what varies, and of the direction, to numbers, as in the generated header
         """
         given = {f"({kind} {key})": value for kind, entries in groups.items() for key, value in entries.items()}
-        given |= dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True))
-        given |= {multiplier(k): value for k, value in enumerate(self.lam)}
+        given |= self._given_rates()
         ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata["ud"]]
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
     def by(self, names: Sequence[str]) -> np.ndarray:
         """Derivatives of the balance by coordinates, speeds, states, inputs or parameters, (n_u + n_c + n_z, len(names))."""
         about = self.module.unit("variation").metadata["ud"]
-        given = dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True))
-        given |= {multiplier(k): value for k, value in enumerate(self.lam)}
+        given = self._given_rates()
         rows = np.tile([given.get(n, 0.0) for n in about], (len(names), 1))
         for row, name in zip(rows, names, strict=True):
             row[about.index(f"(along {name})")] = 1.0
@@ -85,6 +83,11 @@ class Place:
             return np.zeros((len(self.balance), 0))
         found: np.ndarray = self.module.evaluate("variation", self.t, self.x, self.p, self.inputs, rows)
         return found.reshape(len(names), -1).T
+
+    def _given_rates(self) -> dict[str, float]:
+        """Accelerations and multipliers by the names that generated code has for them."""
+        return {**dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True)),
+                **{multiplier(k): value for k, value in enumerate(self.lam)}}
 
     # -- the balance and its parts
 
