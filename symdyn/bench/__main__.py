@@ -7,16 +7,14 @@ import subprocess
 import sys
 import tempfile
 import time as clock
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
 import symdyn as sd
+from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import compile_time, evaluation_time
 from symdyn.pipeline import emit, function_tape
-
-Figure = tuple[str, float, str, str]
 
 
 def chain() -> Iterator[Figure]:
@@ -100,22 +98,9 @@ def start_up() -> Iterator[Figure]:
             yield f"symdyn simulate double_pendulum, {what} time", clock.perf_counter() - begun, "s", limit
 
 
-def missed(value: float, wanted: str) -> bool:
-    """Whether a figure is not what it should be, such as "< 2" or "<= 1e-10"; an empty bound is never missed."""
-    return bool(wanted) and not (value < float(wanted.split()[1]) or (wanted.startswith("<=") and value == float(
-        wanted.split()[1])))
-
-
 def main() -> int:
     """Print every figure; returns the number of those that miss their bound."""
-    groups: list[Callable[[], Iterator[Any]]] = [chain, long_chain, pendulum, puma, start_up]
-    count = 0
-    for group in groups:
-        for name, value, unit, wanted in group():
-            bad = missed(value, wanted)
-            count += bad
-            print(f"{name:62} {value:10.4g} {unit:3} {wanted:10}{'MISSED' if bad else ''}".rstrip(), flush=True)
-    return count
+    return print_figures([chain, long_chain, pendulum, puma, start_up])
 
 
 if __name__ == "__main__":

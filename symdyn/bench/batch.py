@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import symdyn as sd
+from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import best_times
 from symdyn.bench.peers.contest import random_state
 from symdyn.bench.peers.description import describe
@@ -23,7 +24,6 @@ from symdyn.runtime.batch import UNIT, tables_of
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import Frame
 
-Line = tuple[str, float, str, str]
 STATES = 2000
 REPEATS = 100
 PENDULUMS = 10_000
@@ -33,7 +33,7 @@ PIECES = 50
 ROUNDS = 5
 
 
-def chain() -> Iterator[Line]:
+def chain() -> Iterator[Figure]:
     """The right-hand side of seven links: states in one call, their entries side by side."""
     system = sd.systems.get("spatial_chain", n=7)
     equations = system.equations()
@@ -85,7 +85,7 @@ def _direct(module: Module, x: np.ndarray, out: np.ndarray) -> Callable[[], Any]
     return lambda: call(n, tables, result, steps, codes) and kept
 
 
-def pendulums() -> Iterator[Line]:
+def pendulums() -> Iterator[Figure]:
     """Double pendulums for 10 s, each with its own steps: all at once, and some of them one after the other."""
     module = sd.systems.get("double_pendulum").embedding().compile(backend="c")
     rng = np.random.default_rng(4)
@@ -113,15 +113,9 @@ def pendulums() -> Iterator[Line]:
     yield "double_pendulum: the bits of one motion", float(same), "", ">= 1"
 
 
-def main(groups: Sequence[Callable[[], Iterator[Line]]] = (chain, pendulums)) -> int:
+def main(groups: Sequence[Callable[[], Iterator[Figure]]] = (chain, pendulums)) -> int:
     """Print every figure; returns the number of those that miss their bound."""
-    count = 0
-    for group in groups:
-        for name, value, unit, wanted in group():
-            bad = bool(wanted) and not value >= float(wanted.split()[1])
-            count += bad
-            print(f"{name:62} {value:10.4g} {unit:3} {wanted:10}{'MISSED' if bad else ''}".rstrip(), flush=True)
-    return count
+    return print_figures(groups)
 
 
 if __name__ == "__main__":

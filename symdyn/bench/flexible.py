@@ -12,8 +12,8 @@ import numpy as np
 import symdyn as sd
 from symdyn.bench import flexible_cases as cases
 from symdyn.bench import flexible_crank as crank
+from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import compile_time, evaluation_time
-from symdyn.bench.turbine import Figure
 from symdyn.pipeline import function_tape
 
 
@@ -137,22 +137,12 @@ def floating() -> Iterator[Figure]:
 
 def main() -> int:
     """Print every figure; returns the number of those that miss their bound."""
-    from symdyn.bench.__main__ import missed
-
     groups: list[Callable[[], Iterator[Figure]]] = [rotating_beam, land_based, spun_up, closed_loop, tumbling, limits, floating]
     wanted = sys.argv[1:]
     names = [group.__name__ for group in groups]
     if strange := [name for name in wanted if name not in names]:
         sys.exit(f"there is no group {', '.join(strange)}; pass some of {', '.join(names)}, or nothing for all")
-    count = 0
-    for group in groups:
-        if wanted and group.__name__ not in wanted:
-            continue
-        for name, value, unit, bound in group():
-            bad = missed(value, bound)
-            count += bad
-            print(f"{name:78} {value:11.4g} {unit:3} {bound:10}{'MISSED' if bad else ''}".rstrip(), flush=True)
-    return count
+    return print_figures([group for group in groups if not wanted or group.__name__ in wanted], 79)
 
 
 if __name__ == "__main__":

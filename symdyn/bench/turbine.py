@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import symdyn as sd
+from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import evaluation_time
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
@@ -18,7 +19,6 @@ from symdyn.pipeline import emit
 from symdyn.systems.turbine_parts import blade_beam, tower_beam
 from symdyn.tape.floats import evaluate_rows
 
-Figure = tuple[str, float, str, str]
 # Bodies and joints alone.
 BARE: dict[str, Any] = {"hydrostatics": None, "mooring": None, "added_mass": False, "damping": False, "wind": False,
                         "drives": False}
@@ -277,16 +277,7 @@ def platform_frequencies(module: Any, params: dict[str, float]) -> np.ndarray:
 
 def main() -> int:
     """Print every figure; returns the number of those that miss their bound."""
-    from symdyn.bench.__main__ import missed
-
-    groups: list[Callable[[], Iterator[Figure]]] = [derivation, agreement, motion, statics, flexible]
-    count = 0
-    for group in groups:
-        for name, value, unit, wanted in group():
-            bad = missed(value, wanted)
-            count += bad
-            print(f"{name:72} {value:10.4g} {unit:3} {wanted:10}{'MISSED' if bad else ''}".rstrip(), flush=True)
-    return count
+    return print_figures([derivation, agreement, motion, statics, flexible], 72)
 
 
 if __name__ == "__main__":
