@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.backend.methods import method_of
 from symdyn.backend.source import CORRECTIONS, Content, Source, render
 from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
@@ -26,12 +27,14 @@ from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.skipped import skipped
 from symdyn.runtime.arguments import some
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
+from symdyn.runtime.methods import split_name
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 from symdyn.tape.balance import balance
 from symdyn.tape.node import Node
 from symdyn.tape.passes import specialize as specialize_tape
 from symdyn.tape.tape import Output, Tape
+from symdyn.tape.taylor import not_smooth
 
 # Functions of a module: name -> (quantity, what the header of generated code says about it).
 FUNCTIONS = {
@@ -73,6 +76,8 @@ FUNCTIONS = {
     "frames": ("frames", "origin and rotation (row by row) of every body's frame, n-frame"),
     "positions": ("positions", "centres of mass, n-frame, m"),
     "watches": ("watches", "values that loads want to be looked at: draft, tilt and the like"),
+    "events": ("events", "what vanishes at the events, in their order"),
+    "event_resets": ("event_resets", "what entries of the state become at events that reset them"),
     "drawn_lengths": ("drawn_lengths", "lengths in pictures that follow from parameters, m"),
     "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
     "jacobian_inputs": ("jacobian_inputs", "exact derivative of x_dot by the inputs"),
@@ -110,28 +115,31 @@ OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
-         batch: bool = False) -> Source:
+         batch: bool = False, method: str = "dop853") -> Source:
     """The source of the named functions (default: STANDARD and OF_CONSTRAINTS, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
     work         rhs gets one more state at the end: the work of all loads but gravity and springs
     baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
     batch        C only: also rhs and integrator of many states at once, a state in each lane of the processor's vectors
+    method       C only: the integrator's, one of symdyn.backend.methods.METHODS; what it needs besides rhs is emitted with it
 
-    Raises SymdynError for an unknown function, parameter, backend or a broken template.
+    Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
     """
     if standalone and equations.again is not None:
         equations = equations.again()
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     usual = (*STANDARD, *(OF_CONSTRAINTS if equations.constraints else ()))
     names = tuple(functions) if functions is not None else tuple(n for n in usual if has_function(equations, n))
+    if integrator and "rhs" in names and backend == "c":
+        names = tuple(dict.fromkeys((*names, *method_of(method).needs)))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
         raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
     with collector_paused():
         content = _content(equations, names, standalone, bound, work, baumgarte)
-        return render(content, backend, templates, standalone, integrator, batch)
+        return render(content, backend, templates, standalone, integrator, batch, method)
 
 
 def has_function(equations: Equations, name: str) -> bool:
@@ -177,8 +185,10 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
         if name == "rhs" and "watches" in equations.quantities:  # looked at after every simulation
             needed = (*needed, "watches")
-        return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in name,
-                    baumgarte="baumgarte" in name)
+        needed = (*needed, *(n for n in ("events", "event_resets") if n in equations.quantities))
+        field, method = split_name(name)
+        return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in field,
+                    baumgarte="baumgarte" in field, method=method)
 
     rhs = source_of("rhs")
 
@@ -208,6 +218,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "masses": {p.name: body for p, body in equations.symbols.masses.items()},
                 "output_units": dict(equations.symbols.point_units),
+                "events": event_records(equations),
+                "not_smooth": not_smooth(equations.quantity("rhs").tolist()),
                 "watches": [[w.label, w.least, w.most, w.message] for w in equations.watched()],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
@@ -229,6 +241,14 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
     """Names and shapes of the user's outputs."""
     return [[q.removeprefix("output_"), list(equations.quantity(q).shape)]
             for q in equations.quantities if q.startswith("output_")]
+
+
+def event_records(equations: Equations) -> list[dict[str, Any]]:
+    """Events as plain data: name, direction, whether it ends the motion, entries of x = [q; u; z] that it resets."""
+    symbols = equations.symbols
+    places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
+    return [{"name": e.name, "direction": e.direction, "stop": e.stop, "reset": [places[s] for s, _ in e.reset]}
+            for e in equations.events]
 
 
 def _content(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
@@ -253,17 +273,24 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
-                   [[q.name for q in group] for group in equations.unit_groups], otherwise)
+                   [[q.name for q in group] for group in equations.unit_groups], otherwise,
+                   event_records(equations) if "events" in names else ())
 
 
 def _tapes(equations: Equations, names: Sequence[str], work: bool, baumgarte: bool) -> dict[str, Tape]:
-    """The tapes of functions; of rhs with the variations asked for."""
+    """The tapes of functions; of rhs and its derivative by x with the variations asked for."""
     tapes = {name: _quantities(equations, name) for name in names}
     if work or baumgarte:
         field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
         if work:
             field = np.concatenate([field, equations.quantity("power").reshape(1)])
         tapes["rhs"] = Tape.of(equations.recorder, rhs=field)
+    if (work or baumgarte) and "jacobian_x" in names:
+        by_x = equations.quantity("jacobian_x_baumgarte" if baumgarte else "jacobian_x")
+        if work:  # nothing depends on the work
+            by_x = np.vstack([by_x, equations.quantity("power_x").reshape(1, -1)])
+            by_x = np.column_stack([by_x, np.zeros(len(by_x), dtype=object)])
+        tapes["jacobian_x"] = Tape.of(equations.recorder, jacobian_x=by_x)
     return tapes
 
 

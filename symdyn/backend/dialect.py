@@ -75,6 +75,7 @@ class Dialect:
     sincos       sines and cosines taken all at once; None where each is an operation like any other
     call         how numeric algorithms are called; None if the language has none
     parts        how long functions are divided; None if they are not
+    zeros        a statement that makes all {n} results zero, before the others of many zeros; None: each is stored
     madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
 
@@ -92,6 +93,7 @@ class Dialect:
     madd: str | None = None
     parts: Parts | None = None
     call: Call | None = None
+    zeros: str | None = None
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -116,7 +118,7 @@ def read_dialect(folder: Path) -> Dialect:
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
-                                          "files", "madd") if key in table}
+                                          "files", "madd", "zeros") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
                    parts=Parts(**table["parts"]) if "parts" in table else None,
                    call=Call(**table["call"]) if "call" in table else None)
@@ -130,6 +132,7 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         ("check", table["check"], {"name": "a", "code": 1}), ("literal", table.get("literal", ""), {"value": 1.0}),
         *[(f"load.{group}", text, {"k": 0}) for group, text in table["load"].items()],
         *[("operations.madd", table["madd"], {}) for _ in range("madd" in table)],
+        *[("zeros", table["zeros"], {"n": 1}) for _ in range("zeros" in table)],
         *[(f"operations.{op}", text, {}) for op, text in table["operations"].items()],
         *[(f"files.{template}", text, {"name": "a"}) for template, text in table["files"].items()]]
     faults = [f"load.{group} is missing" for group in LOADED if group not in table["load"]]

@@ -19,6 +19,7 @@ import symdyn
 from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.function import Function, Part
+from symdyn.backend.methods import method_of
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.backend.user_functions import header as header_of_user_functions
@@ -33,6 +34,7 @@ _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z":
 # What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
+EVENTS = "events"
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -44,6 +46,7 @@ class Content:
     outputs  user outputs: (name, shape) in the order of the function `outputs`
     unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
     otherwise     tapes by function name for where the first ones fail
+    events        what the function `events` is about: records with direction, stop and reset, entries of x
     """
 
     name: str
@@ -58,6 +61,7 @@ class Content:
     notes: Sequence[str] = ()
     unit_groups: Sequence[Sequence[str]] = ()
     otherwise: Mapping[str, Tape] = field(default_factory=dict)
+    events: Sequence[Mapping[str, Any]] = ()
 
 
 @dataclass(frozen=True)
@@ -89,13 +93,14 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True, batch: bool = False) -> Source:
+           integrator: bool = True, batch: bool = False, method: str = "dop853") -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
     standalone   with reference vectors, header and example; False for a module that is only loaded
     integrator   C only: with the compiled integrator (needs the function rhs)
     batch        C only: with rhs, and the integrator if there is one, of many states at once
+    method       the integrator's, one of symdyn.backend.methods.METHODS
     Raises SymdynError for an unknown backend or a broken template.
     """
     folders = template_folders(templates)
@@ -115,7 +120,11 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     if batch and backend == "c" and "rhs" in content.tapes:
         shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         lanes = batch_of(shipped.parent, dialect, program, content.tapes, content.titles, places, content.otherwise)
-    context = _context(content, program, dialect, standalone, integrator and "rhs" in content.tapes, lanes)
+    integrator = integrator and "rhs" in content.tapes
+    context = _context(content, program, dialect, standalone, integrator, lanes, method)
+    gather = method_of(method).gather
+    if integrator and backend == "c" and gather is not None:
+        context |= gather(content, program, dialect, places)
     files = {}
     wanted = dialect.files or {}
     if not standalone:
@@ -163,7 +172,7 @@ def _template_fault(template: str, error: Exception) -> str:
 
 
 def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool,
-             lanes: Batch | None) -> dict[str, Any]:
+             lanes: Batch | None, method: str) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
@@ -207,9 +216,6 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     projection = None
     if all(n in uses for n in CORRECTIONS):
         projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
-                      "position_call": field_call(CORRECTIONS[0], "out"), "velocity_call": field_call(CORRECTIONS[1], "out"),
-                      "violation_call": field_call(VIOLATION, "out"),
-                      "needs_inputs": any("inputs" in uses[n] for n in (*CORRECTIONS, VIOLATION)),
                       "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]]}
 
     metadata = {
@@ -230,6 +236,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
+        "method": method_of(method), "m": f"{name}_{method}", "has_events": EVENTS in uses, "events": content.events,
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
@@ -243,7 +250,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
-        "field_call": field_call("rhs", "xd"), "projection": projection,
+        "field_call": field_call, "arguments_of": uses, "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
         "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),

@@ -13,13 +13,15 @@ from symdyn.backend.function import ARGUMENTS, Function, Part, Section
 from symdyn.backend.printer import Printer
 from symdyn.errors import SymdynError
 from symdyn.tape.external import UserFunction
-from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node
+from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node, is_zero
 from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
 GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
 # Operations that may stop a function.
 STOPPING = ("call", "guard")
 _INLINE_LENGTH = 72
+# Results that are zero, from how many on they are made so at once: compilers take more than linear time for stores.
+_MANY_ZEROS = 100
 
 
 class Writer:
@@ -72,8 +74,10 @@ class Writer:
 
     def results_of(self, entries: Sequence[Any]) -> Callable[[], tuple[str, ...]]:
         """What stores the entries as result, once their text is known."""
-        return lambda: tuple(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
-                             for k, e in enumerate(entries))
+        zeros = self.dialect.zeros if sum(map(is_zero, entries)) >= _MANY_ZEROS else None
+        begin = (zeros.format(n=len(entries)),) if zeros is not None else ()
+        return lambda: (*begin, *(self.dialect.store.format(k=k + self.dialect.first, value=self.printer.text(e))
+                                  for k, e in enumerate(entries) if not (begin and is_zero(e))))
 
     def keep(self, nodes: Sequence[Node], slots: Mapping[Node, int]) -> tuple[str, ...]:
         """What keeps values for later parts."""

@@ -138,7 +138,9 @@ def _used(model: Model) -> set[Any]:
     for output in model.outputs:
         if not isinstance(output.value, Point):
             expressions += output.value if isinstance(output.value, tuple) else [output.value]
-    names: set[Any] = set()
+    names: set[Any] = {symbol for event in model.events for symbol, _ in event.reset}
+    for event in model.events:
+        expressions += event.expressions
     for load in model.loads:
         used = load.expressions if isinstance(load, Element) else (*getattr(load, "force", ()), *getattr(load, "torque", ()),
                                                                    *getattr(load, "values", ()))

@@ -62,7 +62,8 @@ class Constrained(Motion):
             "F_d": self.F_d, "lam": self.lam, "matrix": self.matrix, "right_side": self.right_side,
             "C_scale": self.C_scale, "length": lambda: self.length,
             "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
-            "rhs_baumgarte": self.rhs_baumgarte, "residual": self.residual}
+            "rhs_baumgarte": self.rhs_baumgarte, "jacobian_x_baumgarte": self.jacobian_x_baumgarte,
+            "residual": self.residual}
         return {**super().quantities(), **own}
 
     # -- rows
@@ -173,12 +174,15 @@ class Constrained(Motion):
         forces = self.quantities()  # of the formulation that this is mixed into
         return np.concatenate([forces["F_tilde"]() - forces["k_tilde"](), self.F_d()])
 
-    def implicit(self) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
-        """As for Motion, r = [M u_dot + k - F + C_r^T lam; C_r u_dot - F_d] with the multipliers held, too."""
-        (ud, lam), saddle, C_r = self.recall("solution"), self.recall("saddle"), self.C_r()
+    def implicit(self, baumgarte: bool = False) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
+        """As for Motion, r = [M u_dot + k - F + C_r^T lam; C_r u_dot - F_d] with the multipliers held, too.
+
+        baumgarte   of the accelerations with Baumgarte's stabilization
+        """
+        (ud, lam), saddle, C_r = self.recall("stabilized" if baumgarte else "solution"), self.recall("saddle"), self.C_r()
         held = [self.algebra.recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
         forces = self.inverse_dynamics() + (C_r.T @ vector(*held) if held else 0)
-        residual = [*forces, *(C_r @ self.speed_rates - self._right())]
+        residual = [*forces, *(C_r @ self.speed_rates - (self._pulled() if baumgarte else self._right()))]
         at = dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
         n_u = len(ud)
         return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
@@ -203,14 +207,24 @@ class Constrained(Motion):
             du = saddle.solve(zeros(len(self.speeds)), -rates)[0]
             return vector(*(rates * scale), *du)
 
-    def rhs_baumgarte(self) -> np.ndarray:
-        """x_dot with F_d - 2 a C_dot - a^2 C in place of F_d; a is one more parameter, 1/s."""
+    def _pulled(self) -> np.ndarray:
+        """F_d - 2 a C_dot - a^2 C; a is one more parameter, 1/s."""
         a = self.algebra.recorder.leaf(BAUMGARTE, kinds.PARAMETER)
+        return vector(*[-r.remaining - 2 * a * r.rate - a * a * r.value for r in self.rows])
+
+    def stabilized(self) -> tuple[np.ndarray, np.ndarray]:
+        """u_dot and lam with Baumgarte's right side in place of F_d."""
         right, saddle = -self.recall("bias"), self.recall("saddle")
         with self.algebra.section("Baumgarte's stabilization"):
-            pulled = vector(*[-r.remaining - 2 * a * r.rate - a * a * r.value for r in self.rows])
-            ud = saddle.solve(right, pulled)[0]
-        return vector(*self.rates, *ud, *self.state_rates())
+            return saddle.solve(right, self._pulled())
+
+    def rhs_baumgarte(self) -> np.ndarray:
+        """x_dot with F_d - 2 a C_dot - a^2 C in place of F_d."""
+        return vector(*self.rates, *self.recall("stabilized")[0], *self.state_rates())
+
+    def jacobian_x_baumgarte(self) -> np.ndarray:
+        """Derivative of rhs_baumgarte by x."""
+        return self.jacobian(self.x(), self.implicit(baumgarte=True))
 
     def residual(self) -> np.ndarray:
         """Residual of the stabilized index-2 form of Gear, Gupta and Leimkuhler (1985), for q_dot, u_dot, z_dot, lam, mu.

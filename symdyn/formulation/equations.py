@@ -60,6 +60,7 @@ class Equations:
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
+    events       what is looked for along a motion (see model.event), in the order of the quantity events
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
@@ -85,6 +86,7 @@ class Equations:
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     watched: Callable[[], Sequence[Any]] = tuple
+    events: tuple[Any, ...] = ()
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -120,15 +120,17 @@ class Motion:
         ud, solver = self.recall("accelerations"), self.recall("solver")
         return self.inverse_dynamics().tolist(), dict(zip(self.speed_rates, ud, strict=True)), solver.solve
 
-    def jacobian(self, by: Sequence[Any]) -> np.ndarray:
+    def jacobian(self, by: Sequence[Any],
+                 implicit: tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]] | None = None) -> np.ndarray:
         """d x_dot / d by, exact.
 
-        Accelerations are differentiated implicitly (see `implicit`), so that the factorization is not differentiated.
+        Accelerations are differentiated implicitly, so that the factorization is not differentiated: by `implicit` if given,
+        else by self.implicit().
         """
         recorder = self.algebra.recorder
         self.recall("accelerations")  # under its own headings
         with self.algebra.section("Jacobian"):
-            residual, at, solve = self.implicit()
+            residual, at, solve = implicit or self.implicit()
             derivatives = jacobian(recorder, residual, by)
             derivatives = vector(*substitute(tuple(derivatives.ravel()), at, recorder)).reshape(derivatives.shape)
             columns = [solve(-derivatives[:, j]) for j in range(len(by))]

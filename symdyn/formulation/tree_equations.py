@@ -69,7 +69,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body",
                   identification=quantities.identification if tree.rigid else None,
-                  provenance=OfBodies(quantities), watched=quantities.loads.watches,
+                  provenance=OfBodies(quantities), watched=quantities.loads.watches, events=model.events,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
                   flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),

@@ -17,7 +17,7 @@ from symdyn.formulation.motion import Motion
 from symdyn.formulation.newton_euler import inward, outward
 from symdyn.formulation.reactions import reactions
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.model.bodies import Point
+from symdyn.model.bodies import Component, Point
 from symdyn.model.elements import Element
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerAngles
@@ -65,6 +65,10 @@ class TreeQuantities(Motion):
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         if self.tree.flexible or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
+        if self.model.events:
+            own["events"] = self.events
+        if any(event.reset for event in self.model.events):
+            own["event_resets"] = self.event_resets
         return {**super().quantities(), **own, **(self.identification.quantities() if self.tree.rigid else {})}
 
     # -- the equations, joint by joint
@@ -181,6 +185,17 @@ class TreeQuantities(Motion):
         if isinstance(value, tuple):
             return self.algebra.constants(value)
         return self.algebra.expression(value)
+
+    def events(self) -> np.ndarray:
+        """What vanishes at the events, (n_e,)."""
+        with self.algebra.section("events"):
+            return vector(*[self._point(e.value.point)[e.value.index] + self.algebra.expression(e.value.offset)
+                            if isinstance(e.value, Component) else self.algebra.expression(e.value) for e in self.model.events])
+
+    def event_resets(self) -> np.ndarray:
+        """What the reset entries of the state become, event after event."""
+        with self.algebra.section("resets of events"):
+            return vector(*[self.algebra.expression(becomes) for e in self.model.events for _, becomes in e.reset])
 
     def _point(self, point: Point) -> np.ndarray:
         """What is asked of a point of a body, n-frame; see Point."""

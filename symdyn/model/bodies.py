@@ -39,6 +39,25 @@ class Point:
     at: Any
     quantity: str = "position"
 
+    def __getitem__(self, index: int) -> Component:
+        """One component of a vector, for `System.add_event`."""
+        return Component(self, index)
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component, 0 for x, 1 for y, 2 for z, of what is asked of a point, and an expression that is added to it."""
+
+    point: Point
+    index: int
+    offset: Any = 0
+
+    def __add__(self, other: Any) -> Component:
+        return Component(self.point, self.index, self.offset + other)
+
+    def __sub__(self, other: Any) -> Component:
+        return Component(self.point, self.index, self.offset - other)
+
 
 def position(body: Body, at: Any = (0, 0, 0)) -> Point:
     """The position of a point of a body in the n-frame, for `System.add_output`; m."""

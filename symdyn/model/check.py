@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
-from symdyn.model.bodies import Body, Point
+from symdyn.model.bodies import Body, Component, Point
 from symdyn.model.elements import AddedMass, Element
+from symdyn.model.event import check_events
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint, Modal
 from symdyn.model.loads import Force, JointForce
@@ -24,7 +25,7 @@ from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.record import Model
 from symdyn.model.symbol_check import check_coordinates, check_symbols, spelling, symbols_in
-from symdyn.model.symbols import take_over
+from symdyn.model.symbols import take_over, time
 from symdyn.model.uses import units_of, uses
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ class _Checker:
         self.parameters, self.inputs = check_symbols(s, self.joints, self.loads, self.coordinates, self.speeds, self.faults)
         elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in symbols_in(expressions)]
         self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
+        state = [*self.coordinates, *self.speeds, *[z.symbol for z in s.states]]
+        self.events = check_events(s.events, state, [*state, *[q.dot for q in self.coordinates], *self.inputs, time], self.faults)
         self._loads()
         self._shapes()
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
@@ -86,7 +89,7 @@ class _Checker:
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units},
-            tuple(s.shapes))
+            tuple(s.shapes), self.events)
 
     # -- names
 
@@ -99,12 +102,13 @@ class _Checker:
         for kind, names in (("bodies", ["ground", *[b.name for b in s.bodies]]),
                             ("joints", [*moving, *[j.name for j in [*self.joints, *s.loops]]]),
                             ("constraints", [c.name for c in s.constraints]),
-                            ("outputs", [o.name for o in s.outputs]), ("states", [z.symbol.name for z in s.states]),
+                            ("outputs", [o.name for o in s.outputs]), ("events", [e.name for e in s.events]),
+                            ("states", [z.symbol.name for z in s.states]),
                             ("loads", [load.label for load in s.loads])):
             for name, count in Counter(map(_hashable, names)).items():
                 if count > 1 and kind != "loads":
                     self.faults.append(f"{count} {kind} are named {name!r}; give each a name of its own")
-            if kind != "outputs":
+            if kind not in ("outputs", "events"):
                 spelling(self.faults, f"the {kind}", names)
         for joint, count in Counter(s.joints).items():
             if count > 1:
@@ -217,6 +221,9 @@ class _Checker:
         for output in self.system.outputs:
             if isinstance(output.value, Point):
                 self._resolve(output.value.body, f"output {output.name!r}: body")
+        for event in self.system.events:
+            if isinstance(event.value, Component):
+                self._resolve(event.value.point.body, f"event {event.name!r}: body")
 
     def _shapes(self) -> None:
         """Shapes have the bodies and parameters that the mechanism has without them."""

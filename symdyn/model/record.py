@@ -10,6 +10,7 @@ import sympy as sp
 
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
+from symdyn.model.event import Event
 from symdyn.model.joints import Joint
 from symdyn.model.shapes import Drawn
 
@@ -66,6 +67,7 @@ class Model:
     duration: float
     units: Mapping[sp.Symbol, str]
     shapes: tuple[Drawn, ...] = ()
+    events: tuple[Event, ...] = ()
 
 
 def joint_speeds(joint: Joint) -> tuple[Any, ...]:

@@ -13,6 +13,7 @@ from symdyn.model.bodies import Body, Point
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.elements import AddedMass, Element
+from symdyn.model.event import Event, make_event
 from symdyn.model.faults import Faults
 from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
@@ -66,6 +67,7 @@ class System:
         self.outputs: list[NamedOutput] = []
         self.states: list[State] = []
         self.constraints: list[Constraint] = []
+        self.events: list[Event] = []
         self.loops: list[Joint | Gear] = []
         self.ground_motion: Joint | None = None
         self.shapes: list[Drawn] = []
@@ -230,6 +232,18 @@ class System:
         taken = self._faults.expression(expression, label)
         if len(self._faults) == faults:
             self.constraints.append(Constraint(label, taken))
+
+    def add_event(self, name: str, value: Any, direction: int = 0, stop: bool = False,
+                  reset: Mapping[Any, Any] | None = None) -> None:
+        """An event where a value passes zero: its time and state are found and recorded in every simulation.
+
+        value      an expression as for add_output, or a component of a point, such as sd.position(ball)[1] - h
+        direction  1: only upwards through zero, -1: only downwards, 0: either way
+        stop       end the motion there
+        reset      coordinates, speeds and extra states with expressions for what they become, from the state before the
+                   event: {v: -e*v} for a ball that bounces
+        """
+        self.events.append(make_event(self._faults, name, value, direction, stop, reset, self.planar))
 
     def draw(self, body: Any, *shapes: Any, color: Any = None) -> None:
         """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from symdyn.model.bodies import Point
+from symdyn.model.bodies import Component, Point
 from symdyn.model.closures import Gear, Rod
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
@@ -55,6 +55,10 @@ def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Itera
         else:
             value = output.value
             yield f"output {output.name!r}", value if isinstance(value, tuple) else [value], False
+    for event in s.events:
+        if isinstance(event.value, Component):
+            yield f"event {event.name!r}: point", event.value.point.at, True
+        yield f"event {event.name!r}", event.expressions, False
     for state in s.states:
         yield f"rate of state {state.symbol}", [state.rate], False
     for constraint in s.constraints:
@@ -111,4 +115,7 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
     for output in s.outputs:
         if isinstance(output.value, Point):
             note(output.value.at, "m")
+    for event in s.events:
+        if isinstance(event.value, Component):
+            note(event.value.point.at, "m")
     return units

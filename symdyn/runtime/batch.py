@@ -68,6 +68,8 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
               "params": parameter_rows(module, params)}
     n = together(arrays, module.name)
     xd = _result(module, states, (n, n_x), out)
+    if out is not None:  # what is read must not be written before
+        arrays = {what: a.copy() if np.may_share_memory(a, out) else a for what, a in arrays.items()}
     reasons = (_on_vectors if module.backend == "c" else _broadcast)(module, n, arrays, xd)
     if reasons:
         told = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)])}"
@@ -131,9 +133,11 @@ def _reason(unit: Any, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarra
 
 def _numbers(module: Module, values: Any, what: str) -> np.ndarray:
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         array = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ArgumentError(f"{module.name}: {what} must be numbers, found {values!r}") from None
+        raise ArgumentError(f"{module.name}: {what} must be real numbers, found {values!r:.200}") from None
     return array if array.dtype.isnative else array.astype(float)
 
 

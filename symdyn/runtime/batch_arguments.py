@@ -20,10 +20,7 @@ def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[st
     Raises ArgumentError for what does not fit. What varies may be NaN: that is a fault of one trajectory alone.
     """
     if not isinstance(values, Mapping):
-        try:
-            array = np.asarray(values if values is not None else 0.0, dtype=float)
-        except (TypeError, ValueError):
-            raise ArgumentError(f"{owner}: {what} must be numbers, found {values!r}") from None
+        array = _real(values if values is not None else 0.0, owner, f"{what} must be real numbers")
         if values is None or array.ndim < 2:
             return take(values, names, what, defaults, owner)[None, :]
         if array.ndim > 2 or array.shape[1] != len(names):
@@ -57,11 +54,17 @@ def together(tables: Mapping[str, np.ndarray], owner: str) -> int:
     return next(iter(lengths.values()), 1)
 
 
-def _column(value: Any, name: str, what: str, owner: str) -> np.ndarray:
+def _real(values: Any, owner: str, wanted: str) -> np.ndarray:
     try:
-        column = np.asarray(value, dtype=float)
+        if np.iscomplexobj(values):
+            raise TypeError
+        return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ArgumentError(f"{owner}: {what}: the values of {name} must be numbers, found {value!r}") from None
+        raise ArgumentError(f"{owner}: {wanted}, found {values!r:.200}") from None
+
+
+def _column(value: Any, name: str, what: str, owner: str) -> np.ndarray:
+    column = _real(value, owner, f"{what}: the values of {name} must be real numbers")
     if column.ndim != 1:
         raise ArgumentError(f"{owner}: {what}: the values of {name} have the shape {column.shape}; give one number, or one for "
                             "each trajectory")

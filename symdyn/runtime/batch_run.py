@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import SimulationInterrupted, SimulationWarning, SymdynError
+from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batch import UNIT, input_rows, parameter_rows, tables_of, width
 from symdyn.runtime.batch_arguments import take_rows, together
 from symdyn.runtime.batch_solution import BatchSolution
+from symdyn.runtime.batch_watches import outside
+from symdyn.runtime.inputs import take_inputs
+from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.simulate import checked_positive, checked_times, checked_tolerances
 from symdyn.runtime.stops import describe_stop
 
@@ -23,6 +26,10 @@ if TYPE_CHECKING:
 
 # Steps of every lane in one call: a fraction of a second, so that Ctrl-C is heard.
 PIECE = 5_000
+# The method of motions that are integrated at once; options of `simulate` that are for one by one.
+METHOD, OPTIONS = "dop853", ("method", "max_steps", "stabilization", "events")
+EVENTS = "events"
+NO_VECTORS = "the C compiler has no vectors"
 TOLD = 3
 _DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
 _STATUS, _REASON, _BAD, _T, _H, _T_FAIL, _STEPS, _REJECTED, _X = range(9)
@@ -46,7 +53,7 @@ class _Asked:
 
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
                    inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
-                   first_step: float = 0.0) -> BatchSolution:
+                   first_step: float = 0.0, **options: Any) -> BatchSolution:
     """Integrate many motions of one mechanism, each with its own steps.
 
     q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
@@ -55,16 +62,25 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     inputs      constants, in the same ways; or what `simulate` takes, the same for all
     t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
     rtol, atol, max_step, first_step   as for `simulate`
+    options     others of `simulate`: method, max_steps, stabilization, events
 
     With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
-    `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints or Euler parameters,
-    inputs that vary over time and the NumPy backend run one by one through `simulate`; `note` of the solution says so.
+    `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters or
+    events, inputs that vary over time, other methods and options, and the NumPy backend run one by one through `simulate`; `note`
+    of the solution says so.
 
     A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
-    raises SimulationInterrupted, whose `solution` holds what was finished. What loads want to be looked at after a run
-    (watches) is not looked at here. Raises ArgumentError for what does not fit.
+    raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning tells in how many motions loads
+    leave what they are meant for, at the states that are kept. Raises ArgumentError for what does not fit.
     """
     metadata = module.metadata
+    unknown = [o for o in options if o not in OPTIONS]
+    if unknown:
+        raise ArgumentError(f"{module.name}: simulate_batch has no option {', '.join(unknown)}; besides its own it takes "
+                            f"{', '.join(OPTIONS)}")
+    has_events = bool(metadata.get(EVENTS)) and options.get("events") is not False
+    plain = {"method": METHOD, "events": has_events}
+    options = {k: v for k, v in options.items() if v is not None and v is not plain.get(k) and v != plain.get(k)}
     initial = metadata["initial"]
     groups = [take_rows(values, metadata[what], f"initial {what}", {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
@@ -72,17 +88,20 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     fixed = input_rows(module, None if by_time else inputs, initial)
     rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
     n = together(rows, module.name)
-    n_starts = max(len(g) for g in groups)
+    n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
     starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
     times, span = _times(module, t)
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
-    note = _why_one_by_one(module, by_time)
-    solution = _one_by_one(module, asked, inputs if by_time else None, note) if note else _on_vectors(module, asked)
+    note = why_one_by_one(module, has_events) or _why_these(by_time, options)
+    solution = _one_by_one(module, asked, inputs if by_time else None, note, options) if note else _on_vectors(module, asked)
     if solution.messages:
         told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
         more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
         warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
+    given = take_inputs(inputs, metadata["inputs"], initial, module.name).rows if by_time else fixed
+    for sentence in outside(module, times, solution.x, asked.params, given):
+        warnings.warn(sentence, SimulationWarning, stacklevel=3)
     return solution
 
 
@@ -99,16 +118,34 @@ def _times(module: Module, t: Any) -> tuple[np.ndarray, tuple[float, float]]:
     return (np.array([span[1]]) if pair else times), span
 
 
-def _why_one_by_one(module: Module, by_time: bool) -> str:
+def why_one_by_one(module: Module, events: bool = True) -> str:
+    """Why motions of a module are not integrated several at once; "" if they are. events: whether they are looked for."""
+    metadata = module.metadata
     if module.backend != "c":
         return f"one by one: the backend is {module.backend}"
-    if module.metadata["constraints"]:
+    if metadata["constraints"]:
         return "one by one: the mechanism has constraints, which states are projected onto"
-    if module.metadata["unit_groups"]:
+    if metadata["unit_groups"]:
         return "one by one: the mechanism has Euler parameters, which are normalised after every step"
+    if events and metadata.get(EVENTS):
+        return "one by one: the mechanism has events"
+    return "" if metadata["sizes"]["x"] else "one by one: the mechanism has no state"
+
+
+def many_at_once(module: Module, built: bool) -> str:
+    """How many states and motions are computed at once; built: whether the code for it is there."""
+    if module.backend != "c":
+        return f"rhs_batch by broadcasting, simulate_batch {why_one_by_one(module)}"
+    lanes = "as many as the processor's vectors have lanes (module.batch_width)"
+    if built:
+        lanes = f"{width(module)} on the processor's vectors" if width(module) > 1 else f"1, {NO_VECTORS}"
+    return f"rhs_batch {lanes}, simulate_batch {why_one_by_one(module) or 'likewise'}"
+
+
+def _why_these(by_time: bool, options: Mapping[str, Any]) -> str:
     if by_time:
         return "one by one: inputs vary over time"
-    return "" if module.metadata["sizes"]["x"] else "one by one: the mechanism has no state"
+    return f"one by one: asked for with {', '.join(options)}" if options else ""
 
 
 # -- on vectors
@@ -126,7 +163,8 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
     real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
     out = (ctypes.c_void_p * 2)(x.ctypes.data, report.ctypes.data)
-    tables = tables_of([asked.starts, asked.inputs, asked.params])
+    params, wrong = _real(module, asked)
+    tables = tables_of([asked.starts, asked.inputs, params])
     go = unit.function("batch_go")
     go.restype = ctypes.c_long
     begun = clock.perf_counter()
@@ -139,13 +177,25 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
         interrupted = True
     seconds = clock.perf_counter() - begun
     success = report[:, _STATUS] == _DONE
-    messages = {int(k): _message(unit, report[k]) for k in np.flatnonzero(~success)}
+    messages = {int(k): wrong.get(int(k)) or _message(unit, report[k]) for k in np.flatnonzero(~success)}
     counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
     solution = BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], width(module),
-                             "" if width(module) > 1 else "the C compiler has no vectors", seconds)
+                             "" if width(module) > 1 else NO_VECTORS, seconds)
     if interrupted:
         raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
     return solution
+
+
+def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
+    """The parameters, NaN in rows with masses that no body has, and what to say of these."""
+    wrong = negative_masses(module, asked.params)
+    if not wrong:
+        return asked.params, wrong
+    if len(asked.params) == 1:
+        raise ArgumentError(wrong[0])
+    params = asked.params.copy()
+    params[list(wrong)] = np.nan
+    return params, wrong
 
 
 def _message(unit: Any, row: np.ndarray) -> str:
@@ -167,7 +217,7 @@ def _message(unit: Any, row: np.ndarray) -> str:
 # -- one by one
 
 
-def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str) -> BatchSolution:
+def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str, options: Mapping[str, Any]) -> BatchSolution:
     n, n_x, sizes = asked.n, module.metadata["sizes"]["x"], module.metadata["sizes"]
     x = np.full((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
@@ -186,7 +236,7 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str) -> BatchS
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SimulationWarning)
                 done = module.simulate(times, q, u, p, z=z, inputs=given if inputs is None else inputs, rtol=asked.rtol,
-                                       atol=asked.atol, max_step=asked.max_step, first_step=asked.first_step)
+                                       atol=asked.atol, max_step=asked.max_step, first_step=asked.first_step, **options)
         except SimulationInterrupted:
             for late in range(k, n):
                 messages[late] = f"{module.name}: not finished"

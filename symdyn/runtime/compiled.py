@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.events import EVENTS, at_once, ended
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
+from symdyn.runtime.methods import unit_name
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, not_converged
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
@@ -24,6 +26,9 @@ PIECE = 20_000
 STEPS_AT_ONCE = 4096
 _DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
 _PROJECTION_FAILED = -6
+_EVENT_STOPPED, _EVENT_FAILED, _EVENT_AT_ONCE = 3, -7, -8
+# Most events that wait to be taken, besides one of each kind; see `noted` in the generated source.
+_EVENTS_WAITING = 64
 _INPUT_STOPPED = 100_000
 _InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
                                   ctypes.POINTER(ctypes.c_double))
@@ -64,6 +69,12 @@ class _Run:
             self.address, ctypes.byref(self.problem), ctypes.c_void_p(span.ctypes.data),
             ctypes.c_void_p(request.x0.ctypes.data), ctypes.c_void_p(request.atol.ctypes.data))
         self.written = ctypes.c_long(0)
+        self.happened: list[tuple[int, float, np.ndarray]] = []
+        self.rows: np.ndarray | None = None
+        if request.look is not None and request.look.any():
+            self.look = np.ascontiguousarray(request.look, dtype=np.intc)
+            self.rows = np.zeros((_EVENTS_WAITING + len(self.look), 2 + self.n_x))
+            unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data))
 
     def _inputs(self, request: Request) -> None:
         free = request.inputs
@@ -101,21 +112,27 @@ class _Run:
     def _go(self, name: str, limit: int, *rest: Any) -> int:
         arguments = [ctypes.c_long(a) if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (limit, *rest)]
         with self.guard:
-            return int(self.unit.function(name)(self.address, *arguments, ctypes.byref(self.written)))
+            status = int(self.unit.function(name)(self.address, *arguments, ctypes.byref(self.written)))
+        if self.rows is not None:
+            take = self.unit.function("simulation_events")
+            take.restype = ctypes.c_long
+            n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
+            self.happened += [(int(row[0]), float(row[1]), row[2:].copy()) for row in self.rows[:n]]
+        return status
 
     def report(self) -> np.ndarray:
         """See `simulation_report` in the generated source."""
-        out = np.zeros(8 + 2 * self.n_x + 6)
+        out = np.zeros(8 + 2 * self.n_x + 8)
         self.unit.function("simulation_report")(self.address, ctypes.c_void_p(out.ctypes.data))
         return out
 
 
-def run_compiled(module: Module, request: Request, bar: Any = None, field: str = "rhs") -> Outcome:
-    """Integrate with the compiled Dormand-Prince 8(5,3).
+def run_compiled(module: Module, request: Request, method: str, bar: Any = None, field: str = "rhs") -> Outcome:
+    """Integrate with a compiled method.
 
     An exception of an input function ends the run; it is raised again unless it is a KeyboardInterrupt.
     """
-    unit: Any = module.unit(field)
+    unit: Any = module.unit(unit_name(field, method))
     run = _Run(unit, request)
     interrupted, seconds, stopped = False, 0.0, False
     times, n_x = request.times, run.n_x
@@ -135,7 +152,8 @@ def run_compiled(module: Module, request: Request, bar: Any = None, field: str =
             status = run.at(t_out, x_out, limit) if times is not None else run.steps(t_out, x_out, limit)
             seconds += clock.perf_counter() - begun
             if times is None and (status == _STORE_FULL or run.written.value == len(t_out)):
-                stored.append((t_out.copy(), x_out.copy()))
+                n = run.written.value
+                stored.append((t_out[:n].copy(), x_out[:n].copy()))
                 run.written.value = 0
             if bar is not None:
                 now = run.report()[0]
@@ -156,13 +174,17 @@ def run_compiled(module: Module, request: Request, bar: Any = None, field: str =
     else:
         t, x = times[:written], x_out[:written]
     report = run.report()
-    success = status == _DONE and not interrupted and not stopped
+    over = status == _EVENT_STOPPED and not interrupted and not stopped
+    success = over or (status == _DONE and not interrupted and not stopped)
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
-    if not success:
+    if over:
+        message = ended(module, next(k for k, s, _ in reversed(run.happened) if module.metadata[EVENTS][k]["stop"]), report[0])
+    if over or not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
     dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
     return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds,
-                   Corrections(dq, du, int(n_corrected), int(n_corrections)))
+                   Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),
+                   int(report[15 + 2 * n_x]))
 
 
 def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
@@ -172,6 +194,11 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         return describe_stop(metadata, t, x, "interrupted")
     if stopped:
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
+    if status == _EVENT_AT_ONCE:
+        return describe_stop(metadata, t, x, at_once(module, run.happened[-1][0]))
+    if status == _EVENT_FAILED:
+        why = run.unit.reason(int(report[5])) if report[5] else "events cannot be evaluated: the result is not finite"
+        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _FIELD_FAILED:
         x_fail = report[8 + n:8 + 2 * n]
         why = _dependent(module, run, report[7], x_fail) + _inputs(module, run, report[7], x_fail)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _UNCONTROLLED = 1e100
 
 
-def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabilization: Any, work: bool) -> None:
+def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabilization: Any, work: bool, events: bool) -> None:
     """Raise ArgumentError if the form does not apply, MissingExtra if the solver is not installed."""
     known = names(module)
     if not known:
@@ -39,6 +39,8 @@ def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabi
     if work:
         raise ArgumentError(f"{module.name}: method 'ggl' does not integrate the work of loads; leave out work=True, or take "
                             "another method")
+    if events:
+        raise ArgumentError(f"{module.name}: method 'ggl' does not look for events; pass events=False, or take another method")
     independent = int(rank(module, t, x, params))
     if independent < len(known):
         raise ArgumentError(f"{module.name}: method 'ggl' needs independent constraints; of {len(known)} only {independent} are. "

@@ -18,9 +18,19 @@ def real_parameters(module: Module, params: Any) -> np.ndarray:
     Raises ArgumentError as it does, and where a parameter that stands alone as the mass of a body is negative.
     """
     p = module.parameters(params)
-    masses = module.metadata.get("masses", {})
-    for name, value in zip(module.metadata["parameters"], p, strict=True):
-        if value < 0 and name in masses:
-            raise ArgumentError(f"{module.name}: the parameter {name}, the mass of body {masses[name]!r}, is {value:g} kg; pass "
-                                "a number that is not below zero")
+    wrong = negative_masses(module, p[None, :])
+    if wrong:
+        raise ArgumentError(wrong[0])
     return p
+
+
+def negative_masses(module: Module, params: np.ndarray) -> dict[int, str]:
+    """What to say of rows of parameters (n, n_p) in which one that stands alone as the mass of a body is negative, by row."""
+    found: dict[int, str] = {}
+    masses = module.metadata.get("masses", {})
+    for name, column in zip(module.metadata["parameters"], params.T, strict=True):
+        if name in masses:
+            for k in np.flatnonzero(column < 0).tolist():
+                found.setdefault(k, f"{module.name}: the parameter {name}, the mass of body {masses[name]!r}, is "
+                                    f"{column[k]:g} kg; pass a number that is not below zero")
+    return found

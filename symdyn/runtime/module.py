@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -294,7 +295,10 @@ class Module:
         """What was generated, what was skipped and why, operation counts; prints as text."""
         if self._reporter is None:
             raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
-        return self._reporter()
+        from symdyn.runtime.batch import UNIT
+        from symdyn.runtime.batch_run import many_at_once
+
+        return replace(self._reporter(), many=many_at_once(self, UNIT in self._units))
 
     def write(self, folder: Any) -> list[Path]:
         """Write the generated files, complete with header, example and reference vectors; returns their paths."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ class Request:
     """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator.
 
     n_state   entries of x0 that are the mechanism's state; one more may be the work of the loads
+    look      which of the module's events are looked for, (n_e,) of bool; None: the module has none
     stabilization   what keeps the state on its constraints
     """
 
@@ -30,6 +32,7 @@ class Request:
     max_steps: int | None
     n_state: int
     stabilization: Stabilization = field(default_factory=Stabilization)
+    look: np.ndarray | None = None
 
     @property
     def field_p(self) -> np.ndarray:
@@ -43,7 +46,10 @@ class Request:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why."""
+    """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
+
+    happened   events in order: which, when, the state (n_x,) just before
+    """
 
     t: np.ndarray
     x: np.ndarray
@@ -55,3 +61,6 @@ class Outcome:
     n_evaluations: int
     seconds: float | None = None
     corrections: Corrections = field(default_factory=Corrections)
+    happened: Sequence[tuple[int, float, np.ndarray]] = ()
+    n_jacobians: int = 0
+    n_factorizations: int = 0

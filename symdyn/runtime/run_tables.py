@@ -50,6 +50,8 @@ def facts(solution: Solution) -> list[tuple[str, str]]:
     if solution.tolerances is not None:
         rows.append(("Tolerances", f"relative {solution.tolerances[0]:.3g}, absolute {solution.tolerances[1]:.3g}"))
     rows += [("Steps", f"{solution.n_steps}, and {solution.n_rejected} rejected"), ("Evaluations", str(solution.nfev))]
+    if solution.njev:
+        rows.append(("Jacobians", f"{solution.njev}, and {solution.nlu} factorizations"))
     inside = solution.integrator_seconds
     rows.append(("Time", _seconds(solution.seconds)
                  + (f", of which {_seconds(inside)} inside the integrator" if inside is not None else "")))

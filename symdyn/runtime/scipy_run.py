@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.events import Locator
 from symdyn.runtime.inputs import Inputs, not_finite
+from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
@@ -24,7 +26,7 @@ def solver_class_of(module: Module, method: Any) -> Any:
 
     if isinstance(method, str):
         if method not in _SCIPY:
-            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are dop853 (compiled), "
+            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are {', '.join(COMPILED)} (compiled), "
                                 f"{', '.join(_SCIPY)}, ggl (with constraints), or pass an OdeSolver class")
         return getattr(integrate, method)
     if isinstance(method, type) and issubclass(method, integrate.OdeSolver):
@@ -101,12 +103,37 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         told = (lost_rank(module, s, at[:n_state], request.p, request.x0[:n_state], t0) for s, at in places)
         return next(filter(None, told), "")
 
+    def between(s: float) -> np.ndarray:
+        """The state within the latest step."""
+        x = dense(s)
+        return projector(s, x) if projector is not None else x
+
+    def cut_by_event() -> tuple[float, np.ndarray, np.ndarray | None] | None:
+        """Where the latest step ends early: the time, the state before and the one to go on from, if there is one."""
+        assert locator is not None
+        begun = before
+        while (at := locator.first(begun, float(solver.t), between)) is not None:
+            x, fired = between(at), locator.fired(at)
+            after = locator.after(at, x, fired)
+            if after is not None and projector is not None:
+                after = projector(at, after)
+            if after is not None or locator.over or locator.failed:
+                return at, x, after
+            locator.begin(at, x, field(at, x), solver.direction * 1e-6 * solver.step_size, fired)
+            begun = at
+        return None
+
     t0, t_end = request.span
+    locator = None
+    if request.look is not None and request.look.any():
+        locator = Locator(module, request.p, request.look, lambda s, x: given(s, x) if n_in else (), n_state, t_end - t0)
     ts, xs = [t0], [request.x0]
     pending = list(request.times[1:]) if request.times is not None else []
-    accepted, message, interrupted = 0, "", False
+    accepted, spent, message, interrupted, over = 0, 0, "", False, False
     here, state = t0, request.x0
     solver: Any = None
+    dense: Any = None
+    before = t0
     try:
         with np.errstate(all="ignore"):
             if projector is not None:
@@ -114,6 +141,8 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
             if not np.isfinite(field(t0, state)).all():  # SciPy would look for a first step for ever
                 raise EvaluationError(trouble[-1])
             solver = solver_class(field, t0, state, t_end, **options)
+            if locator is not None:
+                locator.begin(t0, state, field(t0, state), 1e-9 * (t_end - t0))
             while solver.status == "running":
                 before = solver.t
                 note = solver.step()
@@ -125,7 +154,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                 trouble.clear()
                 # The polynomial of the step ends where the step did, before the projection.
                 passed = pending and (pending[0] - solver.t) * solver.direction < 0
-                dense = solver.dense_output() if passed else None
+                dense = solver.dense_output() if passed or locator is not None else None
                 if projector is not None:
                     tolerated = request.atol + request.rtol * np.abs(solver.y)
                     projected, moved = projector.step(float(solver.t), solver.y, tolerated)
@@ -134,15 +163,30 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                     solver.y = projected
                 accepted += 1
                 here, state = float(solver.t), solver.y.copy()
+                cut = cut_by_event() if locator is not None else None
+                if cut is not None:
+                    here, state = cut[:2]
                 if request.times is None:
-                    ts.append(solver.t)
+                    ts.append(here)
                     xs.append(state)
-                while pending and (pending[0] - solver.t) * solver.direction <= 0:
-                    if pending[0] == solver.t or dense is None:
-                        xs.append(state)
-                    else:
-                        xs.append(projector(pending[0], dense(pending[0])) if projector else dense(pending[0]))
+                while pending and (pending[0] - here) * solver.direction <= 0:
+                    xs.append(state if pending[0] == here or dense is None else between(pending[0]))
                     ts.append(pending.pop(0))
+                if cut is not None and locator is not None:
+                    if locator.over or locator.failed:
+                        over, message = bool(locator.over), locator.over or locator.failed
+                        break
+                    assert cut[2] is not None
+                    state = cut[2]
+                    if request.times is None:
+                        ts.append(here)
+                        xs.append(state)
+                    if here == t_end:
+                        break
+                    step = solver.direction * 1e-6 * solver.step_size
+                    spent += int(solver.nfev)
+                    solver = solver_class(field, here, state, t_end, **{k: v for k, v in options.items() if k != "first_step"})
+                    locator.begin(here, state, field(here, state), step, locator.fired(here))
                 if bar is not None:
                     bar.update(abs(solver.t - before))
                 if watch is not None and watch(here, state):
@@ -159,13 +203,16 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         if error in raised:
             raise
         message = (trouble[-1] if trouble else str(error)) + dependent(state)
-    done = not message
+    done = not message or over
     n = min(len(ts), len(xs))  # an interrupt may come between the two
     if not done:
         message = describe_stop(module.unit(field_name).metadata, here, state, message)
     t, x = np.array(ts[:n]), np.array(xs[:n])
-    if not done:
+    if not done or over:
         t, x = with_last(t, x, here, state)
     return Outcome(t, x, done, message or "reached the end", interrupted, accepted, 0,
-                   int(solver.nfev) if solver is not None else 0,
-                   corrections=projector.corrections if projector is not None else Corrections())
+                   spent + (int(solver.nfev) if solver is not None else 0),
+                   corrections=projector.corrections if projector is not None else Corrections(),
+                   happened=locator.happened if locator is not None else (),
+                   n_jacobians=int(solver.njev) if solver is not None else 0,
+                   n_factorizations=int(solver.nlu) if solver is not None else 0)

@@ -11,10 +11,13 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.arguments import take
+from symdyn.runtime.automatic import automatic
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
+from symdyn.runtime.events import wanted
 from symdyn.runtime.inputs import take_inputs
 from symdyn.runtime.masses import real_parameters
+from symdyn.runtime.methods import DEFAULT, check_compiled, is_compiled
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
@@ -34,7 +37,7 @@ TRIAL_STEPS = 100
 def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
-             progress: bool = False, work: bool = False, stabilization: Any = None) -> Solution:
+             progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True) -> Solution:
     """Integrate the motion.
 
     t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
@@ -43,9 +46,11 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     params      as everywhere in Module
     inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
     rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 on; atol a number or (n_x,), default rtol
-    method      "dop853" compiled (default with the C backend), or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or
-                an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian. With constraints also "ggl": the
-                stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit method (pip install 'symdyn[dae]')
+    method      compiled: one of symdyn.runtime.methods.COMPILED, such as "dop853" (default with the C backend), "bs54" for
+                loose tolerances; or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and
+                LSODA get the exact Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and
+                Leimkuhler by an implicit method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial
+                runs) and constraints; `Solution.why` tells
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
     progress    show a bar (needs tqdm)
     work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
@@ -54,6 +59,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                 matrix that fulfils them; "baumgarte", or ("baumgarte", a): C_ddot + 2 a C_dot + a^2 C = 0 instead of
                 C_ddot = 0, unless given with a = 1/(twenty mean steps of a short run without); "none".
                 Default: projection, with methods that build on several steps (BDF, LSODA) baumgarte
+    events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
 
     Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
     and why, and a SimulationWarning is given. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
@@ -68,18 +74,21 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, or None, found {max_steps!r}")
     request = Request(span, None if every else times, start, p, free, *checked_tolerances(module, rtol, atol),
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
-                      max_steps, len(start))
+                      max_steps, len(start), look=wanted(module, events))
     if work and "power" not in metadata["functions"]:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
-    method = method or ("dop853" if module.backend == "c" else "DOP853")
-    if method == "dop853" and module.backend != "c":
-        raise ArgumentError(f"{module.name}: the compiled integrator 'dop853' needs the C backend; this module "
-                            f"runs on {module.backend}. Use method='DOP853', or compile(backend='c')")
+    method = method or (DEFAULT if module.backend == "c" else "DOP853")
     check_start(module, span[0], start, p)
+    why = ""
+    if isinstance(method, str) and method == "auto":
+        method, why = automatic(module, replace(request, look=None if request.look is None else np.zeros_like(request.look)),
+                                lambda asked, name: _trial(module, asked, name))
+    if is_compiled(method):
+        check_compiled(module, request, method)
     if method == "ggl":
         from symdyn.runtime.dae_run import check_ggl
 
-        check_ggl(module, start, p, span[0], stabilization, work)
+        check_ggl(module, start, p, span[0], stabilization, work, bool(wanted(module, events).any()))
     else:
         request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
         if request.stabilization.way == "baumgarte":
@@ -92,7 +101,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if bar is not None:
             bar.close()
     solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
-                        work, (request.rtol, float(request.atol.max(initial=0.0))))
+                        work, (request.rtol, float(request.atol.max(initial=0.0))), why)
     if outcome.interrupted:
         raise SimulationInterrupted(solution, outcome.message)
     if not outcome.success:
@@ -108,25 +117,28 @@ def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outc
 
         return run_ggl(module, request, bar)
     field = "rhs" + "_work" * (len(request.x0) > request.n_state) + "_baumgarte" * (request.stabilization.way == "baumgarte")
-    return run_compiled(module, request, bar, field) if method == "dop853" else run_scipy(module, request, method, bar, field)
+    return (run_compiled if is_compiled(method) else run_scipy)(module, request, method, bar, field)
 
 
 def _stabilization(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
     """What keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
-    one_step = method == "dop853" or takes_changed_states(solver_class_of(module, method))
+    one_step = is_compiled(method) or takes_changed_states(solver_class_of(module, method))
     chosen = choose(module, asked, one_step, str(getattr(method, "__name__", method)), request.p)
     if chosen.way != "baumgarte":
         return chosen
     if chosen.gain:
         return chosen
 
-    def trial() -> np.ndarray:
-        done = _run(module, replace(request, times=None, max_steps=TRIAL_STEPS), method)
-        if done.interrupted:
-            raise KeyboardInterrupt
-        return done.t
+    short = replace(request, times=None, max_steps=TRIAL_STEPS)
+    return replace(chosen, gain=chosen_gain(lambda: _trial(module, short, method, "none").t, request.span))
 
-    return replace(chosen, gain=chosen_gain(trial, request.span))
+
+def _trial(module: Module, request: Request, method: Any, stabilization: Any = None) -> Outcome:
+    """A run that is thrown away."""
+    done = _run(module, replace(request, stabilization=_stabilization(module, request, method, stabilization)), method)
+    if done.interrupted:
+        raise KeyboardInterrupt
+    return done
 
 
 def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:

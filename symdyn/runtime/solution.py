@@ -16,6 +16,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
+from symdyn.runtime.events import EventRows, rows_of
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome
 from symdyn.runtime.paths import as_path
@@ -33,24 +34,29 @@ class Solution:
 
     t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
     success, message    whether the end was reached, and if not when, where and why
-    n_steps, n_rejected, nfev   of the integrator; seconds: wall time of the call, integrator_seconds: inside compiled code
+    n_steps, n_rejected, nfev   of the integrator; njev, nlu: Jacobians and factorizations of implicit methods
+    seconds, integrator_seconds   wall time of the call, and inside compiled code
     tolerances    relative, and the largest absolute one, if they are known
+    method, why   of integration, and why it was chosen, if it was (method="auto")
+    events    name -> times t (n,) and states just before x (n, n_x) of the system's events
     corrections   of projections onto the constraints: the largest of position and speed, how many, how much work
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
-                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None) -> None:
+                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "") -> None:
         self.module = module
         self.t = outcome.t
         self.x = outcome.x[:, :-1] if work else outcome.x
         self._work = outcome.x[:, -1] if work else None
         self.success, self.message = outcome.success, outcome.message
         self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
+        self.njev, self.nlu = outcome.n_jacobians, outcome.n_factorizations
         self.integrator_seconds = outcome.seconds
         self.seconds = seconds
-        self.params, self.method, self.backend = params, method, module.backend
+        self.params, self.method, self.backend, self.why = params, method, module.backend, why
         self.corrections, self.tolerances = outcome.corrections, tolerances
         self._inputs = inputs
+        self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata["sizes"]["x"])
         self._n_c = len(names(module))
 
     def __getitem__(self, name: Any) -> np.ndarray:

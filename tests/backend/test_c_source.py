@@ -105,7 +105,7 @@ def test_header_in_cpp(derived: Callable[..., Any], write: Callable[..., Path]) 
 
 
 def signature(text: str, function: str) -> list[str]:
-    found = re.search(rf"^SYMDYN_EXPORT int {function}\(([^)]*)\)$", text, re.MULTILINE)
+    found = re.search(rf"^SYMDYN_EXPORT int {function}\(([^)]*)\) {{$", text, re.MULTILINE)
     assert found is not None
     return found[1].split(", ")
 

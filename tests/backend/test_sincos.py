@@ -176,7 +176,7 @@ def test_whatever_the_options_of_the_compiler(flags: list[str], derived: Callabl
 def written(values: Callable[..., list[Any]], **options: Any) -> str:
     """The body of f."""
     text = next(iter(source(values, **options).files.values()))
-    found = re.search(r"turning_f\([^)]*\)\n{\n(.*?)^}", text, re.MULTILINE | re.DOTALL)
+    found = re.search(r"turning_f\([^)]*\) {\n(.*?)^}", text, re.MULTILINE | re.DOTALL)
     assert found is not None
     return found[1]
 

@@ -26,7 +26,7 @@ def rendered(equations: Any, *functions: str) -> Source:
 def body(source: Source, function: str) -> str:
     """The statements of one C function."""
     text = next(iter(source.files.values()))
-    found = re.search(rf"^SYMDYN_EXPORT int {source.metadata['name']}_{function}\([^)]*\)\n{{\n(.*?)^}}", text,
+    found = re.search(rf"^SYMDYN_EXPORT int {source.metadata['name']}_{function}\([^)]*\) {{\n(.*?)^}}", text,
                       re.MULTILINE | re.DOTALL)
     assert found is not None
     return re.sub(r"//.*", "", found[1])

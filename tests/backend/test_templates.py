@@ -165,8 +165,8 @@ def test_broken_template(line: int, broken: str, message: str, derived: Callable
 
 
 def test_fault_in_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
-    (tmp_path / "c").mkdir()
-    path = tmp_path / "c" / "dop853.c.jinja"
+    (tmp_path / "c" / "methods").mkdir(parents=True)
+    path = tmp_path / "c" / "methods" / "explicit.c.jinja"
     path.write_text("\n\n\n{{ nothing }}")
     assert failure(derived("pendulum"), "c", tmp_path) == f"template {path}, line 4: 'nothing' is undefined"
     path.write_text("{% include 'c/absent.jinja' %}")
@@ -186,6 +186,7 @@ def test_file_that_the_dialect_names_is_missing(derived: Callable[..., Any], fol
     ('z = "z[{k}]", ', "", "load.z is missing"),
     ('q = "q[{k}]"', 'q = "q[{n}]"', "load.q = 'q[{n}]' cannot be filled in ('n'); it may use {k}"),
     ("{name} = {value};", "{name} = {values};", "assign = 'const {name} = {values};' cannot be filled in"),
+    ("store = ", "zeros = 'out[{k}]'\nstore = ", "zeros = 'out[{k}]' cannot be filled in ('k'); it may use {n}"),
     ("({0} && {1})", "({0} && {3})", "operations.and = '({0} && {3})' cannot be filled in"),
     ("({0} && {1})", "{ {0} && {1} }", "braces are doubled"),
     ("[operations]", "[sincos]\nleast = 2\ntake = ''\nsine = ''\ncos = ''\n[operations]",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import threading
 import warnings
@@ -241,7 +242,73 @@ def test_interrupt_keeps_what_is_finished(fast: Any) -> None:
     assert np.isnan(solution.x[~solution.success]).all()
 
 
+def test_masses_that_no_body_has_are_told_as_one_motion_tells_them(fast: Any) -> None:
+    masses = [1.0, -0.1, 2.0, -3.0]  # with the first of these the mass matrix is still positive definite
+    told = r"1: double_pendulum: the parameter m2, the mass of body '\w+', is -0.1 kg; pass .*; 3: .* is -3 kg"
+    with pytest.warns(SimulationWarning, match=f"2 of 4 motions failed: {told}"):
+        many = fast.simulate_batch(*starts(4), {"m2": masses}, t=(0, 0.2))
+    assert many.success.tolist() == [True, False, True, False] and np.isnan(many.x[[1, 3]]).all()
+    with pytest.raises(ArgumentError) as alone:
+        fast.simulate((0, 0.2), params={"m2": -0.1})
+    assert many.messages[1] == str(alone.value)
+    with pytest.raises(ArgumentError, match=r"is -0\.1 kg"):
+        fast.simulate_batch(*starts(4), {"m2": -0.1}, t=(0, 0.2))
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_what_loads_want_to_be_looked_at_is_told_once(backend: str) -> None:
+    """A box that floats, that leaves the water, and that sinks."""
+    z, m, pull = sd.coordinates("z"), sd.parameters("m"), sd.inputs("pull")
+    system = sd.System("float", gravity=[0, 0, -10])
+    hull = system.add_body("hull", mass=m)
+    system.add_joint(sd.Prismatic("heave", system.ground, hull, z, axis=[0, 0, 1]))
+    system.add_load(sd.Buoyancy(hull, [(2, 2, 2)], 1000, name="box"))
+    system.add_force(hull, [0, 0, pull])
+    system.defaults = {m: 4000}
+    module = system.embedding().compile(backend=backend)
+    start, rising, sinking = {"z": [0, 1.5, 0, -1.1]}, r"in 1 of 4 motions, the first of them 1, at worst: .*left the water", (
+        r"float_: in 3 of 4 motions, the first of them 1, at worst: .*it sinks: the immersed part of its volume is 1$")
+    with pytest.warns(SimulationWarning) as warned:
+        many = module.simulate_batch(start, params={"m": [4000, 4000, 9000, 7000]}, t=np.linspace(0, 2, 9))
+    assert many.success.all() and len(warned) == 2
+    assert re.search(rising, str(warned[0].message)) and re.search(sinking, str(warned[1].message))
+    for inputs in ({"pull": [0, 0, -1e5, 0]}, lambda t, x: [0]):
+        with pytest.warns(SimulationWarning) as warned:
+            module.simulate_batch(start, inputs=inputs, t=np.linspace(0, 2, 9))
+        assert [int(str(w.message).split()[2]) for w in warned] == ([2, 3] if isinstance(inputs, dict) else [2, 2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(module.simulate_batch({"z": [0, 0.1]}, t=(0, 1))) == 2
+
+
+def test_options_of_one_by_one(fast: Any) -> None:
+    q, u = starts(2)
+    many = fast.simulate_batch(q, u, t=(0, 0.3), method="RK45", max_steps=10_000)
+    assert many.note == "one by one: asked for with method, max_steps" and many.width == 1
+    assert (many.x[1, -1] == fast.simulate(np.array([0, 0.3]), q[1], u[1], method="RK45").x[-1]).all()
+    assert fast.simulate_batch(q, u, t=(0, 0.3), method="dop853", stabilization=None).note == ""
+    with pytest.raises(ArgumentError, match="simulate_batch has no option metod; besides its own it takes method, max_st"):
+        fast.simulate_batch(q, u, metod="RK45")
+
+
+def test_the_report_tells_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
+    fast.rhs_batch(0.0, np.zeros((1, 4)))
+    for module, told in ((fast, f"rhs_batch {fast.batch_width} on the processor's vectors, simulate_batch likewise"),
+                         (four_bar, "simulate_batch one by one: the mechanism has constraints"),
+                         (compiled("double_pendulum", "numpy"), "rhs_batch by broadcasting, simulate_batch one by one: the ba")):
+        assert told in next(line for line in str(module.report()).splitlines() if line.startswith("  Many at once: rhs_batch "))
+    fresh = sd.systems.get("double_pendulum").embedding().compile(backend="c")
+    assert "rhs_batch as many as the processor's vectors have lanes (module.batch_width)" in str(fresh.report())
+
+
 # -- arguments
+
+
+def test_none_at_all(fast: Any) -> None:
+    for given in ({"q": np.zeros((0, 2))}, {"params": {"m1": []}}, {"q": np.zeros((0, 2)), "params": {"m1": []}}):
+        many = fast.simulate_batch(**given, t=(0, 1))
+        assert many.x.shape == (0, 1, 4) and many.success.shape == (0,)
+    assert fast.rhs_batch(0.0, np.zeros((0, 4))).shape == (0, 4)
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -253,8 +320,10 @@ def test_interrupt_keeps_what_is_finished(fast: Any) -> None:
     ({"params": {"zzz": [1, 2]}}, "parameters: there is no 'zzz'; there are g, m1"),
     ({"params": {"l3": 1.0}}, "parameters: there is no 'l3', did you mean l1"),
     ({"params": {"l1": np.ones((2, 2))}}, r"the values of l1 have the shape \(2, 2\)"),
-    ({"params": {"l1": ["a", "b"]}}, "the values of l1 must be numbers"),
-    ({"params": [["a"]]}, "parameters must be numbers"),
+    ({"params": {"l1": ["a", "b"]}}, "the values of l1 must be real numbers"),
+    ({"q": np.ones((3, 2)) * 1j}, "initial q must be real numbers"),
+    ({"params": {"l1": [1, 1j]}}, "the values of l1 must be real numbers"),
+    ({"params": [["a"]]}, "parameters must be real numbers"),
     ({"params": {"l1": np.nan}}, "parameters must be finite, found l1 = nan"),
     ({"t": (0, np.nan)}, "t must be"), ({"rtol": -1}, "tolerances must be positive"), ({"max_step": -1}, "max_step must be"),
 ])
@@ -264,7 +333,8 @@ def test_motions_that_do_not_fit(fast: Any, arguments: dict[str, Any], message: 
 
 
 @pytest.mark.parametrize(("t", "x", "message"), [
-    (0.0, np.zeros((3, 5)), r"x has the shape \(3, 5\), needed is \(n, 4\)"), (0.0, "a", "x must be numbers"),
+    (0.0, np.zeros((3, 5)), r"x has the shape \(3, 5\), needed is \(n, 4\)"), (0.0, "a", "x must be real numbers"),
+    (0.0, np.ones((3, 4)) + 1j, "x must be real numbers"),
     (np.zeros(2), np.zeros((3, 4)), "t has 2 rows, x has 3 rows"), (np.zeros((2, 2)), np.zeros((3, 4)), "t has the shape"),
 ])
 def test_states_that_do_not_fit(double: Any, t: Any, x: Any, message: str) -> None:
@@ -277,6 +347,8 @@ def test_result_in_an_array_of_the_caller(double: Any) -> None:
     wanted = double.rhs_batch(0.0, x)
     for out in (np.zeros((N, 4)), np.zeros((4, N)).T, np.zeros((N, 8))[:, ::2]):
         assert double.rhs_batch(0.0, x, out=out) is out and (out == wanted).all()
+    shared = np.vstack([x, x[:1]])
+    assert (double.rhs_batch(0.0, shared[:N], out=shared[1:]) == wanted).all()  # each row is read before it is written
     frozen = np.zeros((N, 4))
     frozen.flags.writeable = False
     for bad in (np.zeros((N, 3)), np.zeros((N, 4), dtype=int), frozen, [1.0]):

@@ -65,24 +65,20 @@ double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(dou
 //
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
 // (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
-static inline void symdyn_sincos_one(double x, double *sine, double *cosine)
-{
+static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     union { double value; unsigned long long bits; } shifted, a, b;
-
     // A sum of this size has no room for a fraction: it rounds to the integer n and holds it in its last bits.
     shifted.value = x*0.6366197723675814 + 6755399441055744.0;
     const double n = shifted.value - 6755399441055744.0;
     const double rest = x - n*1.5707963267923333, part = n*2.5633441515839558e-12;
     const double h = rest - part;
     const double l = ((rest - h) - part) - n*1.0562999066987428e-23;
-
     const double z = h*h, zz = z*z, hz = h*z, hzz = hz*z;
     const double half = 0.5*z, w = 1.0 - half;
     a.value = h + ((l*w - hz*0.16666666666666557) + (hzz*(0.008333333333309417 - z*0.00019841269821722923)
         + hzz*zz*((2.75573113801828e-06 - z*2.5050448285906677e-08) + zz*1.588101519049919e-10)));
     b.value = w + ((((1.0 - w) - half) - h*l) + (zz*(0.0416666666666666 - z*0.0013888888888874474)
         + zz*zz*((2.4801587289671544e-05 - z*2.7557314401035757e-07) + zz*(2.0875729282436057e-09 - z*1.1359934331481983e-11))));
-
     const unsigned long long exchange = (a.bits ^ b.bits) & (0u - (shifted.bits & 1u));
     a.bits ^= exchange ^ ((shifted.bits & 2u) << 62);
     b.bits ^= exchange ^ (((shifted.bits + 1u) & 2u) << 62);
@@ -98,8 +94,7 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine)
 #endif
 
 // Sines and cosines of n angles.
-static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines)
-{
+static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
     for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= SYMDYN_SMALL_ANGLE;
@@ -113,11 +108,9 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
 
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
 // in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = 1e-05.
-static int symdyn_multipliers(int n, int m, const double *in, double *lam)
-{
+static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
     const double *const rows = in + m*n, *const columns = rows + m, *const g = columns + n;
     double A[2][2], C[2][3], r[2] = { 0.0 };
-
     for (int k = 0; k < m; k++) {
         lam[k] = 0.0;
         for (int j = 0; j < n; j++)
@@ -141,7 +134,6 @@ static int symdyn_multipliers(int n, int m, const double *in, double *lam)
         for (int i = j + 1; i < m; i++)
             A[i][j] /= A[j][j];
     }
-
     // Later rounds leave in r what rounding has made of lam outside the range of C; it is taken off.
     for (int round = 0; round < 15; round++) {
         const int cleans = round >= 5, first = round % 5 == 0, last = round % 5 == 4;
@@ -174,13 +166,11 @@ static int symdyn_multipliers(int n, int m, const double *in, double *lam)
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
 // residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
-static int symdyn_saddle(int n, int m, const double *in, double *x)
-{
+static int symdyn_saddle(int n, int m, const double *in, double *x) {
     const double *const m_in = in + 1, *const c_in = m_in + n*(n + 1)/2, *const s = c_in + m*n, *const w = s + m;
     const double *const f = w + n, *const d = f + n;
     double M[3][3], A[3][3], C[2][3], rows[2] = { 0.0 }, columns[3], lighter[3];
     double r[3], lam[2], largest = 0.0;
-
     // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
     for (int i = 0; i < n; i++) {
         columns[i] = w[i]*w[i]*m_in[i*(i + 1)/2 + i];
@@ -204,7 +194,6 @@ static int symdyn_saddle(int n, int m, const double *in, double *x)
         for (int j = 0; j < n; j++)
             C[k][j] = rows[k]*columns[j]*c_in[k*n + j];
     }
-
     // A = M + a C^T C = L D L^T
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
@@ -226,7 +215,6 @@ static int symdyn_saddle(int n, int m, const double *in, double *x)
         for (int i = j + 1; i < n; i++)
             A[i][j] /= A[j][j];
     }
-
     for (int i = 0; i < n; i++)
         x[i] = 0.0;
     for (int round = 0; round < 5; round++) {
@@ -268,8 +256,8 @@ static int symdyn_saddle(int n, int m, const double *in, double *x)
 // Constants: everything that depends on parameters only; 30 operations, once per set of parameters.
 // p: 14 parameters; out: 9 constants.
 SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out);
-SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out)
-{
+SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out) {
+    (void)p, (void)out;
     const double m1 = p[1];
     const double lc1 = p[2];
     const double I1 = p[3];
@@ -309,8 +297,7 @@ SYMDYN_EXPORT int four_bar_prologue(const double *p, double *out)
 }
 
 // rhs where no constraint depends on the others: 160 operations (69 add, 2 div, 83 mul, 6 trig); longest chain 26.
-static int four_bar_rhs_regular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_rhs_regular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -429,8 +416,7 @@ static int four_bar_rhs_regular(const double *q, const double *u, const double *
 }
 
 // rhs where it does, or nearly so: 425 operations (39 add, 339 kernel, 41 mul, 6 trig); longest chain 12.
-static int four_bar_rhs_singular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_rhs_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -529,8 +515,7 @@ static int four_bar_rhs_singular(const double *q, const double *u, const double 
 // x_dot = f(t, x) with x = [q; u; z]: M_tilde u_dot = F_tilde - k_tilde
 // out: 6 numbers
 SYMDYN_EXPORT int four_bar_rhs(const double *q, const double *u, const double *p, const double *c, double *out);
-SYMDYN_EXPORT int four_bar_rhs(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+SYMDYN_EXPORT int four_bar_rhs(const double *q, const double *u, const double *p, const double *c, double *out) {
     const int code = four_bar_rhs_regular(q, u, p, c, out);
     return code ? four_bar_rhs_singular(q, u, p, c, out) : 0;
 }
@@ -539,8 +524,7 @@ SYMDYN_EXPORT int four_bar_rhs(const double *q, const double *u, const double *p
 // 19 operations (7 add, 6 mul, 6 trig); longest chain 6.
 // out: 2 numbers
 SYMDYN_EXPORT int four_bar_C(const double *q, const double *p, double *out);
-SYMDYN_EXPORT int four_bar_C(const double *q, const double *p, double *out)
-{
+SYMDYN_EXPORT int four_bar_C(const double *q, const double *p, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -579,8 +563,7 @@ SYMDYN_EXPORT int four_bar_C(const double *q, const double *p, double *out)
 // 22 operations (10 add, 6 mul, 6 trig); longest chain 6.
 // out: 2 x 3, row by row
 SYMDYN_EXPORT int four_bar_C_r(const double *q, const double *p, double *out);
-SYMDYN_EXPORT int four_bar_C_r(const double *q, const double *p, double *out)
-{
+SYMDYN_EXPORT int four_bar_C_r(const double *q, const double *p, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -623,8 +606,7 @@ SYMDYN_EXPORT int four_bar_C_r(const double *q, const double *p, double *out)
 // 29 operations (8 add, 15 mul, 6 trig); longest chain 6.
 // out: 2 numbers
 SYMDYN_EXPORT int four_bar_F_d(const double *q, const double *u, const double *p, double *out);
-SYMDYN_EXPORT int four_bar_F_d(const double *q, const double *u, const double *p, double *out)
-{
+SYMDYN_EXPORT int four_bar_F_d(const double *q, const double *u, const double *p, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -666,8 +648,7 @@ SYMDYN_EXPORT int four_bar_F_d(const double *q, const double *u, const double *p
 }
 
 // lam where no constraint depends on the others: 172 operations (73 add, 2 div, 91 mul, 6 trig); longest chain 26.
-static int four_bar_lam_regular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_lam_regular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -786,8 +767,7 @@ static int four_bar_lam_regular(const double *q, const double *u, const double *
 }
 
 // lam where it does, or nearly so: 709 operations (48 add, 605 kernel, 50 mul, 6 trig); longest chain 17.
-static int four_bar_lam_singular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_lam_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -895,15 +875,13 @@ static int four_bar_lam_singular(const double *q, const double *u, const double 
 // multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde
 // out: 2 numbers
 SYMDYN_EXPORT int four_bar_lam(const double *q, const double *u, const double *p, const double *c, double *out);
-SYMDYN_EXPORT int four_bar_lam(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+SYMDYN_EXPORT int four_bar_lam(const double *q, const double *u, const double *p, const double *c, double *out) {
     const int code = four_bar_lam_regular(q, u, p, c, out);
     return code ? four_bar_lam_singular(q, u, p, c, out) : 0;
 }
 
 // reactions where no constraint depends on the others: 272 operations (119 add, 2 div, 145 mul, 6 trig); longest chain 37.
-static int four_bar_reactions_regular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_reactions_regular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -1093,8 +1071,7 @@ static int four_bar_reactions_regular(const double *q, const double *u, const do
 }
 
 // reactions where it does, or nearly so: 805 operations (92 add, 605 kernel, 102 mul, 6 trig); longest chain 24.
-static int four_bar_reactions_singular(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+static int four_bar_reactions_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
     const double q3 = q[2];
@@ -1274,16 +1251,14 @@ static int four_bar_reactions_singular(const double *q, const double *u, const d
 // force and moment of every joint on its child, at the joint's point on it, n-frame
 // out: 4 x 6, row by row
 SYMDYN_EXPORT int four_bar_reactions(const double *q, const double *u, const double *p, const double *c, double *out);
-SYMDYN_EXPORT int four_bar_reactions(const double *q, const double *u, const double *p, const double *c, double *out)
-{
+SYMDYN_EXPORT int four_bar_reactions(const double *q, const double *u, const double *p, const double *c, double *out) {
     const int code = four_bar_reactions_regular(q, u, p, c, out);
     return code ? four_bar_reactions_singular(q, u, p, c, out) : 0;
 }
 
 // What a return code means.
 SYMDYN_EXPORT const char *four_bar_reason(int code);
-SYMDYN_EXPORT const char *four_bar_reason(int code)
-{
+SYMDYN_EXPORT const char *four_bar_reason(int code) {
     switch (code) {
     case 0: return "no fault";
     case -1: return "the result is not finite";
@@ -1295,8 +1270,7 @@ SYMDYN_EXPORT const char *four_bar_reason(int code)
 }
 
 // One call for many states: rows of t, of x = [q; u; z] (6), of ud (3), of inputs (0); strides are in rows, 0 repeats
-// the first row. Stops at the first fault (a result that is not finite
-// is one) and leaves its row in `failed`.
+// the first row. Stops at the first fault (a result that is not finite is one) and leaves its row in `failed`.
 typedef struct {
     long n;
     const double *t, *x, *ud, *inputs, *p, *c;
@@ -1307,99 +1281,74 @@ typedef struct {
 
 enum { four_bar_NOT_FINITE = -1 };
 
-static int four_bar_all_finite(const double *values, int n)
-{
+static int four_bar_all_finite(const double *values, int n) {
     for (int i = 0; i < n; i++)
         if (!(fabs(values[i]) <= 1.7976931348623157e308)) return 0;
     return 1;
 }
 
 SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_rhs(x, x + 3, frame->p, frame->c, frame->out + i * 6);
         if (!code && !four_bar_all_finite(frame->out + i * 6, 6)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
 
 SYMDYN_EXPORT int four_bar_C_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_C_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_C_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_C(x, frame->p, frame->out + i * 2);
         if (!code && !four_bar_all_finite(frame->out + i * 2, 2)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
 
 SYMDYN_EXPORT int four_bar_C_r_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_C_r_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_C_r_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_C_r(x, frame->p, frame->out + i * 6);
         if (!code && !four_bar_all_finite(frame->out + i * 6, 6)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
 
 SYMDYN_EXPORT int four_bar_F_d_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_F_d_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_F_d_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_F_d(x, x + 3, frame->p, frame->out + i * 2);
         if (!code && !four_bar_all_finite(frame->out + i * 2, 2)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
 
 SYMDYN_EXPORT int four_bar_lam_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_lam_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_lam_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_lam(x, x + 3, frame->p, frame->c, frame->out + i * 2);
         if (!code && !four_bar_all_finite(frame->out + i * 2, 2)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
 
 SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame);
-SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame)
-{
+SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         const double *x = frame->x + i * frame->x_stride * 6;
         int code = four_bar_reactions(x, x + 3, frame->p, frame->c, frame->out + i * 24);
         if (!code && !four_bar_all_finite(frame->out + i * 24, 24)) code = four_bar_NOT_FINITE;
-        if (code) {
-            frame->failed = i;
-            return code;
-        }
+        if (code) return frame->failed = i, code;
     }
     return 0;
 }
@@ -1420,332 +1369,279 @@ struct four_bar_problem {
 
 enum { four_bar_INPUT_STOPPED = 100000 };
 
-static int four_bar_field(const four_bar_problem *problem, double t, const double *x, double *xd)
-{
-    (void)t;
-    return four_bar_rhs(x, x + 3, problem->p, problem->c, xd);
+static int four_bar_field(const four_bar_problem *problem, double t, const double *x, double *out) {
+    (void)problem, (void)t, (void)x;
+    return four_bar_rhs(x, x + 3, problem->p, problem->c, out);
 }
 
-/* ---- Dormand-Prince 8(5,3) ---------------------------------------------------------------
+// ---- Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
+// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
+// Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
+// error estimate, p. 254). The coefficients are those of the authors' code DOP853.
+// Nothing is allocated and nothing is global: a run lives in one struct, and a run that was interrupted continues to the same
+// bits as one that was not.
 
-   Explicit Runge-Kutta method of order 8 with error estimates of orders 5 and 3 and a
-   continuous extension of order 7.
-
-   E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff
-   Problems, 2nd ed., Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense
-   output, p. 194), II.10 (method and error estimate, p. 254). The coefficients are those of
-   the authors' code DOP853.
-
-   Nothing is allocated and nothing is global: a run lives in one struct, and a run that was
-   interrupted continues to the same bits as one that was not. */
-
-enum four_bar_dop853_status {
-    four_bar_DOP853_DONE = 0,             /* t_end is reached */
-    four_bar_DOP853_STEP_LIMIT = 1,       /* under way: call again to continue */
-    four_bar_DOP853_STORE_FULL = 2,       /* no room for the next step: call again with room */
-    /* failures are negative, and final but for BAD_OUTPUT_TIME */
-    four_bar_DOP853_FIELD_FAILED = -1,    /* right-hand side refused, even at the smallest step */
-    four_bar_DOP853_STEP_TOO_SMALL = -2,  /* tolerance not met, even at the smallest step */
-    four_bar_DOP853_NOT_FINITE = -3,      /* NaN or Inf, even at the smallest step */
-    four_bar_DOP853_BAD_ARGUMENT = -4,    /* start: a time, state, tolerance or step makes no sense */
-    four_bar_DOP853_BAD_OUTPUT_TIME = -5  /* a requested time lies before the latest step */
+enum {
+    // t_end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event
+    four_bar_dop853_DONE = 0, four_bar_dop853_STEP_LIMIT = 1, four_bar_dop853_STORE_FULL = 2, four_bar_dop853_STOPPED = 3,
+    // Failures are negative, and final but for BAD_OUTPUT_TIME. Even at the smallest step:
+    four_bar_dop853_FIELD_FAILED = -1,      // right-hand side refused
+    four_bar_dop853_STEP_TOO_SMALL = -2,    // tolerance not met
+    four_bar_dop853_NOT_FINITE = -3,        // NaN or Inf
+    four_bar_dop853_BAD_ARGUMENT = -4,      // start: a time, state, tolerance or step makes no sense
+    four_bar_dop853_BAD_OUTPUT_TIME = -5,   // a requested time lies before the latest step
+    four_bar_dop853_PROJECTION_FAILED = -6  // even at the smallest step, no way back onto the constraints
 };
 
 typedef struct four_bar_dop853 {
-    double t;                    /* present time */
-    double t_low;                /* what rounding has cut off t: the time is t + t_low */
-    double t_end;                /* where the run ends, hit exactly */
-    double direction;            /* +1 or -1: sign of t_end - t0 (0 if they are equal) */
-    double t_slack;              /* requested times closer than this to an end count as the end */
-    double h;                    /* length >= 0 of the step to be tried next */
-    double h_max;                /* longest step (the last one may be 1 % longer) */
-    double h_floor;              /* shortest step near t = 0; elsewhere it is 16 ulp of t */
-    double rtol;                 /* tolerated error of a step: atol[i] + rtol*|x[i]| ... */
-    double atol[6];              /* ... in the root mean square over the states */
-    double root_old;             /* error of the latest accepted step (tolerated: 1) to the 1/8 */
-    double x[6];                 /* state at t */
-    double xd[6];                /* its derivative, the first stage of the next step */
-    double t_old;                /* start of the latest accepted step */
-    double h_old;                /* its length, with sign */
-    double x_old[6];             /* state at t_old */
-    double k[16][6];             /* stages of the latest step; k[12] at its end, k[13..15] dense */
-    double dense[7][6];          /* polynomial of the latest step, if dense_ready */
-    int dense_ready;
-    int unstored;                /* run_steps has not stored (t, x) yet */
-    int rejected;                /* the latest attempt was rejected: do not lengthen the step */
-    long n_steps;                /* accepted steps */
-    long n_rejected;             /* attempts given up: error too large, field failed, not finite */
-    long n_evaluations;          /* calls of the right-hand side */
-    int status;                  /* DONE, STEP_LIMIT (under way) or a failure */
-    /* The latest evaluation that failed. A smaller step may have got round it: it is why the
-       run failed only if status is FIELD_FAILED or NOT_FINITE. */
-    int reason;                  /* what the right-hand side returned, 0 if it was not finite */
-    long bad_index;              /* first state with x or xd not finite, else -1 */
-    double t_fail;               /* time of that evaluation */
-    double x_fail[6];            /* state of that evaluation */
+    double t, t_low;             // present time, and what rounding has cut off it: the time is t + t_low
+    double t_end, direction;     // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
+    double t_slack, h_floor;     // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
+    double h, h_max;             // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double rtol, atol[6];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;             // error of the latest accepted step (tolerated: 1) to the 1/8
+    double x[6], xd[6];          // state at t and its derivative
+    double t_old, h_old, x_old[6];  // start of the latest accepted step, its length, with sign, the state there
+    int dense_ready, unstored;   // what is needed within the latest step is prepared; (t, x) is not stored yet
+    int rejected, status;        // the latest attempt was rejected: do not lengthen the step
+    long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
+    // The latest evaluation that failed; the run did because of it if status says so, else a smaller step got round it. reason:
+    // what a function returned, 0 if results were not finite or a correction went too far. bad_index: the first state that is
+    // not finite, or the constraint with the largest residual; else -1.
+    int reason;
+    long bad_index;
+    double t_fail, x_fail[6];
+    double k[16][6];  // stages of the latest step; k[12] at its end
+    double dense[7][6];  // polynomial of the latest step, if dense_ready
 } four_bar_dop853;
 
-/* Prepare a run from (t0, x0) to t_end; t_end < t0 integrates backward. atol[6].
-   h_first: length of the first step, 0: chosen. h_max: longest step, 0: no bound.
-   Returns 0, or a failure (also kept in run->status). */
-int four_bar_dop853_start(
-    four_bar_dop853 *run, const four_bar_problem *problem, double t0, double t_end,
-    const double *x0, double rtol, const double *atol, double h_first, double h_max);
+static const double four_bar_dop853_eps = 2.220446049250313e-16, four_bar_dop853_huge = 1.7976931348623157e308;
 
-/* Continue by at most max_steps attempted steps and write the states at the requested times
-   t_out[*n_written .. n_out) as they are passed, to the rows of x_out[n_out][6]. t_out is
-   sorted in the direction of integration. Times beyond t_end are never served, so that
-   *n_written < n_out then. Returns a status. */
-int four_bar_dop853_run(
-    four_bar_dop853 *run, const four_bar_problem *problem, long max_steps,
-    const double *t_out, long n_out, double *x_out, long *n_written);
-
-/* The same, but append the start and the end of every accepted step to t_steps[capacity] and
-   x_steps[capacity][6]. A step for which STORE_FULL left no room is stored first by the
-   next call. */
-int four_bar_dop853_run_steps(
-    four_bar_dop853 *run, const four_bar_problem *problem, long max_steps,
-    double *t_steps, double *x_steps, long capacity, long *n_written);
-
-static const double four_bar_dop853_eps = 2.220446049250313e-16;
-static const double four_bar_dop853_huge = 1.7976931348623157e308;
-
-/* Evaluate the right-hand side at (t, y) into xd. Returns 0 or the failure, and records it.
-   The only call of the field, so that it can be inlined whatever its size. */
-static int four_bar_dop853_eval(
-    four_bar_dop853 *run, const four_bar_problem *problem, double t, const double *y, double *xd)
-{
-    int i, bad = 0, reason;
-
-    run->n_evaluations++;
-    reason = four_bar_field(problem, t, y, xd);
-    for (i = 0; i < 6; i++)  /* comparisons with NaN are false */
-        bad |= !(fabs(y[i]) <= four_bar_dop853_huge) | !(fabs(xd[i]) <= four_bar_dop853_huge);
-    if (reason == 0 && !bad)
-        return 0;
-
-    run->reason = reason;
-    run->bad_index = -1;
-    run->t_fail = t;
-    for (i = 6 - 1; i >= 0; i--) {
-        run->x_fail[i] = y[i];
-        if (reason == 0 && !(fabs(y[i]) <= four_bar_dop853_huge && fabs(xd[i]) <= four_bar_dop853_huge))
-            run->bad_index = i;
-    }
-    return reason != 0 ? four_bar_DOP853_FIELD_FAILED : four_bar_DOP853_NOT_FINITE;
+// Record a failure; returns its status.
+static int four_bar_dop853_fail(four_bar_dop853 *run, int status, int reason, long bad_index, double t, const double *x) {
+    run->reason = reason, run->bad_index = bad_index, run->t_fail = t;
+    for (int i = 0; i < 6; i++) run->x_fail[i] = x[i];
+    return status;
 }
 
-/* ---- The method --------------------------------------------------------------------------
-   k[j] is the book's k_(j+1). */
+// Evaluate the right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that it can be inlined
+// whatever its size.
+static int four_bar_dop853_eval(four_bar_dop853 *run, const four_bar_problem *problem, double t, const double *y, double *xd) {
+    int bad = 0, first = 0;
+    run->n_evaluations++;
+    const int reason = four_bar_field(problem, t, y, xd);
+    for (int i = 0; i < 6; i++) bad |= !(fabs(y[i]) <= four_bar_dop853_huge) | !(fabs(xd[i]) <= four_bar_dop853_huge);  // comparisons with NaN are false
+    if (!reason && !bad) return 0;
+    while (!reason && fabs(y[first]) <= four_bar_dop853_huge && fabs(xd[first]) <= four_bar_dop853_huge) first++;
+    return four_bar_dop853_fail(run, reason ? four_bar_dop853_FIELD_FAILED : four_bar_dop853_NOT_FINITE, reason, reason ? -1 : first, t, y);
+}
 
-/* Try the step of length h (with sign) from run->t to t_new: the state there and the error
-   relative to the tolerance. Returns 0 or the failure of an evaluation. */
-static int four_bar_dop853_stages(
-    four_bar_dop853 *run, const four_bar_problem *problem, double h, double t_new,
-    double *restrict x_new, double *restrict err)
-{
+// One over the tolerated error of state i in a step from run->x to x_new; finite also for x = 0 without atol.
+static inline double four_bar_dop853_scale(const four_bar_dop853 *run, int i, double x_new) {
+    const double size = fabs(run->x[i]) > fabs(x_new) ? fabs(run->x[i]) : fabs(x_new);
+    return 1.0/(run->atol[i] + run->rtol*size + 1e-300);
+}
+
+// v^(1/8)
+static inline double four_bar_dop853_root(double v) {
+    return sqrt(sqrt(sqrt(v)));
+}
+
+static int four_bar_dop853_begin(four_bar_dop853 *run, const four_bar_problem *problem) {
+    (void)run, (void)problem;
+    return 0;
+}
+
+// The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
+static int four_bar_dop853_try(four_bar_dop853 *run, const four_bar_problem *problem, double h, double t_new,
+    double *restrict x_new, double *restrict xd_new, double *restrict err) {
     const double t = run->t;
     const double *restrict const x = run->x;
     double (*restrict const k)[6] = run->k;
-    double y[6], sum5 = 0.0, sum3 = 0.0, sum;
-    int i, failure;
-
-    for (i = 0; i < 6; i++)
-        k[0][i] = run->xd[i];
-    for (i = 0; i < 6; i++)
+    double y[6], sum = 0.0, sum2 = 0.0;
+    int failure;
+    for (int i = 0; i < 6; i++) k[0][i] = run->xd[i];
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.05260015195876773*k[0][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.05260015195876773*h, y, k[1]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.0197250569845379*k[0][i] + 0.0591751709536137*k[1][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.0789002279381516*h, y, k[2]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.02958758547680685*k[0][i] + 0.08876275643042054*k[2][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.1183503419072274*h, y, k[3]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.2413651341592667*k[0][i] - 0.8845494793282861*k[2][i] + 0.924834003261792*k[3][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.2816496580927726*h, y, k[4]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.037037037037037035*k[0][i] + 0.17082860872947386*k[3][i] + 0.12546768756682242*k[4][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.3333333333333333*h, y, k[5]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.037109375*k[0][i] + 0.17025221101954405*k[3][i] + 0.06021653898045596*k[4][i]
             - 0.017578125*k[5][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.25*h, y, k[6]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.03709200011850479*k[0][i] + 0.17038392571223998*k[3][i] + 0.10726203044637328*k[4][i]
             - 0.015319437748624402*k[5][i] + 0.008273789163814023*k[6][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.3076923076923077*h, y, k[7]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.6241109587160757*k[0][i] - 3.3608926294469414*k[3][i] - 0.868219346841726*k[4][i]
             + 27.59209969944671*k[5][i] + 20.154067550477894*k[6][i] - 43.48988418106996*k[7][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.6512820512820513*h, y, k[8]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.47766253643826434*k[0][i] - 2.4881146199716677*k[3][i] - 0.590290826836843*k[4][i]
             + 21.230051448181193*k[5][i] + 15.279233632882423*k[6][i] - 33.28821096898486*k[7][i]
             - 0.020331201708508627*k[8][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.6*h, y, k[9]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(-0.9371424300859873*k[0][i] + 5.186372428844064*k[3][i] + 1.0914373489967295*k[4][i]
             - 8.149787010746927*k[5][i] - 18.52006565999696*k[6][i] + 22.739487099350505*k[7][i]
             + 2.4936055526796523*k[8][i] - 3.0467644718982196*k[9][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.8571428571428571*h, y, k[10]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(2.273310147516538*k[0][i] - 10.53449546673725*k[3][i] - 2.0008720582248625*k[4][i]
             - 17.9589318631188*k[5][i] + 27.94888452941996*k[6][i] - 2.8589982771350235*k[7][i]
             - 8.87285693353063*k[8][i] + 12.360567175794303*k[9][i] + 0.6433927460157636*k[10][i]);
     failure = four_bar_dop853_eval(run, problem, t_new, y, k[11]);
-    if (failure != 0)
-        return failure;
-
-    /* The solution of order 8, and the error from its differences to orders 5 and 3 (p. 254) */
-    for (i = 0; i < 6; i++) {
+    if (failure) return failure;
+    (void)xd_new;
+    for (int i = 0; i < 6; i++) {
         const double slope = 0.054293734116568765*k[0][i] + 4.450312892752409*k[5][i] + 1.8915178993145003*k[6][i]
             - 5.801203960010585*k[7][i] + 0.3111643669578199*k[8][i] - 0.1521609496625161*k[9][i]
             + 0.20136540080403034*k[10][i] + 0.04471061572777259*k[11][i];
-        const double e5 = 0.01312004499419488*k[0][i] - 1.2251564463762044*k[5][i] - 0.4957589496572502*k[6][i]
+        const double e = 0.01312004499419488*k[0][i] - 1.2251564463762044*k[5][i] - 0.4957589496572502*k[6][i]
             + 1.6643771824549864*k[7][i] - 0.35032884874997366*k[8][i] + 0.3341791187130175*k[9][i]
             + 0.08192320648511571*k[10][i] - 0.022355307863886294*k[11][i];
-        const double e3 = slope - 0.2440944881889764*k[0][i] - 0.7338466882816118*k[8][i]
-            - 0.022058823529411766*k[11][i];
-        double size, scale;
+        const double e2 = slope -0.2440944881889764*k[0][i] - 0.7338466882816118*k[8][i] - 0.022058823529411766*k[11][i];
 
         x_new[i] = x[i] + h*slope;
-        size = fabs(x[i]) > fabs(x_new[i]) ? fabs(x[i]) : fabs(x_new[i]);
-        scale = 1.0/(run->atol[i] + run->rtol*size + 1e-300);  /* not 0: x = 0 without atol */
-        sum5 += (e5*scale)*(e5*scale);
-        sum3 += (e3*scale)*(e3*scale);
+        const double scale = four_bar_dop853_scale(run, i, x_new[i]);
+        sum += (e*scale)*(e*scale);
+        sum2 += (e2*scale)*(e2*scale);
     }
-    sum = sum5 + 0.01*sum3;
-    *err = sum > 0.0 ? fabs(h)*sum5/sqrt(sum*6.0) : 0.0;
+    sum2 = sum + 0.01*sum2;
+    *err = sum2 > 0.0 ? fabs(h)*sum/sqrt(sum2*6.0) : 0.0;
     return 0;
 }
 
-/* Polynomial of order 7 over the latest step, by three more evaluations (p. 194) */
-static int four_bar_dop853_dense(four_bar_dop853 *run, const four_bar_problem *problem)
-{
-    const double t = run->t_old, h = run->h_old;
+// The state at s within the latest step.
+static int four_bar_dop853_between(four_bar_dop853 *run, const four_bar_problem *problem, double s, double *x_out) {
+    const double t = run->t_old, h = run->h_old, theta = (s - t)/h, rest = 1.0 - theta;
     const double *restrict const x = run->x_old;
-    double (*restrict const k)[6] = run->k;
-    double y[6];
-    int i, failure;
-
-    for (i = 0; i < 6; i++)
+    double (*restrict const k)[6] = run->k, (*restrict const d)[6] = run->dense;
+    if (!run->dense_ready) {
+        double y[6];
+        int failure;
+        for (int i = 0; i < 6; i++) k[12][i] = run->xd[i];
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.056167502283047954*k[0][i] + 0.25350021021662483*k[6][i] - 0.2462390374708025*k[7][i]
             - 0.12419142326381637*k[8][i] + 0.15329179827876568*k[9][i] + 0.00820105229563469*k[10][i]
             + 0.007567897660545699*k[11][i] - 0.008298*k[12][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.1*h, y, k[13]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(0.03183464816350214*k[0][i] + 0.028300909672366776*k[5][i] + 0.053541988307438566*k[6][i]
             - 0.05492374857139099*k[7][i] - 0.00010834732869724932*k[10][i] + 0.0003825710908356584*k[11][i]
             - 0.00034046500868740456*k[12][i] + 0.1413124436746325*k[13][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.2*h, y, k[14]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++)
+    if (failure) return failure;
+    for (int i = 0; i < 6; i++)
         y[i] = x[i] + h*(-0.42889630158379194*k[0][i] - 4.697621415361164*k[5][i] + 7.683421196062599*k[6][i]
             + 4.06898981839711*k[7][i] + 0.3567271874552811*k[8][i] - 0.0013990241651590145*k[12][i]
             + 2.9475147891527724*k[13][i] - 9.15095847217987*k[14][i]);
     failure = four_bar_dop853_eval(run, problem, t + 0.7777777777777778*h, y, k[15]);
-    if (failure != 0)
-        return failure;
-    for (i = 0; i < 6; i++) {
-        const double dx = run->x[i] - x[i];
-
-        run->dense[0][i] = dx;
-        run->dense[1][i] = h*k[0][i] - dx;
-        run->dense[2][i] = 2.0*dx - h*(k[0][i] + k[12][i]);
-        run->dense[3][i] = h*(-8.428938276109013*k[0][i] + 0.5667149535193777*k[5][i] - 3.0689499459498917*k[6][i]
+    if (failure) return failure;
+        for (int i = 0; i < 6; i++) {
+            const double dx = run->x[i] - x[i];
+            d[0][i] = dx;
+            d[1][i] = h*k[0][i] - dx;
+            d[2][i] = 2.0*dx - h*(k[0][i] + k[12][i]);
+            d[3][i] = h*(-8.428938276109013*k[0][i] + 0.5667149535193777*k[5][i] - 3.0689499459498917*k[6][i]
             + 2.38466765651207*k[7][i] + 2.117034582445028*k[8][i] - 0.871391583777973*k[9][i]
             + 2.2404374302607883*k[10][i] + 0.6315787787694688*k[11][i] - 0.08899033645133331*k[12][i]
             + 18.148505520854727*k[13][i] - 9.194632392478356*k[14][i] - 4.436036387594894*k[15][i]);
-        run->dense[4][i] = h*(10.427508642579134*k[0][i] + 242.28349177525817*k[5][i] + 165.20045171727028*k[6][i]
+            d[4][i] = h*(10.427508642579134*k[0][i] + 242.28349177525817*k[5][i] + 165.20045171727028*k[6][i]
             - 374.5467547226902*k[7][i] - 22.113666853125306*k[8][i] + 7.733432668472264*k[9][i]
             - 30.674084731089398*k[10][i] - 9.332130526430229*k[11][i] + 15.697238121770845*k[12][i]
             - 31.139403219565178*k[13][i] - 9.35292435884448*k[14][i] + 35.81684148639408*k[15][i]);
-        run->dense[5][i] = h*(19.985053242002433*k[0][i] - 387.0373087493518*k[5][i] - 189.17813819516758*k[6][i]
+            d[5][i] = h*(19.985053242002433*k[0][i] - 387.0373087493518*k[5][i] - 189.17813819516758*k[6][i]
             + 527.8081592054236*k[7][i] - 11.57390253995963*k[8][i] + 6.8812326946963*k[9][i]
             - 1.0006050966910838*k[10][i] + 0.7777137798053443*k[11][i] - 2.778205752353508*k[12][i]
             - 60.19669523126412*k[13][i] + 84.32040550667716*k[14][i] + 11.99229113618279*k[15][i]);
-        run->dense[6][i] = h*(-25.69393346270375*k[0][i] - 154.18974869023643*k[5][i] - 231.5293791760455*k[6][i]
+            d[6][i] = h*(-25.69393346270375*k[0][i] - 154.18974869023643*k[5][i] - 231.5293791760455*k[6][i]
             + 357.6391179106141*k[7][i] + 93.40532418362432*k[8][i] - 37.45832313645163*k[9][i]
             + 104.0996495089623*k[10][i] + 29.8402934266605*k[11][i] - 43.53345659001114*k[12][i]
             + 96.32455395918828*k[13][i] - 39.17726167561544*k[14][i] - 149.72683625798564*k[15][i]);
+        }
+        run->dense_ready = 1;
     }
-    run->dense_ready = 1;
+    (void)problem;
+    for (int i = 0; i < 6; i++)
+        x_out[i] = x[i] + theta*(d[0][i] + rest*(d[1][i] + theta*(d[2][i] + rest*(d[3][i] + theta*(d[4][i] + rest*(d[5][i] + theta*d[6][i]))))));
     return 0;
 }
 
-/* ---- Step control ------------------------------------------------------------------------ */
-
-/* v^(1/8), without pow */
-static double four_bar_dop853_root8(double v)
-{
-    return sqrt(sqrt(sqrt(v)));
+// The state at s within the latest step, on the constraints. Returns 0 or a failure.
+static int four_bar_dop853_state_at(four_bar_dop853 *run, const four_bar_problem *problem, double s, double *x) {
+    int failure;
+    if (!run->dense_ready && run->rejected) return four_bar_dop853_BAD_OUTPUT_TIME;  // stages are those of an attempt from t
+    if ((failure = four_bar_dop853_between(run, problem, s, x))) return failure;
+    return 0;
 }
 
-/* Length of the first step (p. 169), from the size of the state, its derivative and
-   the change of the derivative over a small Euler step */
-static double four_bar_dop853_first_step(four_bar_dop853 *run, const four_bar_problem *problem)
-{
+// Length of the first step (Hairer, Norsett, Wanner, section II.4), from the size of the state, its derivative and the change of
+// the derivative over a small Euler step.
+static double four_bar_dop853_first_step(four_bar_dop853 *run, const four_bar_problem *problem) {
     const double span = fabs(run->t_end - run->t);
     double d0 = 0.0, d1 = 0.0, d2 = 0.0, h0, h1, y[6], yd[6], scale[6];
-    int i;
-
-    for (i = 0; i < 6; i++) {
+    for (int i = 0; i < 6; i++) {
         const double tolerated = run->atol[i] + run->rtol*fabs(run->x[i]);
-
-        scale[i] = tolerated > 0.0 ? 1.0/tolerated : 0.0;  /* x = 0 without atol: no say */
+        scale[i] = tolerated > 0.0 ? 1.0/tolerated : 0.0;  // x = 0 without atol: no say
         d0 += run->x[i]*scale[i]*run->x[i]*scale[i]/6.0;
         d1 += run->xd[i]*scale[i]*run->xd[i]*scale[i]/6.0;
     }
-    d0 = sqrt(d0);
-    d1 = sqrt(d1);
+    d0 = sqrt(d0), d1 = sqrt(d1);
     h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01*d0/d1;
     h0 = h0 <= span ? h0 : span;
-    for (i = 0; i < 6; i++)
-        y[i] = run->x[i] + run->direction*h0*run->xd[i];
-    if (four_bar_dop853_eval(run, problem, run->t + run->direction*h0, y, yd) != 0)
-        return h0;  /* the step control will find a way round */
-    for (i = 0; i < 6; i++)
-        d2 += (yd[i] - run->xd[i])*scale[i]*(yd[i] - run->xd[i])*scale[i]/6.0;
+    for (int i = 0; i < 6; i++) y[i] = run->x[i] + run->direction*h0*run->xd[i];
+    if (four_bar_dop853_eval(run, problem, run->t + run->direction*h0, y, yd)) return h0;  // the step control will find a way round
+    for (int i = 0; i < 6; i++) d2 += (yd[i] - run->xd[i])*scale[i]*(yd[i] - run->xd[i])*scale[i]/6.0;
     d2 = sqrt(d2)/h0;
-    if (d1 <= 1e-15 && d2 <= 1e-15)
-        h1 = h0*1e-3 > 1e-6 ? h0*1e-3 : 1e-6;
-    else
-        h1 = four_bar_dop853_root8(0.01/(d1 > d2 ? d1 : d2));
+    if (d1 <= 1e-15 && d2 <= 1e-15) h1 = h0*1e-3 > 1e-6 ? h0*1e-3 : 1e-6;
+    else h1 = four_bar_dop853_root(0.01/(d1 > d2 ? d1 : d2));
     return h1 < 100.0*h0 ? h1 : 100.0*h0;
 }
 
-int four_bar_dop853_start(
-    four_bar_dop853 *run, const four_bar_problem *problem, double t0, double t_end,
-    const double *x0, double rtol, const double *atol, double h_first, double h_max)
-{
+// Go on from (t, x), projected, as at a start. h_first: length of the first step, 0: chosen. Returns 0 or a failure.
+static int four_bar_dop853_restart(four_bar_dop853 *run, const four_bar_problem *problem, double t, const double *x, double h_first) {
+    run->t = run->t_old = t;
+    run->t_low = 0.0, run->root_old = 0.316;
+    run->unstored = 1, run->dense_ready = run->rejected = 0;
+    for (int i = 0; i < 6; i++) run->x[i] = run->x_old[i] = x[i];
+    if (t == run->t_end) return run->status = four_bar_dop853_DONE;
+    if ((run->status = four_bar_dop853_eval(run, problem, t, run->x, run->xd))) return run->status;
+    run->h = h_first > 0.0 ? h_first : four_bar_dop853_first_step(run, problem);
+    if ((run->status = four_bar_dop853_begin(run, problem))) return run->status;
+    run->status = four_bar_dop853_STEP_LIMIT;
+    return 0;
+}
+
+// See simulation_start.
+static int four_bar_dop853_start(four_bar_dop853 *run, const four_bar_problem *problem, const double *told, const double *x0, const double *atol) {
+    const double t0 = told[0], t_end = told[1], rtol = told[2], h_first = told[3], h_max = told[4];
     const double span = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const four_bar_dop853 empty;
-    int i, bad;
-
+    int bad = !(span <= four_bar_dop853_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
     *run = empty;
     run->t = run->t_old = t0;
     run->t_end = t_end;
@@ -1753,172 +1649,102 @@ int four_bar_dop853_start(
     run->t_slack = 8.0*four_bar_dop853_eps*far;
     run->h_floor = four_bar_dop853_eps*four_bar_dop853_eps*span;
     run->h_max = h_max > 0.0 ? h_max : span;
-    run->rtol = rtol;
-    run->root_old = 0.316;
-    run->unstored = 1;
-    run->bad_index = -1;
-    bad = !(span <= four_bar_dop853_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
-    for (i = 0; i < 6; i++) {
+    run->rtol = rtol, run->unstored = 1, run->bad_index = -1;
+    for (int i = 0; i < 6; i++) {
         run->atol[i] = atol[i];
         run->x[i] = run->x_old[i] = x0[i];
         bad |= !(fabs(x0[i]) <= four_bar_dop853_huge) | !(atol[i] >= 0.0) | !(atol[i] + rtol > 0.0);
     }
-    if (bad)
-        return run->status = four_bar_DOP853_BAD_ARGUMENT;
-    if (t_end == t0)
-        return run->status = four_bar_DOP853_DONE;
-    run->status = four_bar_dop853_eval(run, problem, t0, run->x, run->xd);
-    if (run->status != 0)
-        return run->status;
-    run->status = four_bar_DOP853_STEP_LIMIT;
-    run->h = h_first > 0.0 ? h_first : four_bar_dop853_first_step(run, problem);
-    return 0;
+    return bad ? (run->status = four_bar_dop853_BAD_ARGUMENT) : four_bar_dop853_restart(run, problem, t0, x0, h_first);
 }
 
-/* Try one step. Accepted, it moves (t, x) on; else the next one to be tried is shorter. Sets
-   run->status if t_end is reached or if there is no shorter step. */
-static void four_bar_dop853_attempt(four_bar_dop853 *run, const four_bar_problem *problem)
-{
-    const double rest = fabs((run->t_end - run->t) - run->t_low);
-    double h_min = 16.0*four_bar_dop853_eps*fabs(run->t), h = run->h, x_new[6];
-    double t_new, t_low = 0.0, err = 0.0, grow, root;
-    int i, failure;
+// A step that is tried: its length with sign, the shortest one, its end, roots of its error and of the one before.
+typedef struct {
+    double h, h_min, t_new, t_low, root, pull;
+    int crossing;
+} four_bar_dop853_step;
 
+// The step to be tried next.
+static void four_bar_dop853_propose(const four_bar_dop853 *run, four_bar_dop853_step *step) {
+    const double rest = fabs((run->t_end - run->t) - run->t_low);
+    double h_min = 16.0*four_bar_dop853_eps*fabs(run->t), h = run->h;
     h_min = h_min > run->h_floor ? h_min : run->h_floor;
     h = h < run->h_max ? h : run->h_max;
     h = h > h_min ? h : h_min;
+    step->t_low = 0.0, step->crossing = 0;
     if (1.01*h >= rest) {
         h = run->direction*rest;
-        t_new = run->t_end;
+        step->t_new = run->t_end;
     } else {
-        double step, back;
-
-        if (2.0*h > rest)  /* two equal steps, not a whole one and a bit */
-            h = 0.5*rest;
+        if (2.0*h > rest) h = 0.5*rest;  // two equal steps, not a whole one and a bit
         h *= run->direction;
-        step = h + run->t_low;  /* two-sum: the rounding error of t does not build up */
-        t_new = run->t + step;
-        back = t_new - run->t;
-        t_low = (run->t - (t_new - back)) + (step - back);
+        const double way = h + run->t_low, t_new = run->t + way;  // two-sum: the rounding error of t does not build up
+        const double back = t_new - run->t;
+        step->t_low = (run->t - (t_new - back)) + (way - back);
+        step->t_new = t_new;
     }
-
-    failure = four_bar_dop853_stages(run, problem, h, t_new, x_new, &err);
-    if (failure == 0 && err <= 1.0)
-        failure = four_bar_dop853_eval(run, problem, t_new, x_new, run->k[12]);
-    root = four_bar_dop853_root8(err > 1e-8 ? err : 1e-8);
-
-    if (failure != 0 || !(err <= 1.0)) {
-        run->n_rejected++;
-        run->rejected = 1;
-        if (fabs(h) <= h_min)
-            run->status = failure != 0 ? failure : four_bar_DOP853_STEP_TOO_SMALL;
-        grow = failure != 0 || !(err <= four_bar_dop853_huge) ? 0.25 : 0.85/root;
-        run->h = fabs(h)*(grow > 0.2 ? grow : 0.2);
-        return;
-    }
-
-    /* PI control (section IV.2 of volume II): h*0.85*err^(-1/8)*err_old^(1/32), all by square
-       roots. Measured against the usual h*0.9*err^(-1/8), at equal error: 7 % fewer evaluations
-       for double pendulums (3 % by the second factor), 1 % more for Kepler orbits. */
-    grow = 0.85/root*sqrt(sqrt(run->root_old));
-    grow = grow < 6.0 ? grow : 6.0;
-    grow = grow > 0.333 ? grow : 0.333;
-    run->h = fabs(h)*(run->rejected && grow > 1.0 ? 1.0 : grow);
-    run->root_old = root > 0.316 ? root : 0.316;
-
-    run->t_old = run->t;
-    run->h_old = h;
-    run->t = t_new;
-    run->t_low = t_low;
-    for (i = 0; i < 6; i++) {
-        run->x_old[i] = run->x[i];
-        run->x[i] = x_new[i];
-        run->xd[i] = run->k[12][i];
-    }
-    run->n_steps++;
-    run->rejected = 0;
-    run->dense_ready = 0;
-    run->unstored = 1;
-    if (run->t == run->t_end)
-        run->status = four_bar_DOP853_DONE;
+    step->h = h, step->h_min = h_min;
 }
 
-/* ---- Runs -------------------------------------------------------------------------------- */
+// What becomes of a step, by its error or failure: accepted, it moves (t, x) on; else the next one to be tried is shorter.
+static void four_bar_dop853_judge(four_bar_dop853 *run, const four_bar_dop853_step *step, int failure, double err, const double *x_new, const double *xd_new) {
+    const double h = fabs(step->h);
+    double grow;
+    if (failure || !(err <= 1.0)) {
+        run->n_rejected++;
+        run->rejected = 1;
+        if (h <= step->h_min) run->status = failure ? failure : four_bar_dop853_STEP_TOO_SMALL;
+        grow = failure || !(err <= four_bar_dop853_huge) ? 0.25 : 0.85/step->root;
+        run->h = h*(grow > 0.2 ? grow : 0.2);
+        return;
+    }
+    // PI control (Hairer and Wanner, volume II, section IV.2): h*0.85*err^(-1/8)*err_old^(1/32). Measured for
+    // order 8 against h*0.9*err^(-1/8), at equal error: 7 % fewer evaluations for double pendulums, 1 % more for Kepler orbits.
+    grow = 0.85/step->root*step->pull;
+    grow = grow < 6.0 ? grow : 6.0;
+    grow = grow > 0.333 ? grow : 0.333;
+    run->h = h*(run->rejected && grow > 1.0 ? 1.0 : grow);
+    run->root_old = step->root > 0.316 ? step->root : 0.316;
+    run->t_old = run->t, run->h_old = step->h;
+    run->t = step->t_new, run->t_low = step->t_low;
+    for (int i = 0; i < 6; i++) {
+        run->x_old[i] = run->x[i];
+        run->x[i] = x_new[i], run->xd[i] = xd_new[i];
+    }
+    run->n_steps++;
+    run->rejected = run->dense_ready = 0, run->unstored = 1;
+    if (run->t == run->t_end) run->status = four_bar_dop853_DONE;
+}
 
-/* Write the requested times that are passed by now; returns 0 or a failure. */
-static int four_bar_dop853_serve(
-    four_bar_dop853 *run, const four_bar_problem *problem,
-    const double *t_out, long n_out, double *x_out, long *n_written)
-{
+// Try one step. Sets run->status if t_end is reached or if there is no shorter step.
+static void four_bar_dop853_attempt(four_bar_dop853 *run, const four_bar_problem *problem) {
+    double x_new[6], xd_new[6], err = 0.0;
+    four_bar_dop853_step step;
+    four_bar_dop853_propose(run, &step);
+    int failure = four_bar_dop853_try(run, problem, step.h, step.t_new, x_new, xd_new, &err);
+    if (failure == 0 && err <= 1.0) failure = four_bar_dop853_eval(run, problem, step.t_new, x_new, xd_new);
+    step.root = four_bar_dop853_root(err > 1e-8 ? err : 1e-8);
+    step.pull = sqrt(sqrt(run->root_old));
+    four_bar_dop853_judge(run, &step, failure, err, x_new, xd_new);
+}
+
+// Write the requested times that are passed by now; returns 0 or a failure.
+static int four_bar_dop853_serve(four_bar_dop853 *run, const four_bar_problem *problem, const double *t_out, long n_out, double *x_out, long *n_written) {
     for (; *n_written < n_out; ++*n_written) {
         const double s = t_out[*n_written];
         const double ahead = (s - run->t)*run->direction, behind = (run->t_old - s)*run->direction;
         double *restrict const x = x_out + *n_written*6;
-        int i, failure;
-
         if (run->direction == 0.0 ? !(fabs(s - run->t) <= run->t_slack)
-                : !(ahead <= (run->t == run->t_end ? run->t_slack : 0.0)))
-            return 0;  /* not reached yet */
-        if (behind > run->t_slack)
-            return four_bar_DOP853_BAD_OUTPUT_TIME;
+                : !(ahead <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;  // not reached yet
+        if (behind > run->t_slack) return four_bar_dop853_BAD_OUTPUT_TIME;
         if (ahead >= 0.0 || behind >= 0.0) {
-            for (i = 0; i < 6; i++)
-                x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
+            for (int i = 0; i < 6; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
             continue;
         }
-        if (!run->dense_ready) {
-            if (run->rejected)  /* the stages are already those of an attempt from t */
-                return four_bar_DOP853_BAD_OUTPUT_TIME;
-            if ((failure = four_bar_dop853_dense(run, problem)) != 0)
-                return run->status = failure;
-        }
-        {
-            const double theta = (s - run->t_old)/run->h_old, rest = 1.0 - theta;
-            double (*restrict const d)[6] = run->dense;
-
-            for (i = 0; i < 6; i++)
-                x[i] = run->x_old[i] + theta*(d[0][i] + rest*(d[1][i] + theta*(d[2][i]
-                    + rest*(d[3][i] + theta*(d[4][i] + rest*(d[5][i] + theta*d[6][i]))))));
-        }
+        const int failure = four_bar_dop853_state_at(run, problem, s, x);
+        if (failure) return failure == four_bar_dop853_BAD_OUTPUT_TIME ? failure : (run->status = failure);
     }
     return 0;
-}
-
-int four_bar_dop853_run(
-    four_bar_dop853 *run, const four_bar_problem *problem, long max_steps,
-    const double *t_out, long n_out, double *x_out, long *n_written)
-{
-    for (;; max_steps--) {
-        const int failure = four_bar_dop853_serve(run, problem, t_out, n_out, x_out, n_written);
-
-        if (failure != 0)
-            return failure;
-        if (run->status != four_bar_DOP853_STEP_LIMIT || max_steps <= 0)
-            return run->status;
-        four_bar_dop853_attempt(run, problem);
-    }
-}
-
-int four_bar_dop853_run_steps(
-    four_bar_dop853 *run, const four_bar_problem *problem, long max_steps,
-    double *t_steps, double *x_steps, long capacity, long *n_written)
-{
-    for (;; max_steps--) {
-        int i;
-
-        if (run->unstored) {
-            if (*n_written >= capacity)
-                return four_bar_DOP853_STORE_FULL;
-            t_steps[*n_written] = run->t;
-            for (i = 0; i < 6; i++)
-                x_steps[*n_written*6 + i] = run->x[i];
-            ++*n_written;
-            run->unstored = 0;
-        }
-        if (run->status != four_bar_DOP853_STEP_LIMIT || max_steps <= 0)
-            return run->status;
-        four_bar_dop853_attempt(run, problem);
-    }
 }
 
 // A run as one block of memory, so that a caller in another language needs only its size.
@@ -1930,42 +1756,52 @@ typedef struct {
 SYMDYN_EXPORT long four_bar_simulation_size(void);
 SYMDYN_EXPORT long four_bar_simulation_size(void) { return (long)sizeof(four_bar_simulation); }
 
-SYMDYN_EXPORT int four_bar_simulation_start(four_bar_simulation *s, const four_bar_problem *problem, const double *span,
-    const double *x0, const double *atol);
-// span: t0, t_end, rtol, first step (0: chosen), largest step (0: any); atol: 6.
-SYMDYN_EXPORT int four_bar_simulation_start(four_bar_simulation *s, const four_bar_problem *problem, const double *span,
-    const double *x0, const double *atol)
-{
+// Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); atol:
+// 6. Returns 0 or a failure.
+SYMDYN_EXPORT int four_bar_simulation_start(four_bar_simulation *s, const four_bar_problem *problem, const double *span, const double *x0, const double *atol);
+SYMDYN_EXPORT int four_bar_simulation_start(four_bar_simulation *s, const four_bar_problem *problem, const double *span, const double *x0, const double *atol) {
     s->problem = *problem;
-    return four_bar_dop853_start(&s->run, &s->problem, span[0], span[1], x0, span[2], atol, span[3], span[4]);
+    return four_bar_dop853_start(&s->run, &s->problem, span, x0, atol);
 }
 
+// Continue by at most max_steps attempted steps and write the states at the requested times t[*written .. n), sorted in the direction
+// of integration, as they are passed, to the rows of x[n][6]; times beyond t_end are never served. Returns a status.
 SYMDYN_EXPORT int four_bar_simulation_at(four_bar_simulation *s, long max_steps, const double *t, long n, double *x, long *written);
-SYMDYN_EXPORT int four_bar_simulation_at(four_bar_simulation *s, long max_steps, const double *t, long n, double *x, long *written)
-{
-    return four_bar_dop853_run(&s->run, &s->problem, max_steps, t, n, x, written);
+SYMDYN_EXPORT int four_bar_simulation_at(four_bar_simulation *s, long max_steps, const double *t, long n, double *x, long *written) {
+    for (;; max_steps--) {
+        const int failure = four_bar_dop853_serve(&s->run, &s->problem, t, n, x, written);
+        if (failure) return failure;
+        if (s->run.status != four_bar_dop853_STEP_LIMIT || max_steps <= 0) return s->run.status;
+        four_bar_dop853_attempt(&s->run, &s->problem);
+    }
 }
 
+// The same, but append the start and the end of every accepted step to t[n] and x[n][6]. A step for which STORE_FULL left no room is
+// stored first by the next call.
 SYMDYN_EXPORT int four_bar_simulation_steps(four_bar_simulation *s, long max_steps, double *t, double *x, long n, long *written);
-SYMDYN_EXPORT int four_bar_simulation_steps(four_bar_simulation *s, long max_steps, double *t, double *x, long n, long *written)
-{
-    return four_bar_dop853_run_steps(&s->run, &s->problem, max_steps, t, x, n, written);
+SYMDYN_EXPORT int four_bar_simulation_steps(four_bar_simulation *s, long max_steps, double *t, double *x, long n, long *written) {
+    for (;; max_steps--) {
+        if (s->run.unstored) {
+            if (*written >= n) return four_bar_dop853_STORE_FULL;
+            t[*written] = s->run.t;
+            for (int i = 0; i < 6; i++) x[*written*6 + i] = s->run.x[i];
+            ++*written;
+            s->run.unstored = 0;
+        }
+        if (s->run.status != four_bar_dop853_STEP_LIMIT || max_steps <= 0) return s->run.status;
+        four_bar_dop853_attempt(&s->run, &s->problem);
+    }
 }
 
 // out: t, next step, accepted steps, rejected steps, evaluations, reason, bad index, time of failure, x, state at failure.
 SYMDYN_EXPORT void four_bar_simulation_report(const four_bar_simulation *s, double *out);
-SYMDYN_EXPORT void four_bar_simulation_report(const four_bar_simulation *s, double *out)
-{
-    out[0] = s->run.t;
-    out[1] = s->run.h;
-    out[2] = (double)s->run.n_steps;
-    out[3] = (double)s->run.n_rejected;
-    out[4] = (double)s->run.n_evaluations;
-    out[5] = s->run.reason;
-    out[6] = (double)s->run.bad_index;
-    out[7] = s->run.t_fail;
+SYMDYN_EXPORT void four_bar_simulation_report(const four_bar_simulation *s, double *out) {
+    const four_bar_dop853 *run = &s->run;
+    const double told[] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations, run->reason,
+        (double)run->bad_index, run->t_fail};
+    for (int i = 0; i < 8; i++) out[i] = told[i];
     for (int i = 0; i < 6; i++) {
-        out[8 + i] = s->run.x[i];
-        out[8 + 6 + i] = s->run.x_fail[i];
+        out[8 + i] = run->x[i];
+        out[14 + i] = run->x_fail[i];
     }
 }

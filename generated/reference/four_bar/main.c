@@ -9,8 +9,7 @@
 static const double p[] = { 9.81, 1.0, 0.4, 0.053333333333333344, 2.0, 1.0, 0.6666666666666666, 1.5, 0.8, 0.32000000000000006, 0.8, 2.0, 2.0, 1.6 };
 
 // Largest difference, relative to the largest entry of the reference.
-static double difference(const double *found, const double *wanted, int n)
-{
+static double difference(const double *found, const double *wanted, int n) {
     double largest = 0.0, error = 0.0;
     for (int i = 0; i < n; i++) largest = fmax(largest, fabs(wanted[i]));
     for (int i = 0; i < n; i++) {
@@ -20,8 +19,7 @@ static double difference(const double *found, const double *wanted, int n)
     return largest > 0.0 ? error / largest : error;
 }
 
-static int check(const char *name, int code, const double *found, const double *wanted, int n, double tolerance)
-{
+static int check(const char *name, int code, const double *found, const double *wanted, int n, double tolerance) {
     const double e = code ? INFINITY : difference(found, wanted, n);
     const int good = e <= tolerance;
     printf("%-18s %-5s difference %.1e, tolerance %.1e%s%s\n", name, good ? "ok" : "WRONG", e, tolerance, code ? ": " : "",
@@ -29,8 +27,7 @@ static int check(const char *name, int code, const double *found, const double *
     return good ? 0 : 1;
 }
 
-int main(void)
-{
+int main(void) {
     int wrong = 0;
     double c[9];
     int code = four_bar_prologue(p, c);

@@ -1,0 +1,20 @@
+"""Methods of integration that the C templates know: one record each, a tableau as data."""
+
+from symdyn.backend.methods.bs54 import BS54
+from symdyn.backend.methods.dop853 import DOP853
+from symdyn.backend.methods.gauss import GAUSS
+from symdyn.backend.methods.radau import RADAU
+from symdyn.backend.methods.record import Method, Tableau
+from symdyn.backend.methods.taylor import TAYLOR
+from symdyn.errors import SymdynError
+
+METHODS = {method.name: method for method in (DOP853, BS54, RADAU, GAUSS, TAYLOR)}
+
+__all__ = ["METHODS", "Method", "Tableau", "method_of"]
+
+
+def method_of(name: str) -> Method:
+    """The method of this name; raises SymdynError for one that there is not."""
+    if name not in METHODS:
+        raise SymdynError(f"there is no compiled method {name!r}; there are {', '.join(METHODS)}")
+    return METHODS[name]

@@ -1,0 +1,64 @@
+"""Radau IIA of 5 stages: order 9, stiffly accurate, L-stable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symdyn.backend.methods.record import Method
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """Coefficients of a collocation method with matrix A, of an odd number of stages, as its equations are solved.
+
+    nodes      0 < c_1 < ... < c_s = 1; inverse: A^-1
+    roots      (alpha, beta) of the eigenvalues alpha + i beta of A^-1: the real one gamma, then of each pair that with beta > 0
+    join, part with w = part z the system A^-1 z / h - J z = r falls apart into (alpha_k + i beta_k) w_k / h - J w_k = (part r)_k,
+               real and imaginary parts of w_1, w_2, ... in turn, and z = join w
+    estimate   d of the error estimate (gamma/h - J)^-1 (f(t, x) + d z / h), z the stages less x, which vanishes for polynomials
+               of degree s
+    tail       a polynomial w of the place in the step, lowest power first: the polynomial of the stages and w times the estimate
+               are right for polynomials of degree s + 1. 0 at 0 and 1
+    """
+
+    nodes: Vector
+    inverse: tuple[Vector, ...]
+    roots: tuple[tuple[float, float], ...]
+    join: tuple[Vector, ...]
+    part: tuple[Vector, ...]
+    estimate: Vector
+    tail: Vector
+
+
+COLLOCATION = Collocation(
+    nodes=(0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
+    inverse=((8.755923977938362, 2.8919426153801173, -0.8751863962002651, 0.3997052079399655, -0.13370616384921583),
+             (-7.161380720145387, 1.8060777240836443, 2.3637971760686085, -0.8659007802831346, 0.2743380777751942),
+             (4.122165246243374, -4.4960171258133945, 0.8567652453971776, 2.5183209492110645, -0.6570627571343601),
+             (-3.8786632197240105, 3.3931519180649543, -5.188340906407187, 0.5812330525808164, 2.809983655279712),
+             (8.41242422359429, -6.970256116656661, 8.777114204150473, -18.2192823110881, 13.0)),
+    roots=((6.2867047517292765, 0.0), (5.70095329867179, 3.2102656003085497), (3.655694325463572, 6.543736899360077)),
+    join=((0.013576867344947943, 0.0, -0.011478515255229515, -0.01401985889287541, -0.010242047817908826, 0.04767387729029572),
+          (0.0016179004017190875, 0.0, -0.007668830749180163, 0.024708578426518527, 0.05017286451737106, -0.09433181918161143),
+          (0.07915785334744721, 0.0, 0.01939846399882895, 0.08180035370375117, -0.23053953404341795, 0.1027030453801259),
+          (0.41225608268046143, 0.0, 0.40760117128019907, 0.19968242788680252, 0.37789390224886127, 0.46674413033249434),
+          (1.0, 0.0, 1.0, 0.0, 1.0, 0.0)),
+    part=((27.697693775684087, 12.783337911304406, 3.20848938671343, -0.9514904122489162, 0.7415504960259897),
+          (0.0, 0.0, 0.0, 0.0, 0.0),
+          (-33.041880213519, -17.376953479063566, -0.17212906325400557, -0.09916977798254265, 0.5312281158383066),
+          (-8.611443979875292, 9.699991409528808, 1.9147286396968743, 2.41869200608494, -1.0474634879353375),
+          (5.344186437834912, 4.593615567759161, -3.0363603234594243, 1.050660190231459, -0.27277861186429625),
+          (3.748059807439805, -3.984965736343885, -1.0444156416080188, 1.1840985681379486, -0.44991777015678036)),
+    estimate=(-27.78093394406464, 3.641478498049213, -1.2525477211691187, 0.5920031671845428, -0.2),
+    tail=(0.0, 6.2867047517292765, -78.58380939661596, 314.33523758646385, -550.0866657763117, 440.06933262104934,
+          -132.0207997863148))
+
+RADAU = Method(
+    "radau", "Radau IIA of 5 stages with the exact Jacobian: order 9, error estimate of order 5, dense output of order 6",
+    6, "radau",
+    ("E. Hairer, G. Wanner, Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems, 2nd ed.,",
+     "Springer 1996, section IV.8 (Newton's method, error estimate; 3 stages); the same, Stiff differential equations solved by",
+     "Radau methods, J. Comput. Appl. Math. 111 (1999) 93-111 (5 stages)."),
+    needs=("jacobian_x",), gather=lambda *_: {"collocation": COLLOCATION})

@@ -1,0 +1,46 @@
+"""The recurrences of Taylor coefficients as statements of a dialect, with constants of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from symdyn.backend.dialect import Dialect
+from symdyn.backend.program import Program, build
+from symdyn.errors import UnsupportedExpression
+from symdyn.tape.balance import balance
+from symdyn.tape.tape import Output, Tape
+from symdyn.tape.taylor import series
+
+if TYPE_CHECKING:
+    from symdyn.backend.source import Content
+
+# Sums that a vector holds, and vectors that are summed up at once: as many additions wait for each other as they take.
+LANES, MOST_VECTORS = 4, 4
+
+
+def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
+    """What the template of the method needs: the functions of the series, their program and their sizes.
+
+    Raises UnsupportedExpression where the right-hand side has no Taylor series.
+    """
+    rhs = content.tapes["rhs"]
+    state = [name for group in ("q", "u", "z") for name in content.groups[group]]
+    try:
+        made = series(rhs.recorder, next(iter(rhs.outputs.values())).entries, state)
+    except UnsupportedExpression as error:
+        raise UnsupportedExpression(f"{content.name}: {error}; use method='dop853'") from None
+    # Factors side by side, filled up with zeros to whole blocks of vectors: the sums are done on these.
+    rates, left, right = (made.next.outputs["series_next"].entries[a:b] for a, b in pairwise(made.borders))
+    n_block = LANES * min(MOST_VECTORS, max(1, -(-made.n_s // LANES)))
+    zeros = (0,) * (-made.n_s % n_block)
+    row = Output("series_next", (2 * (made.n_s + len(zeros)) + made.n_x,), (*left, *zeros, *right, *zeros, *rates))
+    whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": row}))
+    tapes = {name: whole.prune((name,)) for name in ("series_start", "series_next")}
+    written = build(dialect, tapes, {name: name for name in tapes}, {**places, **made.places}, program.reasons)
+    start, following = written.functions
+    stretches = [part for f in (start, following) for part in (f.parts or (f,))]
+    uses = {"uses_parts": bool(start.parts or following.parts), "uses_sincos": "symdyn_sincos(" in repr(stretches)}
+    return {"series": written, "series_start": start, "series_next": following, "n_0": made.n_0,
+            "n_sums": made.n_s + len(zeros), "n_block": n_block, "n_lanes": LANES, **{k: v for k, v in uses.items() if v}}

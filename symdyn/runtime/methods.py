@@ -1,0 +1,86 @@
+"""The compiled methods of integration by name, what each needs and does not do, and the units that hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.outcome import Request
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+DEFAULT = "dop853"
+
+
+@dataclass(frozen=True)
+class CompiledMethod:
+    """A method of the C backend.
+
+    needs    functions that the module must have
+    serves   what it is for, a line
+    unfit    why it does not take a module or a request, with what to use instead; empty if it does
+    """
+
+    name: str
+    serves: str
+    needs: tuple[str, ...] = ()
+    unfit: Callable[[Module, Request], str] = lambda module, request: ""
+
+
+def _constrained(module: Module, request: Request) -> str:
+    """Steps that are projected onto constraints are not symmetric: energy would drift as with any other method."""
+    names = module.metadata.get("constraints", ())
+    if not names:
+        return ""
+    return (f"it keeps energy by its symmetry, which corrections back onto constraints ({', '.join(names[:3])}"
+            f"{', ...' if len(names) > 3 else ''}) take away; use method='dop853', which is projected, with a tight rtol, or "
+            "coordinates that need no constraints")
+
+
+def _not_expanded(module: Module, request: Request) -> str:
+    """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
+    instead = f"use method='{DEFAULT}'"
+    if request.inputs.function is not None or request.inputs.table is not None:
+        return f"inputs that vary have no Taylor series; {instead}, or write them as expressions of the time t"
+    reason = module.metadata.get("not_smooth", "")
+    return f"{reason}, and has no Taylor series there; {instead}" if reason else ""
+
+
+COMPILED = {m.name: m for m in (
+    CompiledMethod("dop853", "explicit, order 8: tolerances of 1e-6 to 1e-13"),
+    CompiledMethod("bs54", "explicit, order 5: tolerances from 1e-5 on"),
+    CompiledMethod("gauss", "symmetric, order 16, constant steps: very long conservative motion", unfit=_constrained),
+    CompiledMethod("taylor", "Taylor series by recurrences: tolerances of 1e-9 to 1e-17", unfit=_not_expanded),
+    CompiledMethod("radau", "implicit, order 9, with the exact Jacobian: stiff systems", ("jacobian_x",)),
+)}
+
+
+def unit_name(field: str, method: str) -> str:
+    """The unit with the integrator of a right-hand side: a unit holds one method."""
+    return field if method == DEFAULT else f"{field}:{method}"
+
+
+def split_name(unit: str) -> tuple[str, str]:
+    """The right-hand side and the method of a unit."""
+    field, _, method = unit.partition(":")
+    return field, method or DEFAULT
+
+
+def is_compiled(method: object) -> bool:
+    return isinstance(method, str) and method in COMPILED
+
+
+def check_compiled(module: Module, request: Request, method: str) -> None:
+    """Raises ArgumentError where a compiled method does not fit, with the reason and what to use instead."""
+    if module.backend != "c":
+        instead = f"'{method.upper()}'" if method == DEFAULT else "one of SciPy's ('DOP853', stiff: 'Radau')"
+        raise ArgumentError(f"{module.name}: the compiled integrator {method!r} needs the C backend; this module "
+                            f"runs on {module.backend}. Use method={instead}, or compile(backend='c')")
+    record = COMPILED[method]
+    missing = [n for n in record.needs if n not in module.metadata.get("functions", record.needs)]
+    why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)
+    if why:
+        raise ArgumentError(f"{module.name}: method {method!r} does not fit: {why}")

@@ -1,0 +1,158 @@
+"""Compiled methods of integration: measured orders, the choice by "auto", and what does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.backend.methods import METHODS
+from symdyn.errors import ArgumentError
+from symdyn.pipeline import emit
+from symdyn.runtime import methods
+from symdyn.runtime.automatic import spectral_radius
+from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.methods import COMPILED, split_name, unit_name
+from symdyn.runtime.outcome import Request
+from tests.runtime.constrained import module as constrained
+
+START = {"q": {"q1": 2.0}, "u": {"q1_dot": 0.5}}
+
+
+@pytest.fixture(scope="module")
+def pendulum(compiled: Callable[..., Any]) -> Any:
+    return compiled("pendulum", "c")
+
+
+def heavy_oil() -> sd.System:
+    """A pendulum in oil that follows slowly: the damper makes one eigenvalue -d/(m l^2)."""
+    (q1,) = sd.coordinates("q1:2")
+    m, length, g, d = sd.parameters("m l g d")
+    system = sd.System("heavy_oil", gravity=[0, -g])
+    bob = system.add_body("bob", mass=m, com=[0, -length])
+    system.add_joint(sd.Revolute("pivot", system.ground, bob, q1))
+    system.add_joint_force("pivot", -d * q1.dot)
+    system.defaults = {m: 1, length: 1, g: 9.81, d: 1e4}
+    system.initial = {q1: 2.0}
+    return system
+
+
+@pytest.fixture(scope="module")
+def oil() -> dict[str, Any]:
+    equations = heavy_oil().embedding()
+    return {b: equations.compile(backend=b) for b in ("c", "numpy") if b == "numpy" or find_compiler() is not None}
+
+
+# -- orders
+
+
+@pytest.mark.parametrize(("method", "order", "between", "steps"), [("bs54", 5, 5, (0.05, 0.025, 0.0125)),
+                                                                   ("dop853", 8, 8, (0.2, 0.1, 0.05))])
+def test_measured_order(method: str, order: int, between: int, steps: tuple[float, ...], pendulum: Any) -> None:
+    """Equal steps, at their ends and between them: tolerances that every step meets."""
+    exact = pendulum.simulate((0, 2), **START, rtol=1e-14)
+    ends, middle = [], []
+    for h in steps:
+        found = pendulum.simulate((0, 2), **START, rtol=0.9, atol=1e3, first_step=h, max_step=h, method=method)
+        ends.append(np.abs(found.x[-1] - exact.x[-1]).max())
+        middle.append(np.abs(found.x - exact.x).max())
+    for errors, wanted in ((ends, order), (middle, between)):
+        assert wanted - 0.4 < np.log2(errors[0] / errors[-1]) / (len(steps) - 1) < wanted + 1.5
+
+
+def test_the_loose_pair_is_as_good_for_fewer_evaluations(compiled: Callable[..., Any]) -> None:
+    """Medians over tolerances, of a motion that is over before it becomes chaotic."""
+    double = compiled("double_pendulum", "c")
+    ends = np.array([0.0, 2.0])
+    exact = double.simulate(ends, rtol=1e-13).x[-1]
+    pairs = [[double.simulate(ends, rtol=r, method=m) for m in ("bs54", "dop853")] for r in 10.0**-np.arange(2, 5, 0.25)]
+    errors = np.array([[np.linalg.norm(s.x[-1] - exact) for s in pair] for pair in pairs])
+    assert np.median([loose.nfev / tight.nfev for loose, tight in pairs]) < 0.85
+    assert np.median(errors[:, 0] / errors[:, 1]) < 2
+
+
+def test_the_loose_pair_on_constraints() -> None:
+    """Projected, and backward: as the tight pair, within the tolerance."""
+    bar = constrained("four_bar")
+    times = np.linspace(0, 2, 50)
+    loose, tight = (bar.simulate(times, rtol=1e-7, method=m) for m in ("bs54", "dop853"))
+    np.testing.assert_allclose(loose.x, tight.x, rtol=0, atol=2e-5)
+    assert np.abs(loose.constraint_violation).max() < 1e-12 and loose.corrections.n_steps > 0
+    back = bar.simulate(times[::-1], q=loose.q[-1], u=loose.u[-1], rtol=1e-7, method="bs54")
+    np.testing.assert_allclose(back.x[-1], loose.x[0], rtol=0, atol=2e-5)
+
+
+# -- the choice
+
+
+@pytest.mark.parametrize(("rtol", "method", "why"), [(1e-3, "bs54", "for rtol = 0.001 the pair of order 5"),
+                                                     (1e-6, "dop853", "for rtol = 1e-06 the explicit method of order 8"),
+                                                     (1e-9, "taylor", "for rtol = 1e-09, and with 4 operations in the")])
+def test_auto_by_tolerance(rtol: float, method: str, why: str, pendulum: Any) -> None:
+    found = pendulum.simulate((0, 10), **START, rtol=rtol, method="auto")
+    assert found.method == method and why in found.why and "the motion is not stiff (" in found.why
+    named = pendulum.simulate((0, 10), **START, rtol=rtol, method=method)
+    np.testing.assert_array_equal(found.x, named.x)
+    assert named.why == ""
+
+
+def test_auto_with_constraints() -> None:
+    found = constrained("four_bar").simulate((0, 2), rtol=1e-8, method="auto")
+    assert found.method == "dop853" and found.why.endswith("and constraints the explicit method of order 8 is quickest")
+
+
+@pytest.mark.parametrize(("backend", "explicit", "implicit"), [("c", "dop853", "radau"), ("numpy", "DOP853", "Radau")])
+def test_auto_by_stiffness(backend: str, explicit: str, implicit: str, oil: dict[str, Any]) -> None:
+    """Eigenvalue -1e4 1/s: steps of the explicit method are 6.4e-4 s, however slow the motion."""
+    if backend not in oil:
+        pytest.skip("no C compiler here")
+    implicit = implicit if implicit in COMPILED or backend == "numpy" else "Radau"
+    found = oil[backend].simulate((0, 1), rtol=1e-6, method="auto")
+    assert found.method == implicit and found.n_steps < 100
+    assert "the motion is stiff (eigenvalues up to 1e+04 1/s times the step of a trial run" in found.why
+    thin = oil[backend].simulate((0, 1), rtol=1e-6, method="auto", params={"d": 1.0})
+    assert thin.method == explicit
+
+
+def test_spectral_radius(oil: dict[str, Any]) -> None:
+    """That of x_dot at q = pi/2, where gravity adds nothing to the eigenvalues 0 and -d."""
+    x = np.array([np.pi / 2, 0.0])
+    module = oil["numpy"]
+    request = Request((0, 1), None, x, module.parameters(), Inputs(np.zeros(0)), 1e-6, x, 0.0, 0.0, None, 2)
+    assert spectral_radius(module, request, 0.0, x) == pytest.approx(1e4, rel=1e-6)
+    assert np.isnan(spectral_radius(module, request, 0.0, np.array([np.nan, 0.0])))
+
+
+# -- names and faults
+
+
+def test_records_are_those_that_can_be_compiled() -> None:
+    assert set(METHODS) == set(COMPILED)
+    for name, record in METHODS.items():
+        assert record.name == name and set(COMPILED[name].needs) <= set(record.needs) | {"jacobian_x"}
+        assert split_name(unit_name("rhs_work", name)) == ("rhs_work", name)
+    assert unit_name("rhs", "dop853") == "rhs" and unit_name("rhs", "bs54") == "rhs:bs54"
+
+
+def test_a_unit_holds_one_method(derived: Callable[..., Any]) -> None:
+    text = next(iter(emit(derived("pendulum"), "c", ("rhs",), standalone=False, method="bs54").files.values()))
+    assert "pendulum_bs54_start" in text and "dop853" not in text and "Bogacki" in text
+
+
+@pytest.mark.parametrize("method", sorted(COMPILED))
+def test_compiled_methods_need_compiled_code(method: str, compiled: Callable[..., Any]) -> None:
+    with pytest.raises(ArgumentError, match=f"'{method}' needs the C backend; this module runs on numpy. Use method="):
+        compiled("pendulum", "numpy").simulate((0, 1), method=method)
+
+
+def test_a_method_that_does_not_fit_says_why(pendulum: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(COMPILED, "needy", methods.CompiledMethod("needy", "nothing", ("telepathy",)))
+    monkeypatch.setitem(COMPILED, "picky", methods.CompiledMethod("picky", "nothing", unfit=lambda m, _: f"{m.name} is small"))
+    with pytest.raises(ArgumentError, match="method 'needy' does not fit: its equations have no telepathy; use method='dop853'"):
+        pendulum.simulate((0, 1), method="needy")
+    with pytest.raises(ArgumentError, match="method 'picky' does not fit: pendulum is small"):
+        pendulum.simulate((0, 1), method="picky")

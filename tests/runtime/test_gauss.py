@@ -1,0 +1,174 @@
+"""Gauss collocation: coefficients, order, energy over very long motion, reversal, rotations, and what it does not take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.backend.methods.gauss import COEFFICIENTS
+from symdyn.errors import ArgumentError
+from symdyn.systems import get
+from tests.runtime.constrained import module as constrained
+
+GAUSS = {"method": "gauss"}
+GRAVITY = 9.81
+
+
+@pytest.fixture(scope="module")
+def pendulum(compiled: Callable[..., Any]) -> Any:
+    return compiled("pendulum", "c")
+
+
+@pytest.fixture(scope="module")
+def double(compiled: Callable[..., Any]) -> Any:
+    return compiled("double_pendulum", "c")
+
+
+@pytest.fixture(scope="module")
+def fast() -> Any:
+    """The pendulum as users have it: without the flags that have tests compile quickly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("SYMDYN_CC", raising=False)
+        module = get("pendulum").embedding().compile("c")
+        module.simulate([0.0, 1.0], **GAUSS)
+    return module
+
+
+def swing(t: float, release: float) -> float:
+    """Angle of a pendulum of 1 m, released at rest."""
+    with mpmath.workdps(30):
+        k, w = mpmath.sin(mpmath.mpf(release) / 2), mpmath.sqrt(mpmath.mpf(GRAVITY))
+        quarter = mpmath.ellipk(k**2)
+        phase = mpmath.fmod(w * mpmath.mpf(t), 4 * quarter)
+        return float(2 * mpmath.asin(k * mpmath.ellipfun("sn", quarter - phase, k**2)))
+
+
+# -- coefficients
+
+
+def test_collocation_conditions() -> None:
+    """B(16) and C(8) of Butcher, as far as floats go, and the conditions of symplecticity to the last bit."""
+    c, b, m = (np.array(v) for v in (COEFFICIENTS.nodes, COEFFICIENTS.weights, COEFFICIENTS.ratios))
+    s = len(c)
+    for k in range(1, 2 * s + 1):
+        assert abs(b @ c ** (k - 1) - 1 / k) < 4e-16
+    for k in range(1, s + 1):
+        assert np.abs((m * b) @ c ** (k - 1) - c**k / k).max() < 4e-16
+    assert all(Fraction(m[i, j]) + Fraction(m[j, i]) == 1 for i in range(s) for j in range(s))
+    assert sum(map(Fraction, COEFFICIENTS.weights)) == 1
+
+
+def test_legendre_values() -> None:
+    """Orthonormal polynomials at the nodes: the rule integrates their products exactly."""
+    P, b = np.array(COEFFICIENTS.legendre), np.array(COEFFICIENTS.weights)
+    assert np.abs((P * b) @ P.T - np.eye(2)).max() < 1e-14
+    assert P[0] == pytest.approx(P[0][::-1], abs=1e-14) and P[1] == pytest.approx(-P[1][::-1], abs=1e-14)
+
+
+# -- errors
+
+
+def test_measured_order(pendulum: Any) -> None:
+    found = [pendulum.simulate([0.0, 12.0], [1e-3], **GAUSS, first_step=12 / n).q[-1, 0] for n in (12, 16, 20)]
+    errors = np.abs(np.array(found) - swing(12, 1e-3))
+    assert 15.4 < np.log(errors[0] / errors[-1]) / np.log(20 / 12) < 17
+
+
+def test_a_pendulum_over_2000_seconds(fast: Any) -> None:
+    times = np.linspace(0, 2000, 9)
+    exact = [swing(t, 2.0) for t in times]
+    for given, most in (({"first_step": 0.05}, 5e-12), ({"rtol": 1e-14}, 5e-11)):
+        found = fast.simulate(times, **GAUSS, **given)
+        assert np.abs(found.q[:, 0] - exact).max() < most
+    assert found.n_steps < 15_000
+
+
+def test_energy_after_10000_periods(fast: Any) -> None:
+    """The period is 2.66587 s; errors by the largest kinetic energy, that of the lowest point."""
+    found = fast.simulate(np.linspace(0, 26_665.2, 2001), **GAUSS, rtol=1e-13)
+    change = (found.energy - found.energy[0]) / (GRAVITY * (1 - np.cos(2.0)))
+    assert found.success and np.abs(change).max() < 1e-13
+
+
+def test_energy_of_chaotic_motion_over_many_steps(double: Any) -> None:
+    """The range of the potential energy is that of both rods, hanging and standing."""
+    found = double.simulate(np.linspace(0, 75, 301), **GAUSS, first_step=0.0125)
+    assert found.n_steps == 6_000
+    assert np.abs(found.energy - found.energy[0]).max() / (4 * GRAVITY) < 5e-14
+
+
+def test_the_chosen_step_follows_the_tolerance(double: Any) -> None:
+    """From rest into fast motion: steps that the start would allow are too long farther on."""
+    scale = 4 * GRAVITY
+    for rtol, most in ((1e-6, 1e-5), (1e-9, 1e-8), (1e-13, 1e-12)):
+        found = double.simulate(np.linspace(0, 50, 101), **GAUSS, rtol=rtol)
+        assert np.abs(found.energy - found.energy[0]).max() / scale < most
+        assert 0 < found.n_rejected < 0.3 * found.n_steps
+
+
+# -- structure
+
+
+@pytest.mark.parametrize("given", [{"first_step": 0.02}, {"rtol": 1e-12}])
+def test_forward_and_back(double: Any, given: dict[str, float]) -> None:
+    """Of equal steps nothing is left but rounding, of chosen ones the tolerance."""
+    q = np.array([-1.2, 0.3])
+    there = double.simulate([0.0, 100.0], q, **GAUSS, **given)
+    back = double.simulate([100.0, 0.0], there.q[-1], there.u[-1], **GAUSS, **given)
+    assert np.abs(back.x[-1] - [*q, 0, 0]).max() < (1e-13 if "first_step" in given else 1e-10)
+    assert "rtol" in given or back.n_steps == there.n_steps == 5000
+
+
+def test_states_between_are_as_exact_as_ends(pendulum: Any) -> None:
+    """Steps of 0.2 s, 40 outputs in each; backward, too."""
+    times = np.linspace(0, 4, 801)
+    exact = np.array([swing(t, 2.0) for t in times[::10]])
+    forth = pendulum.simulate(times, **GAUSS, first_step=0.2)
+    assert forth.n_steps == 20 and np.abs(forth.q[::10, 0] - exact).max() < 1e-14 * 40
+    last = forth.x[-1]
+    back = pendulum.simulate(times[::-1], last[:1], last[1:], **GAUSS, first_step=0.2)
+    assert np.abs(back.q[::-10, 0] - exact).max() < 1e-14 * 80
+
+
+def top() -> sd.System:
+    """A symmetric top on its tip, by Euler parameters."""
+    m, a, A, C, g = sd.parameters("m a A C g")
+    system = sd.System("top", gravity=[0, 0, -g])
+    rotor = system.add_body("rotor", mass=m, inertia=[A, A, C], com=[0, 0, a])
+    system.add_joint(sd.Spherical("tip", system.ground, rotor, orientation=sd.EulerParameters()))
+    system.defaults = {m: 1, a: 0.1, A: 0.004, C: 0.006, g: GRAVITY}
+    return system
+
+
+def test_the_norm_of_euler_parameters_is_kept_without_corrections() -> None:
+    """A quadratic invariant, as the energy of the spinning top is nearly."""
+    start = {"q": [np.cos(0.25), np.sin(0.25), 0, 0], "u": [0, 0, 100.0]}
+    found = top().embedding().compile("c").simulate(np.linspace(0, 20, 101), **start, **GAUSS, rtol=1e-13, stabilization="none")
+    assert np.abs(np.linalg.norm(found.q, axis=1) - 1).max() < 1e-14
+    assert np.abs(found.energy / found.energy[0] - 1).max() < 1e-14
+
+
+def test_the_work_of_loads_is_integrated_along(compiled: Callable[..., Any]) -> None:
+    oscillator = compiled("driven_oscillator", "c")
+    ours, other = (oscillator.simulate([0.0, 3.0], rtol=1e-13, work=True, method=m) for m in ("gauss", "dop853"))
+    assert ours.x[-1] == pytest.approx(other.x[-1], rel=1e-10) and ours.work[-1] == pytest.approx(other.work[-1], rel=1e-9)
+
+
+# -- what it does not take
+
+
+def test_a_step_whose_sweeps_find_no_end_is_taken_in_parts(pendulum: Any) -> None:
+    found = pendulum.simulate([0.0, 20.0], [1.5], **GAUSS, first_step=5.0)
+    assert found.success and found.n_rejected > 0 and found.n_steps > 4
+
+
+def test_constraints_are_refused() -> None:
+    with pytest.raises(ArgumentError, match=r"four_bar: method 'gauss' does not fit: .*corrections back onto constraints \(.*"
+                                            r"use method='dop853'"):
+        constrained("four_bar").simulate((0, 1), **GAUSS)

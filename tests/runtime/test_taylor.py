@@ -1,0 +1,220 @@
+"""The Taylor method: order, closed forms over long times, other integrators, outputs, and what it does not take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError, SimulationWarning, UnsupportedExpression
+from symdyn.pipeline import emit
+from symdyn.systems import get
+from tests.oracles.random_trees import random_tree
+from tests.runtime.constrained import module as constrained
+
+TAYLOR = {"method": "taylor"}
+TIGHT = {"rtol": 1e-13, "atol": 1e-13}
+GRAVITY = 9.81
+
+
+@pytest.fixture(scope="module")
+def pendulum(compiled: Callable[..., Any]) -> Any:
+    return compiled("pendulum", "c")
+
+
+@pytest.fixture(scope="module")
+def double(compiled: Callable[..., Any]) -> Any:
+    return compiled("double_pendulum", "c")
+
+
+@pytest.fixture(scope="module")
+def fast() -> Any:
+    """The pendulum as users have it: without the flags that have tests compile quickly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("SYMDYN_CC", raising=False)
+        module = get("pendulum").embedding().compile("c")
+        module.simulate([0.0, 1.0], **TAYLOR)
+    return module
+
+
+def driven() -> sd.System:
+    """A pendulum on a slider that is moved, with a smooth force, an input, an extra state and a fault far away."""
+    q1, q2 = sd.coordinates("q1 q2")
+    m, length, k, g = sd.parameters("m l k g", positive=True)
+    F = sd.inputs("F")
+    z, grown = sd.coordinates("z grown")
+    s = sd.System("driven", gravity=[0, -g])
+    s.move_ground([sp.sin(3 * sd.t) / 10, sd.t**2 / 20])
+    cart = s.add_body("cart", mass=m)
+    bob = s.add_body("bob", mass=2 * m, inertia=m / 50, com=[0, -length])
+    slider = s.add_joint(sd.Prismatic("slider", s.ground, cart, q1, axis=[1, 0]))
+    s.add_joint(sd.Revolute("hinge", cart, bob, q2))
+    s.add_joint_force(slider, F - k * q1 - sp.tanh(q1.dot) + z + sp.exp(-q2**2) / sp.sqrt(1 + q1**2))
+    s.add_state(z, sp.cos(sd.t) * q2 - z**3)
+    s.add_state(grown, grown**2)
+    s.defaults = {m: 1.0, length: 0.5, k: 20.0, g: GRAVITY}
+    s.initial = {q2: 0.4, F: 0.3, z: 0.2}
+    return s
+
+
+@pytest.fixture(scope="module")
+def moved(pendulum: Any) -> Any:
+    return driven().embedding().compile("c")
+
+
+def swing(t: float, release: float) -> float:
+    """Angle of a pendulum of 1 m, released at rest."""
+    with mpmath.workdps(30):
+        k, w = mpmath.sin(mpmath.mpf(release) / 2), mpmath.sqrt(mpmath.mpf(GRAVITY))
+        quarter = mpmath.ellipk(k**2)
+        phase = mpmath.fmod(w * mpmath.mpf(t), 4 * quarter)
+        return float(2 * mpmath.asin(k * mpmath.ellipfun("sn", quarter - phase, k**2)))
+
+
+# -- accuracy
+
+
+def test_measured_order(pendulum: Any) -> None:
+    """Equal steps of order 6, the lowest, at their ends and between them."""
+    start = {"q": {"q1": 2.0}, "u": {"q1_dot": 0.5}}
+    exact = pendulum.simulate((0, 2), **start, **TIGHT)
+    ends, middle = [], []
+    for h in (0.05, 0.025, 0.0125):
+        found = pendulum.simulate((0, 2), **start, rtol=0.9, atol=1e3, first_step=h, max_step=h, **TAYLOR)
+        assert found.nfev == pytest.approx(6 * found.n_steps, abs=7)
+        ends.append(np.abs(found.x[-1] - exact.x[-1]).max())
+        middle.append(np.abs(found.x - exact.x).max())
+    for errors in (ends, middle):
+        assert 5.6 < np.log2(errors[0] / errors[-1]) / 2 < 7.5
+
+
+def test_order_and_error_follow_the_tolerance(pendulum: Any) -> None:
+    errors, orders = [], []
+    for rtol in (1e-3, 1e-6, 1e-9, 1e-12, 1e-15):
+        found = pendulum.simulate([0.0, 10.0], q=[2.0], rtol=rtol, atol=rtol, **TAYLOR)
+        errors.append(abs(found.q[-1, 0] - swing(10.0, 2.0)))
+        orders.append(round(found.nfev / found.n_steps))
+        assert errors[-1] < 30 * rtol + 1e-14
+    assert orders == [8, 12, 16, 20, 23] and found.n_rejected == 0
+
+
+def test_two_thousand_seconds(fast: Any) -> None:
+    found = fast.simulate([0.0, 1000.0, 2000.0], q=[2.0], rtol=1e-15, atol=1e-15, **TAYLOR)
+    assert abs(found.q[-1, 0] - swing(2000.0, 2.0)) < 1e-11
+
+
+def test_energy_of_ten_thousand_periods(fast: Any) -> None:
+    with mpmath.workdps(20):
+        period = float(4 * mpmath.ellipk(mpmath.sin(mpmath.mpf(1) / 2) ** 2) / mpmath.sqrt(GRAVITY))
+        found = fast.simulate(np.linspace(0, 1e4 * period, 101), q=[1.0], rtol=1e-15, atol=1e-15, max_steps=None, **TAYLOR)
+        energy = [mpmath.mpf(u) ** 2 / 2 - GRAVITY * mpmath.cos(mpmath.mpf(q)) for q, u in found.x]
+        assert max(abs(e - energy[0]) for e in energy) / GRAVITY < 1e-13
+
+
+def test_a_start_with_symmetry(double: Any) -> None:
+    """Horizontal at rest q has only the powers t^2, t^6, ... and u only t, t^5, ...: the last two vanish, of order 7 and 8."""
+    loose = double.simulate([0.0, 1.0], q=[0, 0], rtol=1e-3, atol=1e-3, **TAYLOR)
+    assert loose.nfev / loose.n_steps < 9.5 and loose.n_steps > 4
+    np.testing.assert_allclose(loose.x[-1], double.simulate([0.0, 1.0], q=[0, 0], **TIGHT).x[-1], rtol=0, atol=0.02)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e12])
+def test_slow_and_fast(scale: float, pendulum: Any) -> None:
+    """The same motion in another unit of time: coefficients neither overflow nor vanish."""
+    slow = pendulum.simulate(np.linspace(0, 3, 7), q=[2.0], rtol=1e-14, **TAYLOR)
+    atol = [1e-12, 1e-12 / scale]
+    options = {"params": {"g": GRAVITY / scale**2}, "rtol": 1e-14, "atol": atol}
+    other = pendulum.simulate(np.linspace(0, 3, 7) * scale, q=[2.0], **options, **TAYLOR)
+    np.testing.assert_allclose(other.q, slow.q, rtol=0, atol=1e-11)
+
+
+# -- against the explicit method
+
+
+@pytest.mark.parametrize("seed", [4])
+def test_random_trees(seed: int) -> None:
+    system = random_tree(seed)
+    module = system.embedding().compile("c")
+    rng = np.random.default_rng(seed)
+    q, u = (rng.uniform(-0.5, 0.5, module.metadata["sizes"][g]) for g in "qu")
+    for group in module.metadata["unit_groups"]:
+        places = [module.metadata["q"].index(name) for name in group]
+        q[places] /= np.linalg.norm(q[places])
+    times = np.linspace(0, 0.5, 11)
+    wanted, found = (module.simulate(times, q, u, **TIGHT, method=m) for m in ("dop853", "taylor"))
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-10 * np.abs(wanted.x).max())
+
+
+def test_constraints() -> None:
+    bar = constrained("four_bar")
+    times = np.linspace(0, 2, 21)
+    found, wanted = (bar.simulate(times, **TIGHT, method=m) for m in ("taylor", "dop853"))
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-10)
+    assert np.abs(found.constraint_violation).max() < 1e-13 and found.success
+
+
+def test_moved_ground_states_inputs_and_parameters(moved: Any) -> None:
+    times = np.linspace(0, 2, 15)
+    options = {"q": [0.1, 0.5], "u": [0.2, -1.0], "params": {"k": 35.0}, "inputs": [0.7], **TIGHT}
+    found, wanted = (moved.simulate(times, **options, method=m) for m in ("taylor", "dop853"))
+    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-11)
+
+
+# -- outputs
+
+
+def test_between_steps_and_backward(moved: Any) -> None:
+    """Outputs do not change the steps; between them the polynomial is as good as at their ends; and back again."""
+    times = np.linspace(0, 2, 201)
+    every = moved.simulate((0.0, 2.0), steps=True, **TIGHT, **TAYLOR)
+    dense = moved.simulate(times, **TIGHT, **TAYLOR)
+    assert dense.n_steps == every.n_steps < 100
+    np.testing.assert_array_equal(dense.x[-1], every.x[-1])
+    single = moved.simulate([0.0, times[77]], **TIGHT, **TAYLOR)
+    np.testing.assert_allclose(dense.x[77], single.x[-1], rtol=0, atol=1e-12)
+    back = moved.simulate(times[::-1], q=dense.q[-1], u=dense.u[-1], z=dense.z[-1], **TIGHT, **TAYLOR)
+    np.testing.assert_allclose(back.x[::-1], dense.x, rtol=0, atol=1e-9)
+
+
+def test_step_lengths_asked_for(pendulum: Any) -> None:
+    found = pendulum.simulate((0, 1), q=[2.0], steps=True, first_step=1e-3, max_step=0.05, **TAYLOR)
+    lengths = np.diff(found.t)
+    assert lengths[0] == pytest.approx(1e-3) and 0.04 < lengths.max() < 0.051
+
+
+def test_a_pole_is_not_stepped_over(moved: Any) -> None:
+    """z' = z^2 from 1 ends at t = 1."""
+    with pytest.warns(SimulationWarning):
+        found = moved.simulate((0.0, 2.0), z=[0.2, 1.0], rtol=1e-9, **TAYLOR)
+    assert not found.success and found.t[-1] == pytest.approx(1.0, abs=1e-6)
+    assert "the step became too small" in found.message
+
+
+# -- what it does not take
+
+
+def test_inputs_that_vary(moved: Any) -> None:
+    for given in (lambda t, x: [t], (np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))):
+        with pytest.raises(ArgumentError, match="method 'taylor' does not fit: inputs that vary have no Taylor series; use "
+                                                "method='dop853', or write them as expressions of the time t"):
+            moved.simulate((0, 1), inputs=given, **TAYLOR)
+
+
+def test_right_hand_sides_that_switch(derived: Callable[..., Any]) -> None:
+    (q1,) = sd.coordinates("q1:2")
+    system = sd.System("rubbing", planar=True)
+    slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q1, axis=[1, 0]))
+    system.add_joint_force(slider, -sp.Abs(q1.dot) * q1.dot)
+    equations = system.embedding()
+    with pytest.raises(UnsupportedExpression, match=r"rubbing: there is no Taylor series: the right-hand side switches \(abs\); "
+                                                    "use method='dop853'"):
+        emit(equations, "c", ("rhs",), standalone=False, method="taylor")
+    module = equations.compile()
+    if module.backend == "c":
+        with pytest.raises(ArgumentError, match=r"does not fit: the right-hand side switches \(abs\)"):
+            module.simulate((0, 1), **TAYLOR)
