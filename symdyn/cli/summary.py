@@ -19,6 +19,11 @@ def summarize(solution: Solution) -> None:
     print(f"{module.name}: {solution.method} on {where} to t = {end} s" + ("" if solution.success else ", stopped early"))
     if module.fallback:
         print(f"  {module.fallback}")
+    if solution.why:
+        print(f"  {solution.method} because {solution.why}")
+    for name, rows in solution.events.items():
+        if len(rows.t):
+            print(f"  event {name}: {len(rows.t)} times, first at t = {rows.t[0]:.6g} s")
     inside = solution.integrator_seconds
     time = f"{1e3 * solution.seconds:.3g} ms" if inside is None else f"{1e3 * inside:.3g} ms inside the integrator"
     print(f"  {solution.n_steps} steps, {solution.nfev} evaluations, {time}")

@@ -53,7 +53,7 @@ COMPILED = {m.name: m for m in (
     CompiledMethod("dop853", "explicit, order 8: tolerances of 1e-6 to 1e-13"),
     CompiledMethod("bs54", "explicit, order 5: tolerances from 1e-5 on"),
     CompiledMethod("gauss", "symmetric, order 16, constant steps: very long conservative motion", unfit=_constrained),
-    CompiledMethod("taylor", "Taylor series by recurrences: tolerances of 1e-9 to 1e-17", unfit=_not_expanded),
+    CompiledMethod("taylor", "series by recurrences: short right-hand sides, smallest errors", unfit=_not_expanded),
     CompiledMethod("radau", "implicit, order 9, with the exact Jacobian: stiff systems", ("jacobian_x",)),
 )}
 

@@ -291,6 +291,28 @@ def test_options_of_one_by_one(fast: Any) -> None:
         fast.simulate_batch(q, u, metod="RK45")
 
 
+def test_events_end_motions_one_by_one() -> None:
+    """A ball that falls 1 m in sqrt(0.2) s, and one that falls on."""
+    z = sd.coordinates("z")
+    system = sd.System("ball", gravity=[0, 0, -10])
+    ball = system.add_body("ball", mass=1)
+    system.add_joint(sd.Prismatic("fall", system.ground, ball, z, axis=[0, 0, 1]))
+    system.add_event("floor", z, direction=-1, stop=True)
+    module = system.embedding().compile(backend="c")
+    ends = module.simulate_batch({"z": [1.0, 50.0]}, t=(0, 2))
+    assert ends.note == "one by one: the mechanism has events" and ends.success.all()
+    np.testing.assert_allclose(ends.x[:, 0], [[0, -np.sqrt(20)], [30, -20]], atol=1e-12)
+    many = module.simulate_batch({"z": [1.0, 50.0]}, t=[0, 0.4, 2])
+    np.testing.assert_allclose(many["z"], [[1, 0.2, np.nan], [50, 49.2, 30]], atol=1e-12)
+    through = module.simulate_batch({"z": [1.0, 50.0]}, t=(0, 2), events=False)
+    assert through.note == "" and through["z"][0, 0] == pytest.approx(-19)
+    with pytest.raises(ArgumentError, match="events roof asked for; there are floor"):
+        module.simulate_batch({"z": [1.0]}, t=(0, 2), events=["roof"])
+    drawn = sd.ensemble(module, {"z": [1.0, 50.0]}, t=(0, 2), outcomes=["end z"])
+    np.testing.assert_allclose(drawn["end z"], [0, 30], atol=1e-12)
+    assert sd.ensemble(module, {"z": [1.0, 50.0]}, t=(0, 2), outcomes=["end z"], events=False)["end z"][0] == pytest.approx(-19)
+
+
 def test_the_report_tells_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
     fast.rhs_batch(0.0, np.zeros((1, 4)))
     for module, told in ((fast, f"rhs_batch {fast.batch_width} on the processor's vectors, simulate_batch likewise"),

@@ -13,6 +13,7 @@ import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.pipeline import emit
 from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.run_tables import facts
 from tests.runtime.constrained import module as constrained
 
 
@@ -105,6 +106,7 @@ def test_against_other_methods(mass: Any) -> None:
     np.testing.assert_allclose(scipy.x, tight.x, rtol=0, atol=2e-7)
     assert found.nfev < 0.5 * scipy.nfev and found.n_steps < 0.2 * mass.simulate(times, **start, rtol=1e-8).n_steps
     assert 0 < found.njev < found.n_steps and found.nlu >= 3 * found.n_steps and scipy.njev > 0 and scipy.nlu > 0
+    assert ("Jacobians", f"{found.njev}, and {found.nlu} factorizations") in facts(found)
 
 
 def test_smooth_motion_at_all_tolerances(compiled: Callable[..., Any]) -> None:
