@@ -14,6 +14,7 @@ from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
 from symdyn.runtime.arguments import take
+from symdyn.runtime.batch_run import why_one_by_one
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.module import Module
 from symdyn.runtime.outcome import Outcome
@@ -155,9 +156,7 @@ def _raise_others(error: Exception) -> None:
 
 def vectors_serve(module: Module, consistent: bool, options: Mapping[str, Any]) -> bool:
     """Whether motions can be integrated several at once, with the very steps of `simulate`."""
-    metadata = module.metadata
-    return (module.backend == "c" and not (metadata["constraints"] or metadata["unit_groups"] or consistent)
-            and bool(metadata["x"]) and set(options) <= {"rtol", "atol", "max_step", "first_step"})
+    return not (why_one_by_one(module) or consistent) and set(options) <= {"rtol", "atol", "max_step", "first_step"}
 
 
 def motion(setting: Setting, sample: np.ndarray) -> Solution:

@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 
 from symdyn.ensembles.chunk import Chunk, Setting, motion, quiet, setting_of, vectors_serve
+from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
+from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
 from symdyn.ensembles.portable import PortableModule
 from symdyn.ensembles.result import Ensemble
@@ -27,6 +29,8 @@ from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, Ensembl
 from symdyn.runtime.batch import UNIT
 from symdyn.runtime.module import Module
 
+# What is handed on to `simulate`.
+OPTIONS = ("rtol", "atol", "method", "max_step", "first_step", "max_steps", "stabilization", "events")
 # Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
 CHUNK, PARTS = 1000, 16
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
@@ -59,17 +63,18 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
     outstanding chunks that are handed to the executor at a time; default: three for every worker
     functions   of the module that functions of a Solution call in other processes only
-    options     of `simulate`: rtol, atol, method, max_step, max_steps, stabilization
+    options     of `simulate`: rtol, atol, method, max_step, first_step, max_steps, stabilization, events
 
     From 2000 samples on motions are integrated several at once on the processor's vectors, where `simulate_batch` does so.
-    A member that fails has no numbers in its row, and is told in `failures`. Returns an Ensemble. Raises ArgumentError for what
-    does not fit, EnsembleStopped where an executor died or the disk is full: what was done is kept, if there is a path.
+    A member that fails has no numbers in its row, and is told in `failures`; warnings of single motions are not given. Returns an
+    Ensemble. Raises ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an
+    executor died or the disk is full: what was done is kept, if there is a path.
     """
     module = system if isinstance(system, Module) else system.compile() if hasattr(system, "compile") else None
     if module is None:
         raise ArgumentError(f"an ensemble needs a Module or a System, found {system!r:.80}")
     drawn = samples if isinstance(samples, Samples) else Samples(samples, "paired")
-    unknown = [o for o in options if o not in ("rtol", "atol", "method", "max_step", "first_step", "max_steps", "stabilization")]
+    unknown = [o for o in options if o not in OPTIONS]
     if unknown:
         raise ArgumentError(f"{module.name}: an ensemble has no option {', '.join(unknown)}")
     measures = take_measures(outcomes, module)
@@ -81,7 +86,10 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     setting = replace(setting, vectors=vectors)
     size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)
     if path is not None:
-        return _in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True)
+        if not isinstance(path, (str, Path)) or "\0" in str(path):
+            raise ArgumentError(f"{module.name}: the path is {path!r}; pass that of a folder, as text or a Path")
+        with OneRun(Path(path)):
+            return _in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True)
     folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
     try:
         result = _in_folder(folder, setting, drawn, executor, size, ahead, False, progress, False)
@@ -221,8 +229,10 @@ def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...
 
 def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:
     portable: PortableModule = setting.system
-    return {"system": portable.module.name, "code": portable.key(), "backend": portable.module.backend, "chunk": size,
-            "samples": samples.told(), "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
+    functions = {m.label: fingerprint(m.function) for m in setting.measures if m.function is not None}
+    return {**({"functions": functions} if functions else {}), "system": portable.module.name,
+            "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": samples.told(),
+            "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
             "outcomes": {m.label: m.told() for m in setting.measures}, "consistent": setting.consistent,
             "vectors": setting.vectors,
             "base": {k: v.tolist() for k, v in setting.base.items()},

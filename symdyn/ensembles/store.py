@@ -41,7 +41,8 @@ class Store:
         self.chunks.mkdir(parents=True, exist_ok=True)
         for left in self.chunks.glob(".*.tmp"):
             left.unlink(missing_ok=True)
-        return {k for k in range(self.n_chunks) if self._is_whole(k)}
+        there = (int(path.stem) for path in self.chunks.glob("*.npz") if path.stem.isdigit())
+        return {k for k in there if k < self.n_chunks and self._is_whole(k)}
 
     def complete(self) -> bool:
         """Whether the run came to its end; then what it may have left is removed."""

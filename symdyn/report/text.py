@@ -31,7 +31,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Report:
-    """What was generated, what was skipped and why; prints as text."""
+    """What was generated, what was skipped and why; prints as text.
+
+    many   how many states and motions are computed at once
+    """
 
     title: str
     backend: str
@@ -40,6 +43,7 @@ class Report:
     rows: tuple[Row, ...]
     skipped: tuple[str, ...]
     candidates: tuple[Candidate, ...] = ()
+    many: str = ""
 
     def __str__(self) -> str:
         lines = [self.title, f"  backend {self.backend}" + (f": {self.fallback}" if self.fallback else "")]
@@ -52,6 +56,8 @@ class Report:
             lines.append(f"  {r.function:20}{r.total:>11}{kinds[0]:>7}{kinds[1]:>7}{kinds[2]:>5}{kinds[3]:>6}{other:>7}"
                          f"{r.prologue:>10}{r.chain:>15}")
         lines.append("  Every function is generated when it is first used, with nothing in it that it does not need.")
+        if self.many:
+            lines.append(f"  Many at once: {self.many}")
         if self.candidates:
             lines.append("  Chosen for the least time of its right-hand side:")
             lines += [f"    {HEADING}", *(f"    {candidate}" for candidate in self.candidates)]

@@ -16,6 +16,7 @@ from symdyn.runtime.batch import UNIT, input_rows, parameter_rows, tables_of, wi
 from symdyn.runtime.batch_arguments import take_rows, together
 from symdyn.runtime.batch_solution import BatchSolution
 from symdyn.runtime.batch_watches import outside
+from symdyn.runtime.events import wanted
 from symdyn.runtime.inputs import take_inputs
 from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.simulate import checked_positive, checked_times, checked_tolerances
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 PIECE = 5_000
 # The method of motions that are integrated at once; options of `simulate` that are for one by one.
 METHOD, OPTIONS = "dop853", ("method", "max_steps", "stabilization", "events")
-EVENTS = "events"
 NO_VECTORS = "the C compiler has no vectors"
 TOLD = 3
 _DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
@@ -78,9 +78,9 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     if unknown:
         raise ArgumentError(f"{module.name}: simulate_batch has no option {', '.join(unknown)}; besides its own it takes "
                             f"{', '.join(OPTIONS)}")
-    has_events = bool(metadata.get(EVENTS)) and options.get("events") is not False
-    plain = {"method": METHOD, "events": has_events}
-    options = {k: v for k, v in options.items() if v is not None and v is not plain.get(k) and v != plain.get(k)}
+    options = {k: v for k, v in options.items() if v is not None and not (k == "method" and v == METHOD)}
+    events = options.pop("events", True)
+    has_events = bool(wanted(module, events).any())
     initial = metadata["initial"]
     groups = [take_rows(values, metadata[what], f"initial {what}", {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
@@ -94,6 +94,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
     note = why_one_by_one(module, has_events) or _why_these(by_time, options)
+    options["events"] = events
     solution = _one_by_one(module, asked, inputs if by_time else None, note, options) if note else _on_vectors(module, asked)
     if solution.messages:
         told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
@@ -127,7 +128,7 @@ def why_one_by_one(module: Module, events: bool = True) -> str:
         return "one by one: the mechanism has constraints, which states are projected onto"
     if metadata["unit_groups"]:
         return "one by one: the mechanism has Euler parameters, which are normalised after every step"
-    if events and metadata.get(EVENTS):
+    if events and wanted(module, events).any():
         return "one by one: the mechanism has events"
     return "" if metadata["sizes"]["x"] else "one by one: the mechanism has no state"
 
@@ -223,7 +224,7 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str, options: 
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
     messages: dict[int, str] = {}
     times = asked.times if len(asked.times) > 1 else np.array(asked.span)
-    begun = clock.perf_counter()
+    begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
     def solution() -> BatchSolution:
         return BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], 1, note,
@@ -246,10 +247,11 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str, options: 
             messages[k] = str(error)
             continue
         success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
-        kept = np.isin(times, done.t)
-        states = np.full((len(times), n_x), np.nan)
-        states[kept] = done.x[np.isin(done.t, times)]
-        x[k] = states[-len(asked.times):]
+        if len(asked.times) > 1:
+            there = dict(zip(done.t.tolist(), done.x, strict=True))
+            x[k] = [there.get(t, nowhere) for t in times.tolist()]
+        elif done.success:  # at the end, or where an event ended the motion
+            x[k] = done.x[-1]
         if not done.success:
             messages[k] = done.message
     return solution()

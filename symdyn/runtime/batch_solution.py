@@ -16,7 +16,8 @@ class BatchSolution:
     """Motions of one mechanism from many starts, with many parameters.
 
     t          (n_t,) output times, s
-    x          (n, n_t, n_x) states [q; u; z]; NaN after a trajectory has failed
+    x          (n, n_t, n_x) states [q; u; z]; NaN after a trajectory has failed, or an event has ended it, whose state is the end
+               state where only that is kept
     success    (n,) whether the end was reached; messages: of those that did not, when, where and why, by their number
     n_steps, n_rejected   (n,) steps of the integrator
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is

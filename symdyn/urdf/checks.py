@@ -24,7 +24,7 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
         carrying[joint.child] = joint
         hanging.setdefault(joint.parent, []).append(joint)
     roots = [name for name in robot.links if name not in carrying]
-    if len(roots) > 1:
+    if len(roots) > 1 and not robot.dropped:  # one that was dropped may carry the other
         found = ", ".join(f"{name!r} (line {robot.links[name].line})" for name in roots)
         faults.at(robot.links[roots[1]].line, f"{len(roots)} links are the child of no joint: {found}; join all but one to the "
                                               "rest")
@@ -37,7 +37,8 @@ def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
     looped = [joint for joint in carrying.values() if joint.name not in placed and joint.parent in robot.links]
     if looped:
         names = ", ".join(f"{joint.name!r} (line {joint.line})" for joint in looped)
-        faults.at(looped[0].line, f"joints {names} hang on each other in a loop; a URDF is a tree that begins at one link")
+        which = f"joints {names} hang on each other" if len(looped) > 1 else f"joint {looped[0].name!r} hangs a link on itself"
+        faults.at(looped[0].line, f"{which} in a loop; a URDF is a tree that begins at one link")
     return (roots[0] if roots else ""), order
 
 
@@ -59,8 +60,8 @@ def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str
                 break
             if following.name in passed:
                 if following is joint:
-                    faults.at(mimic.line, f"joints {', '.join(map(repr, passed))} mimic each other in a circle; leave out one "
-                                          "<mimic>")
+                    which = f"joints {', '.join(map(repr, passed))} mimic each other in a circle; leave out one <mimic>"
+                    faults.at(mimic.line, which if len(passed) > 1 else f"joint {joint.name!r} mimics itself; leave out <mimic>")
                 break
             if following.kind in ("planar", "floating"):
                 if source is joint:

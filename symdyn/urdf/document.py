@@ -105,9 +105,23 @@ def read_document(path: Path) -> Element:
 def _no_xml(reason: str, text: bytes, line: int) -> str:
     """What is wrong with text that is no XML."""
     reason = reason.partition(":")[0]
+    if not text.strip():
+        return "the file is empty; pass a URDF file"
+    found = _not_utf8(text)
+    if found and "invalid token" in reason:
+        return f"{found}, and the file declares no other encoding; save it as UTF-8, or name the encoding in <?xml encoding=...?>"
     if reason == "unbound prefix":
         lines = text.decode("utf-8", "replace").splitlines()
-        found = lines[line - 1].strip() if line <= len(lines) else ""
-        return (f"a tag has a prefix that the file does not declare, in {found[:100]!r}; if it belongs to xacro, run the file "
+        tag = lines[line - 1].strip() if line <= len(lines) else ""
+        return (f"a tag has a prefix that the file does not declare, in {tag[:100]!r}; if it belongs to xacro, run the file "
                 "through xacro first")
     return f"the file is no XML there ({reason}); pass a URDF file"
+
+
+def _not_utf8(text: bytes) -> str:
+    """Which byte of a text is not UTF-8; "" if it is."""
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return f"the byte 0x{text[error.start]:02x} is not UTF-8"
+    return ""

@@ -12,6 +12,9 @@ from symdyn.urdf.values import FileFaults, Triple
 Named = TypeVar("Named", Link, UrdfJoint)
 # What an axis is where none is given.
 AXIS: Triple = (1.0, 0.0, 0.0)
+# Elements that would contradict each other.
+ONCE = {"link": ("inertial",), "joint": ("origin", "parent", "child", "axis", "dynamics", "mimic"),
+        "inertial": ("origin", "mass", "inertia")}
 
 
 def parse(root: Element, faults: FileFaults) -> Robot:
@@ -24,8 +27,8 @@ def parse(root: Element, faults: FileFaults) -> Robot:
     for element in root.children:
         if element.tag == "link":
             _add(robot.links, _link(element, faults), "link", faults)
-        elif element.tag == "joint":
-            _add(robot.joints, _joint(element, faults), "joint", faults)
+        elif element.tag == "joint" and not _add(robot.joints, _joint(element, faults), "joint", faults):
+            robot.dropped.append(element.line)
     if not robot.links:
         faults.at(root.line, "the robot has no links; a URDF has at least one <link name=\"...\">")
     return robot
@@ -38,14 +41,23 @@ def _refuse_xacro(root: Element, faults: FileFaults) -> None:
             faults.at(element.line, f"<xacro:{name}> is left over from xacro; run the file through xacro first")
 
 
-def _add(known: dict[str, Named], found: Named, what: str, faults: FileFaults) -> None:
+def _add(known: dict[str, Named], found: Named, what: str, faults: FileFaults) -> bool:
+    """Whether it has a name of its own."""
     if not found.name:
-        return
+        return False
     if found.name in known:
         faults.at(found.line, f"the {what} {found.name!r} is there already, in line {known[found.name].line}; give each a name "
                               "of its own")
-        return
+        return False
     known[found.name] = found
+    return True
+
+
+def _demand_once(element: Element, what: str, faults: FileFaults) -> None:
+    for tag in ONCE[element.tag]:
+        found = list(element.all(tag))
+        if len(found) > 1:
+            faults.at(found[1].line, f"{what} has another <{tag}> in line {found[0].line}; leave one of them out")
 
 
 def _origin(element: Element, what: str, faults: FileFaults) -> Origin:
@@ -55,11 +67,13 @@ def _origin(element: Element, what: str, faults: FileFaults) -> Origin:
 
 def _link(element: Element, faults: FileFaults) -> Link:
     name = faults.name(element, "name", "a link")
+    _demand_once(element, f"link {name!r}", faults)
     inertial = element.find("inertial")
     return Link(name, None if inertial is None else _inertial(inertial, f"link {name!r}", faults), element.line)
 
 
 def _inertial(element: Element, what: str, faults: FileFaults) -> Inertial:
+    _demand_once(element, f"{what}: <inertial>", faults)
     mass, inertia = element.find("mass"), element.find("inertia")
     for tag, part in (("mass", mass), ("inertia", inertia)):
         if part is None:
@@ -74,6 +88,7 @@ def _inertial(element: Element, what: str, faults: FileFaults) -> Inertial:
 def _joint(element: Element, faults: FileFaults) -> UrdfJoint:
     name = faults.name(element, "name", "a joint")
     what = f"joint {name!r}"
+    _demand_once(element, what, faults)
     kind = faults.name(element, "type", what)
     if kind and kind not in TYPES:
         faults.at(element.line, f"{what} has the type {kind!r}; there are {', '.join(TYPES)}")

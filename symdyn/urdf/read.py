@@ -25,10 +25,9 @@ from symdyn.urdf.document import as_path, read_document
 from symdyn.urdf.inertias import demand_inertia, negligible, tensor
 from symdyn.urdf.parameters import Names, Parameters, plain
 from symdyn.urdf.parse import parse
-from symdyn.urdf.robot import ZERO, Inertial, Link, Origin, Robot, UrdfJoint
+from symdyn.urdf.robot import GRAVITY, ZERO, Inertial, Link, Origin, Robot, UrdfJoint
 from symdyn.urdf.values import FileFaults, nearest
 
-GRAVITY = 9.81
 ROOTS = ("fixed", "floating")
 
 

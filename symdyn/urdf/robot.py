@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from symdyn.urdf.values import Triple
 
+# A file holds no gravity; what is read has so much along -z, m/s^2.
+GRAVITY = 9.81
 ZERO: Triple = (0.0, 0.0, 0.0)
 # Types of joints and how many coordinates each has.
 TYPES = {"fixed": 0, "revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
@@ -74,8 +76,12 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class Robot:
-    """All of a file that dynamics depends on, in the order of the file."""
+    """All of a file that dynamics depends on, in the order of the file.
+
+    dropped   lines of joints that have no name of their own
+    """
 
     name: str
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, UrdfJoint] = field(default_factory=dict)
+    dropped: list[int] = field(default_factory=list)

@@ -11,6 +11,8 @@ from symdyn.urdf.document import Element
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 Triple = tuple[float, float, float]
+# Nothing in metres, kilograms or radians is larger, and squares of such numbers are finite still.
+LARGEST = 1e100
 
 
 class FileFaults(list[str]):
@@ -52,12 +54,11 @@ class FileFaults(list[str]):
             return list(default or [0.0] * n)
         words = text.split()
         values = [float(word) for word in words if _NUMBER.fullmatch(word)]
-        # A number such as 1e999 is one, but not a finite one.
-        if len(values) == len(words) == n and all(abs(v) < float("inf") for v in values):
+        if len(values) == len(words) == n and all(abs(v) <= LARGEST for v in values):
             return values
         about = "; it looks like xacro, so run the file through xacro first" if "${" in text or "$(" in text else ""
-        self.at(element.line, f"{what}: {attribute} of <{element.tag}> is {text[:100]!r}; give {wanted}, finite and written "
-                              f"out{about}")
+        how = ", finite and written out" if len(values) < len(words) or len(words) != n else f" of {LARGEST:.0e} at most"
+        self.at(element.line, f"{what}: {attribute} of <{element.tag}> is {text[:100]!r}; give {wanted}{how}{about}")
         return list(default or [0.0] * n)
 
 

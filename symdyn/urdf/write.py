@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import sympy as sp
 
-from symdyn.errors import ModelError
+from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed, Joint, Prismatic, Revolute
 from symdyn.model.loads import JointForce
@@ -19,6 +20,7 @@ from symdyn.model.symbols import Coordinate, Input
 from symdyn.urdf.angles import angles
 from symdyn.urdf.document import as_path
 from symdyn.urdf.parameters import Names
+from symdyn.urdf.robot import GRAVITY
 
 # What limits are where a type of joint must have some, m or rad, N or N m, m/s or rad/s.
 _UNLIMITED = "1e+09"
@@ -30,6 +32,10 @@ def urdf_text(model: Model) -> str:
     lines = writer.lines()
     if writer.faults:
         raise ModelError(writer.faults, model.name)
+    gravity = writer.gravity()
+    if gravity != (0.0, 0.0, -GRAVITY):
+        warnings.warn(f"{model.name}: a URDF holds no gravity, and read_urdf takes {GRAVITY} m/s^2 along -z; here it is "
+                      f"[{', '.join(f'{g:g}' for g in gravity)}]", ModelWarning, stacklevel=4)
     return "\n".join(lines) + "\n"
 
 
@@ -85,6 +91,7 @@ class _Writer:
         model, faults = self.model, self.faults
         for what, given in (("closed loops", [j.name for j in model.loops]), ("constraints", [c.name for c in model.constraints]),
                             ("extra states", [z.symbol.name for z in model.states]),
+                            ("events", [e.name for e in model.events]),
                             ("a moving ground", ["ground"] if model.ground_motion is not None else [])):
             if given:
                 faults.append(f"it has {what} ({', '.join(given)}); a URDF is a tree of links and joints alone")
@@ -123,6 +130,10 @@ class _Writer:
                                "loads but viscous damping: leave it out")
             return
         self.damping[joint.name] = self.damping.get(joint.name, 0.0) + float(d)
+
+    def gravity(self) -> tuple[float, ...]:
+        """As numbers, m/s^2."""
+        return tuple(self._array(self.model.gravity).ravel().tolist())
 
     # -- elements
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import errno
 import itertools
+import os
 import pickle
+import signal
+import time
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
@@ -15,6 +18,7 @@ from scipy import stats
 import symdyn as sd
 from symdyn.ensembles import chunk, portable, run, store
 from symdyn.ensembles.archive import thinned
+from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
 from symdyn.runtime.recall import recall
@@ -397,6 +401,58 @@ def test_only_the_same_ensemble_is_gone_on_with(module, tmp_path):
     (folder / "manifest.json").write_text("{")
     with pytest.raises(ArgumentError, match=r"manifest.json cannot be read"):
         sd.ensemble(module, drawn(), T, path=folder, resume=True)
+
+
+def test_a_changed_function_is_another_ensemble(module, tmp_path):
+    def asked(factor):
+        return {"widest": lambda solution: factor * solution["q1"].max()}
+
+    first = sd.ensemble(module, drawn(), T, asked(1), path=tmp_path / "a")
+    assert sd.ensemble(module, drawn(), T, asked(1), path=tmp_path / "a", resume=True).n_resumed == first.count
+    differ = r'holds another ensemble.*\n  functions: {"widest": "\w+"} there, {"widest": "\w+"} now$'
+    with pytest.raises(ArgumentError, match=differ):
+        sd.ensemble(module, drawn(), T, asked(2), path=tmp_path / "a", resume=True)
+
+
+def test_one_run_at_a_time_in_a_folder(module, tmp_path):
+    folder, told = tmp_path / "deep" / "a", []
+
+    def other(solution):
+        if not told:
+            with pytest.raises(ArgumentError, match=r"another run is at work in .*a: .*wait until it has ended, or name another"):
+                sd.ensemble(module, drawn(), T, path=folder, resume=True)
+            told.append(True)
+        return solution["q1"].max()
+
+    sd.ensemble(module, drawn(), T, {"widest": other}, path=folder, executor=ThreadPoolExecutor(1))
+    assert told and sd.ensemble(module, drawn(), T, {"widest": other}, path=folder, resume=True).n_resumed == 40
+    (tmp_path / "file").write_text("")
+    for path, message in ((tmp_path / "file", r"the folder .*file cannot be used \(File exists\)"),
+                          (3, r"the path is 3; pass that of a folder"), ("a\0b", r"the path is 'a\\x00b'")):
+        with pytest.raises(ArgumentError, match=message):
+            sd.ensemble(module, drawn(), T, path=path)
+    with pytest.raises(ArgumentError, match="holds another"):
+        sd.ensemble(module, drawn(), T, path=folder, resume=True)
+    with pytest.raises(ArgumentError, match="none of 1 samples"):
+        sd.ensemble(module, {"m1": [np.nan]}, T, path=tmp_path / "b")
+    assert folder.exists() and not (tmp_path / "b").exists()  # where nothing was written nothing is left
+
+
+def test_a_forked_worker_does_not_hold_the_lock(tmp_path):
+    ready, tell = os.pipe()
+    with OneRun(tmp_path):
+        child = os.fork()
+        if child == 0:
+            os.write(tell, b"!")
+            time.sleep(30)
+            os._exit(0)
+        assert os.read(ready, 1) == b"!"
+    try:
+        with OneRun(tmp_path), pytest.raises(ArgumentError, match="another run"), OneRun(tmp_path):
+            pass
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
 
 
 def test_results_are_read_with_numpy_alone(module, tmp_path):

@@ -195,6 +195,12 @@ def test_every_fault_of_the_file_in_one_message(tmp_path: Path) -> None:
      ["3: joint 'j': parent has no link; write <parent link=\"...\">", "3: joint 'j' has no child; write <child link=\"...\"/>"]),
     ([link("a"), link("b"), joint("j", "revolute", "a", "b"), joint("j", "revolute", "a", "b")],
      ["5: the joint 'j' is there already, in line 4; give each a name of its own"]),
+    # what follows from a joint without a name of its own is not told, too
+    ([link("a"), link("b"), link("c"), joint("j", "revolute", "a", "b"), joint("j", "revolute", "b", "c")],
+     ["6: the joint 'j' is there already, in line 5; give each a name of its own"]),
+    ([link("a"), link("b"), joint("", "fixed", "a", "b")], ["4: a joint has no name; write <joint name=\"...\">"]),
+    ([link("a"), link("b"), joint("j", "fixed", "a", "a")],
+     ["4: joint 'j' hangs a link on itself in a loop; a URDF is a tree that begins at one link"]),
 ])
 def test_what_is_no_tree(tmp_path: Path, lines: list[str], told: list[str]) -> None:
     assert faults(tmp_path, robot(*lines)) == told
@@ -202,7 +208,7 @@ def test_what_is_no_tree(tmp_path: Path, lines: list[str], told: list[str]) -> N
 
 @pytest.mark.parametrize(("more", "told"), [
     ('<mimic joint="hing"/>', "6: joint 'arm' mimics 'hing', which is no joint of the file; did you mean 'hinge'?"),
-    ('<mimic joint="arm"/>', "6: joints 'arm' mimic each other in a circle; leave out one <mimic>"),
+    ('<mimic joint="arm"/>', "6: joint 'arm' mimics itself; leave out <mimic>"),
     ("<mimic/>", "6: joint 'arm': mimic has no joint; write <mimic joint=\"...\">"),
     ('<mimic joint="hinge" multiplier="two"/>',
      "6: joint 'arm': multiplier of <mimic> is 'two'; give a number, finite and written out"),
@@ -210,7 +216,9 @@ def test_what_is_no_tree(tmp_path: Path, lines: list[str], told: list[str]) -> N
     ('<axis xyz="0 1"/>', "6: joint 'arm': xyz of <axis> is '0 1'; give 3 numbers, finite and written out"),
     ('<origin rpy="nan 0 0"/>', "6: joint 'arm': rpy of <origin> is 'nan 0 0'; give 3 numbers, finite and written out"),
     ('<origin xyz="1_0 0 0"/>', "6: joint 'arm': xyz of <origin> is '1_0 0 0'; give 3 numbers, finite and written out"),
-    ('<origin xyz="1e999 0 0"/>', "6: joint 'arm': xyz of <origin> is '1e999 0 0'; give 3 numbers, finite and written out"),
+    ('<origin xyz="1e999 0 0"/>', "6: joint 'arm': xyz of <origin> is '1e999 0 0'; give 3 numbers of 1e+100 at most"),
+    ('<origin xyz="0 -2e100 0"/>', "6: joint 'arm': xyz of <origin> is '0 -2e100 0'; give 3 numbers of 1e+100 at most"),
+    ('<axis xyz="1 0 0"/>\n<axis xyz="0 1 0"/>', "7: joint 'arm' has another <axis> in line 6; leave one of them out"),
     ('<origin xyz="0 0 ${h/2}"/>', "6: joint 'arm': xyz of <origin> is '0 0 ${h/2}'; give 3 numbers, finite and written out; it "
                                    "looks like xacro, so run the file through xacro first"),
 ])
@@ -285,7 +293,8 @@ DOCTYPE = ("the file declares a document type, which is refused: entities and ot
     ('<!DOCTYPE robot SYSTEM "http://nowhere.invalid/robot.dtd">\n<robot name="&x;"/>', f"1: {DOCTYPE}"),
     ('<robot>\n<link name="&x;"/></robot>', "2: the file is no XML there (undefined entity); pass a URDF file"),
     ("<robot>\n<link name='a'>\n</robot>", "3: the file is no XML there (mismatched tag); pass a URDF file"),
-    ("", "1: the file is no XML there (no element found); pass a URDF file"),
+    ("", "1: the file is empty; pass a URDF file"), ("<robot>\n\0</robot>", "2: the file is no XML there (not well-formed "
+                                                                          "(invalid token)); pass a URDF file"),
     ("<sdf version='1.6'/>", "1: the file holds a <sdf>; a URDF holds a <robot>"),
     ('<robot name="r">\n<xacro:include filename="arm.xacro"/>\n</robot>',
      "2: a tag has a prefix that the file does not declare, in '<xacro:include filename=\"arm.xacro\"/>'; if it belongs to "
@@ -297,6 +306,23 @@ DOCTYPE = ("the file declares a document type, which is refused: entities and ot
 ])
 def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
     assert faults(tmp_path, text) == [told]
+
+
+def test_files_in_other_encodings(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    for encoding in ("latin-1", "utf-16"):
+        path.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>\n{pendulum().replace("bar", "bår")}'.encode(encoding))
+        assert "bår" in [body.name for body in sd.read_urdf(path).check().bodies]
+    path.write_bytes(pendulum().replace("bar", "bår").encode("latin-1"))
+    with pytest.raises(ModelError, match=r":\d+: the byte 0xe5 is not UTF-8, and the file declares no other encoding; save it"):
+        sd.read_urdf(path)
+
+
+def test_elements_that_contradict_each_other(tmp_path: Path) -> None:
+    heavy = BALL.replace("<inertial>", '<inertial><mass value="7"/>')
+    assert faults(tmp_path, pendulum(link("twice", f"{BALL}\n{BALL}"), link("heavy", heavy))) [:2] == [
+        "6: link 'twice' has another <inertial> in line 5; leave one of them out",
+        "7: link 'heavy': <inertial> has another <mass> in line 7; leave one of them out"]
 
 
 def test_files_that_are_not_there(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import symdyn as sd
 from symdyn.bench.robots import collection
-from symdyn.errors import ArgumentError, MissingExtra, ModelError
+from symdyn.errors import ArgumentError, MissingExtra, ModelError, ModelWarning
 from symdyn.urdf.angles import angles, rotation
 from tests.urdf.texts import ALL, saved
 
@@ -138,10 +138,20 @@ def fault_of(change: Callable[[sd.System], object]) -> str:
     return fault
 
 
+def test_gravity_that_is_not_what_is_read_is_told(tmp_path: Path) -> None:
+    system = sd.System("side", gravity=[0, -9.81, 0])
+    bar = system.add_body("bar", mass=1, inertia=[1, 1, 1], com=[1, 0, 0])
+    system.add_joint(sd.Revolute("hinge", system.ground, bar, sd.coordinates("q"), axis=[0, 0, 1]))
+    told = r"^side: a URDF holds no gravity, and read_urdf takes 9\.81 m/s\^2 along -z; here it is \[0, -9\.81, 0\]$"
+    with pytest.warns(ModelWarning, match=told):
+        system.to_urdf(tmp_path / "side.urdf")
+
+
 @pytest.mark.parametrize(("change", "told"), [
     (lambda s: s.close_loop(sd.Rod("rod", "two + more", "four", 1.0)), "it has closed loops (rod); a URDF is a tree of links"),
     (lambda s: s.add_constraint(sd.coordinates("b") - 1, "stop"), "it has constraints (stop); a URDF is a tree"),
     (lambda s: s.add_state(sd.coordinates("z"), 1), "it has extra states (z)"),
+    (lambda s: s.add_event("bump", sd.coordinates("b")), "it has events (bump)"),
     (lambda s: s.move_ground(position=[sd.t, 0, 0]), "it has a moving ground (ground)"),
     (lambda s: s.add_joint(sd.Spherical("ball", "four", s.add_body("five", mass=1, inertia=[1, 1, 1]))),
      "joint 'ball' is spherical; what is written is fixed, revolute or prismatic"),
