@@ -24,6 +24,7 @@ _HOME = {
     "symdyn.model.system": ("System",),
     "symdyn.formulation.explicit": ("embedding",),
     "symdyn.formulation.explicit_augmented": ("augmented",),
+    "symdyn.report.full": ("full_report",),
     "symdyn.report.latex": ("latex",),
     "symdyn.flexible.beam": ("Beam",),
     "symdyn.flexible.shape": ("Shape",),
@@ -38,7 +39,7 @@ _HOME = {
                       "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
-_PACKAGES = {name: f"symdyn.{name}" for name in ("frames", "lecture", "rotation", "systems")} | {
+_PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {
     name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")} | {"shapes": "symdyn.model.shapes"}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]

@@ -216,6 +216,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "charts": [list(chart) for chart in equations.charts],
                 "masses": {p.name: body for p, body in equations.symbols.masses.items()},
                 "output_units": dict(equations.symbols.point_units),
                 "events": event_records(equations),

@@ -1,4 +1,4 @@
-"""The command line: symdyn list | derive | generate | simulate | sweep | report | diagnose | compare | bench | demo.
+"""The command line: symdyn list | derive | generate | simulate | sweep | report | diagnose | compare | bench | stress | demo.
 
 Everything is imported when it is needed, so that help and list come at once and a simulation that was done before
 starts without SymPy. Exit codes: 0 done, 1 it could not be done, 2 it was asked wrongly, 3 the simulation stopped
@@ -13,13 +13,13 @@ import warnings
 from collections.abc import Sequence
 
 from symdyn.cli.messages import FAILED, INTERRUPTED, WRONG, Stop, complain, show_warning
-from symdyn.cli.parser import make_parser
+from symdyn.cli.parser import joined, make_parser
 from symdyn.errors import CompileError, CompilerNotFound, EvaluationError, MissingExtra, SymdynError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
-    arguments = make_parser().parse_args(argv)
+    arguments = make_parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
     with warnings.catch_warnings():
         warnings.showwarning = show_warning
         try:

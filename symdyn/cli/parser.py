@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,12 @@ from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.report import report
 from symdyn.cli.simulate import simulate
+from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
 from symdyn.cli.values import stabilization
+
+# What `symdyn bench` measures under a word of its own.
+_MEASUREMENTS = ("peers", "loops", "growth")
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -61,11 +65,14 @@ def make_parser() -> argparse.ArgumentParser:
     formulation(proof)
     proof.add_argument("--tune", action="store_true", help="compile the candidates and time them, instead of predicting")
     proof.add_argument("--no-verify", action="store_true", help="leave out the proof")
+    _add_full(proof)
     _add_diagnose(coordinates(command("diagnose", diagnose, "what the constraints do: freedoms, redundant and contradictory "
                                       "ones, singular configurations, idle motions")))
     _add_compare(command("compare", compare, "what slides print beside what symdyn derives, with a verdict on every entry; "
                          "without names the cases are listed", system=False))
-    _add_bench(commands.add_parser("bench", help="measure symdyn", description="Measure symdyn on this machine."))
+    _add_bench(commands)
+    _add_stress(command("stress", stress, "numerical stability: every check with a figure, a bound with its reason, and a "
+                        "verdict; without names the catalogue, and mechanisms made for the purpose", system=False))
     _add_output(command("demo", demo, "derive, generate, compile, simulate and draw a robot arm that falls freely",
                         system=False))
     return parser
@@ -93,8 +100,9 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="END or START END, s (default: the system's)")
     parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance of a step (default: 1e-8)")
     parser.add_argument("--atol", type=float, help="absolute tolerance of a step (default: as rtol)")
-    parser.add_argument("--method", help="dop853 (compiled), or RK23, RK45, DOP853, Radau, BDF, LSODA of SciPy; with "
-                        "constraints also ggl (pip install 'symdyn[dae]')")
+    parser.add_argument("--method", help="compiled: dop853 (default), bs54 (loose tolerances), taylor (fine ones), gauss (long "
+                        "conservative motion), radau (stiff), auto (chosen among these); RK23, RK45, DOP853, Radau, BDF, LSODA "
+                        "of SciPy; with constraints also ggl (pip install 'symdyn[dae]')")
     parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
     for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1"),
                        ("--u", "initial speeds, such as q1_dot=1"), ("--z", "initial extra states"),
@@ -127,6 +135,14 @@ def _add_sweep(parser: argparse.ArgumentParser) -> None:
     _add_output(parser)
 
 
+def _add_full(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--full", action="store_true", help="write a page that works offline: equations, operations, condition "
+                        "of the mass matrix along a motion, work against error, stability under stress, proof")
+    parser.add_argument("--budget", metavar="SECONDS", type=float, help="with --full, for work against error (default: 20)")
+    parser.add_argument("--output", metavar="DIR", type=Path, help="with --full, folder for report.html (default: "
+                        "generated/NAME)")
+
+
 def _add_diagnose(parser: argparse.ArgumentParser) -> None:
     for flag, what in (("--q", "coordinates of the state to look at, such as q1=0.1"), ("--set", "parameters, such as l=2.0")):
         parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
@@ -146,10 +162,39 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
                         "generated/compare)")
 
 
-def _add_bench(parser: argparse.ArgumentParser) -> None:
-    kinds = parser.add_subparsers(title="what", metavar="WHAT", required=True)
+def joined(argv: Sequence[str]) -> list[str]:
+    """The arguments with `bench peers` and the like as one word: a command of its own beside `bench`, which takes names."""
+    words = list(argv)
+    return [" ".join(words[:2]), *words[2:]] if words[:1] == ["bench"] and words[1:2] and words[1] in _MEASUREMENTS else words
+
+
+def _add_bench(commands: Any) -> None:
+    text = "what motions cost at every accuracy: time, evaluations and operations against the error"
+    work = commands.add_parser("bench", help=f"{text}; also {', '.join(_MEASUREMENTS)}", description=(
+        f"Measure {text}, for formulations, methods and tolerances, against references of more digits. `symdyn bench peers` "
+        "(accelerations beside Pinocchio and CasADi), `loops` (constraints beside published motions) and `growth` (what more "
+        "bodies cost) are measurements of their own."))
+    work.set_defaults(run=bench.work)
+    work.add_argument("systems", metavar="NAME", nargs="*", help="a system of the catalogue, with its first option such as "
+                      "'n_link_pendulum(5)', one of lagrange_top, heavy_top, torque_free_body, or a Python file that defines "
+                      "system()")
+    work.add_argument("--all", action="store_true", help="sixteen mechanisms from the pendulum to the floating turbine")
+    for flag, what in (("--formulations", "embedding, recursive, augmented, absolute, absolute:angles, and with Euler "
+                        "parameters embedding:parameters and the like (default: all that there are)"),
+                       ("--methods", "compiled ones and SciPy's (default: all compiled ones)"),
+                       ("--against", "other programs in the same run: scipy cvode ida heyoka casadi pinocchio mujoco exudyn")):
+        work.add_argument(flag, metavar="NAME", nargs="+", help=what)
+    for flag, metavar, what in (("--rtol", "TOLERANCE", "tolerances, relative and absolute (default: 1e-3 to 1e-15)"),
+                                ("--steps", "STEP", "s, for gauss, whose steps have one length, besides the tolerances"),
+                                ("--at", "TIME", "s, times besides the end at which errors are told")):
+        work.add_argument(flag, metavar=metavar, nargs="+", type=float, help=what)
+    work.add_argument("--end", metavar="TIME", type=float, help="s (default: the system's duration)")
+    work.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the median counts (default: 5)")
+    work.add_argument("--budget", metavar="SECONDS", type=float, help="begin no run after this time; the same command goes on")
+    work.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
+    _add_output(work, "generated/bench; what an unfinished run left there is gone on with")
     text = "accelerations of the same mechanisms beside Pinocchio and CasADi's C code, in one run"
-    peers = kinds.add_parser("peers", help=text, description=text)
+    peers = commands.add_parser("bench peers", prog="symdyn bench peers", description=text)
     peers.set_defaults(run=bench.peers)
     peers.add_argument("--models", metavar="NAME", nargs="+", help="some of the mechanisms, such as spatial_chain or "
                         "'spatial_chain(7)' (default: all)")
@@ -157,12 +202,12 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
                         "counts (default: 40)")
     peers.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
     text = "how operations, derivation, compilation and run time grow with the number of bodies: table and picture"
-    growth = kinds.add_parser("growth", help=text, description=text)
+    growth = commands.add_parser("bench growth", prog="symdyn bench growth", description=text)
     growth.set_defaults(run=bench.growth)
     growth.add_argument("--sizes", metavar="N", nargs="+", type=int, help="numbers of bodies (default: 2 to 100)")
     _add_output(growth)
     text = "mechanisms with loops beside published motions and closed forms: errors, energy, constraints, run time"
-    loops = kinds.add_parser("loops", help=text, description=text)
+    loops = commands.add_parser("bench loops", prog="symdyn bench loops", description=text)
     loops.set_defaults(run=bench.loops)
     loops.add_argument("--systems", metavar="NAME", nargs="+", help="some of the mechanisms, such as andrews_squeezer or "
                        "'n_four_bar(2)' (default: all)")
@@ -170,5 +215,17 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
     loops.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
 
 
-def _add_output(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the files (default: generated/NAME)")
+def _add_stress(parser: argparse.ArgumentParser) -> None:
+    parser.epilog = "Exit codes: 0 nothing failed; 1 a check failed; 2 it was asked wrongly."
+    parser.add_argument("systems", metavar="NAME", nargs="*", help="a system of the catalogue, or a Python file that defines "
+                        "system()")
+    parser.add_argument("--short", action="store_true", help="fewer states and systems, shorter runs: less than half a minute")
+    parser.add_argument("--checks", metavar="CHECK", nargs="+", help="some of the checks, by name")
+    parser.add_argument("--list", action="store_true", help="list the checks and do nothing else")
+    parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the work (default: one a processor)")
+    parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
+    _add_output(parser, "generated/stress")
+
+
+def _add_output(parser: argparse.ArgumentParser, default: str = "generated/NAME") -> None:
+    parser.add_argument("--output", metavar="DIR", type=Path, help=f"folder for the files (default: {default})")

@@ -93,7 +93,8 @@ class Gathered:
             raise ModelError(self.faults, self.model.name)
 
     def length(self) -> Any:
-        """The mechanism's length, m: root of the sum of squares of all distances of joints and of centres of mass, else 1 m."""
+        """The mechanism's length, m: root of the sum of squares of all distances of joints, else of centres of mass, else of
+        parameters that are lengths, as long as these are not zero; else 1 m."""
         a = self.algebra
         with a.section("length of the mechanism"):
             total: Any = 0
@@ -105,6 +106,13 @@ class Gathered:
             if is_zero(total):
                 for body in self.model.bodies:
                     total = total + dot(*(2 * [a.constants(body.com)]))
+            if is_zero(total):
+                for p in self.model.parameters:
+                    if self.model.units.get(p) == "m":
+                        total = total + a.expression(p) ** 2
+                if not is_zero(total):
+                    apply = a.recorder.apply
+                    total = apply("select", apply("gt", total, 0), total, 1)
             return 1 if is_zero(total) else a.name("length", a.sqrt(total))
 
     # -- each kind

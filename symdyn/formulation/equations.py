@@ -51,6 +51,7 @@ class Equations:
     quantities   name -> function that records it; planar: 3 rows a body instead of 6
     notes        what the formulation left out, and why
     unit_groups  coordinates that form a unit vector (Euler parameters)
+    charts       of Euler angles: joint, sequence, kind of speeds, coordinate of the second angle
     again        derives the same equations on a new tape, so that files do not depend on what was recorded before
     frames       axes that quantities are formed in: "body", or "parallel" where links keep those of the link before
     candidates   what this formulation was chosen from, if it was chosen (symdyn.choice)
@@ -74,6 +75,7 @@ class Equations:
     quantities: Mapping[str, Callable[[], Any]]
     notes: tuple[str, ...] = ()
     unit_groups: tuple[tuple[sp.Symbol, ...], ...] = ()
+    charts: tuple[tuple[str, str, str, str], ...] = field(default=(), kw_only=True)
     again: Callable[[], Equations] | None = None
     simplify_seconds: float = 10.0
     frames: str = "body"

@@ -17,7 +17,7 @@ from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed, Joint, Modal
-from symdyn.model.orientation import EulerParameters
+from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.record import Model
 from symdyn.tape.recorder import Recorder
 
@@ -69,7 +69,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body",
                   identification=quantities.identification if tree.rigid else None,
-                  provenance=OfBodies(quantities), watched=quantities.loads.watches, events=model.events,
+                  provenance=OfBodies(quantities), charts=_charts(model), watched=quantities.loads.watches, events=model.events,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
                   flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),
@@ -98,6 +98,13 @@ def _notes(model: Model, tree: Tree) -> list[str]:
 def _reach(model: Model) -> dict[sp.Symbol, float]:
     """Elastic coordinates: a deflection of a tenth of the beam's length is far."""
     return {q: joint.reach for joint in model.joints if isinstance(joint, Modal) for q in joint.coordinates}
+
+
+def _charts(model: Model) -> tuple[tuple[str, str, str, str], ...]:
+    """Joints whose orientation is told by Euler angles of their own; the second angle is what brings gimbal lock."""
+    oriented = [(j, getattr(j, "orientation", None)) for j in model.joints]
+    return tuple((j.name, angles.sequence, angles.speeds, j.coordinates[-2].name) for j, angles in oriented
+                 if isinstance(angles, EulerAngles) and j.coordinates[-2] in model.coordinates)
 
 
 def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:

@@ -334,8 +334,8 @@ class System:
         Numbers read back to the last bit (angles of a frame: to rounding), with the same names; what `sd.read_urdf` made is read
         back equal. Links have their frames at their joints, as the format has it; the root link is the one body that a Fixed
         joint holds at the ground's frame, else a link "world". Joints without limits are written as continuous, dependent
-        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity, drives by inputs, outputs and shapes have no
-        place in it. Returns the path.
+        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity (a ModelWarning tells where it is not what
+        `sd.read_urdf` takes), drives by inputs, outputs and shapes have no place in it. Returns the path.
 
         Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a
         file that cannot be written; ArgumentError for a path that is none.

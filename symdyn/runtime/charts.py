@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,16 +25,18 @@ INSTEAD = "take EulerParameters, or another sequence"
 def distances(module: Module, x: np.ndarray) -> np.ndarray:
     """How far the angles of every chart are from gimbal lock, rad, (n, n_charts), of rows of states."""
     names, rows = module.metadata["x"], np.atleast_2d(x)
-    found = [np.abs(np.cos(b) if len(set(sequence)) == 3 else np.sin(b)) for _, sequence, _, name in module.metadata.get(CHARTS, ())
-             for b in [rows[:, names.index(name)]]]
+    found = []
+    for _, sequence, _, name in module.metadata.get(CHARTS, ()):
+        angle = rows[:, names.index(name)]
+        found.append(np.abs(np.cos(angle) if len(set(sequence)) == 3 else np.sin(angle)))
     return np.array(found).reshape(-1, len(rows)).T
 
 
 def at_lock(module: Module, x: np.ndarray) -> str:
     """What to add to a message where a run stopped: that angles are at gimbal lock, if they are."""
-    told = [f"the {sequence} angles of joint {joint} are within {d:.2g} rad of gimbal lock ({INSTEAD})" for (joint, sequence, *_), d in
-            zip(module.metadata.get(CHARTS, ()), distances(module, x).ravel(), strict=True) if d < AT]
-    return "".join(f"; {text}" for text in told)
+    charts = module.metadata.get(CHARTS, ())
+    return "".join(f"; the {sequence} angles of joint {joint} are within {d:.2g} rad of gimbal lock ({INSTEAD})"
+                   for (joint, sequence, *_), d in zip(charts, distances(module, x).ravel(), strict=True) if d < AT)
 
 
 def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarray, run: Callable[[Request], Outcome],
@@ -67,13 +69,7 @@ def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarra
             if between.min() < least:
                 least, when = float(between.min()), float(outcome.t[int(between.argmin())])
         if least < limit:
-            warnings.warn(f"{module.name}: near t = {when:.9g} the {sequence} angles of joint {joint} came within {least:.2g} "
-                          "rad of "
-                          f"gimbal lock, where rounding errors of their rates exceed rtol = {request.rtol:g}: digits are lost, "
-                          "and "
-                          f"steps are short; {INSTEAD}", SimulationWarning, stacklevel=level + 1)
-
-
-def chart_records(joints: Any) -> list[list[str]]:
-    """Joint, sequence, speeds, coordinate of the second angle, as plain data, from the equations' charts."""
-    return [list(map(str, row)) for row in joints]
+            warnings.warn(
+                f"{module.name}: near t = {when:.9g} the {sequence} angles of joint {joint} came within {least:.2g} rad of "
+                f"gimbal lock, where rounding errors of their rates exceed rtol = {request.rtol:g}: digits are lost, and steps "
+                f"are short; {INSTEAD}", SimulationWarning, stacklevel=level + 1)

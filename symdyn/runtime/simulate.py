@@ -12,6 +12,7 @@ import numpy as np
 from symdyn.errors import ArgumentError, MissingExtra, SimulationInterrupted, SimulationWarning
 from symdyn.runtime.arguments import take
 from symdyn.runtime.automatic import automatic
+from symdyn.runtime.charts import CHARTS, warn_near_lock
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.events import wanted
@@ -47,10 +48,10 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
     rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 on; atol a number or (n_x,), default rtol
     method      compiled: one of symdyn.runtime.methods.COMPILED, such as "dop853" (default with the C backend), "bs54" for
-                loose tolerances; or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and
-                LSODA get the exact Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and
-                Leimkuhler by an implicit method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial
-                runs) and constraints; `Solution.why` tells
+                loose tolerances, "radau" for stiff systems; or one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an
+                OdeSolver class; Radau, BDF and LSODA get the exact Jacobian. With constraints also "ggl": the stabilized
+                index-2 form of Gear, Gupta and Leimkuhler by an implicit method (pip install 'symdyn[dae]'). "auto": by
+                tolerance, stiffness (short trial runs) and constraints; `Solution.why` tells
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
     progress    show a bar (needs tqdm)
     work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
@@ -108,6 +109,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
     if metadata.get(WATCHES) and len(solution.t):
         warn(module, solution.rows(WATCHES), "in this motion", 3)
+    if metadata.get(CHARTS) and method != "ggl":
+        warn_near_lock(module, request, solution.t, solution.x, lambda part: _run(module, part, method), 3)
     return solution
 
 

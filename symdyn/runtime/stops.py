@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import EvaluationError
+from symdyn.runtime.charts import at_lock
 from symdyn.runtime.constraints import names, rank, scaled_jacobian
 
 if TYPE_CHECKING:
@@ -16,19 +17,20 @@ if TYPE_CHECKING:
 
 def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
     """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
+    locked = at_lock(module, x)
     if "mass_matrix" not in module.functions or not module.metadata["u"] or names(module):
-        return ""  # under constraints a singular mass matrix is nothing special
+        return locked  # under constraints a singular mass matrix is nothing special
     try:
         M = module.evaluate("mass_matrix", t, x, p)
     except EvaluationError:
-        return ""
+        return locked
     scale = np.sqrt(np.maximum(np.diagonal(M), 1e-300))
     values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
     if values[0] > 1e-8 * values[-1]:
-        return ""
+        return locked
     share = np.abs(vectors[:, 0])
     along = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
-    return f"; the mass matrix is nearly singular there, along {', '.join(along)}"
+    return f"; the mass matrix is nearly singular there, along {', '.join(along)}{locked}"
 
 
 def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.ndarray, t0: float) -> str:

@@ -1,0 +1,55 @@
+"""Work against error: what a motion costs at every accuracy, by formulation, method and tolerance (`symdyn bench`, `sd.bench`).
+
+    cases, bodies, closed_forms   the mechanisms of --all, and how a name becomes what is measured
+    subject                       its formulations, and errors of motions in any coordinates
+    reference, converged, store   what errors are measured by: closed forms, runs with more digits, runs that agree
+    methods, asked                what can be asked for, checked
+    measure, against              one row of ours, and of another program
+    benchmark                     the plan, the run that goes on where it was stopped, the result
+    table, picture, page          how it is shown
+    command                       `symdyn bench`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from symdyn.bench.work.benchmark import Benchmark
+
+
+def bench(system: Any, formulations: Sequence[str] | None = None, methods: Sequence[str] | None = None,
+          tolerances: Sequence[float] | None = None, steps: Sequence[float] | None = None, end: float | None = None,
+          repeats: int = 5, against: Sequence[str] = (), budget: float | None = None, folder: Any = None,
+          progress: bool = False, at: Sequence[float] = ()) -> Benchmark:
+    """Measure what the motion of a mechanism costs at every accuracy.
+
+    system         a System, equations such as those of sd.embedding, or a name of the catalogue, such as "double_pendulum" or
+                   "n_link_pendulum(5)", or of the list of `symdyn bench --all`
+    formulations   some of "embedding", "recursive", "augmented", "absolute", "absolute:angles", and where the system can be had
+                   with Euler parameters also "embedding:parameters" and so on; default: all that the mechanism has
+    methods        compiled ones and SciPy's, as for `simulate`; default: all compiled ones
+    tolerances     relative and absolute ones of a step; default: 1e-3 to 1e-15
+    steps          s, for methods with steps of one length; besides the tolerances; default: none
+    end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state
+    repeats        timed runs of a row, of which the median counts; of very short ones up to eight times as many
+    against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn"
+    budget         s after which no further run is begun
+    folder         where results are written, after every run; what an unfinished run left there is gone on with
+    progress       show a bar (needs tqdm)
+    at             times besides the end at which errors are of interest, s
+
+    Raises ArgumentError that lists everything that is wrong with what is asked for; SymdynError if nothing can be measured.
+    """
+    from symdyn.bench.work.asked import checked
+    from symdyn.bench.work.benchmark import run
+    from symdyn.bench.work.cases import taken
+
+    subject = taken(system, end)
+    asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at)
+    result = run(subject, asked, None if folder is None else Path(folder), progress)
+    if folder is not None:
+        result.save(folder)
+    return result

@@ -1,0 +1,60 @@
+"""What another program is asked for when it runs beside symdyn: the same motion, at its own fair best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import numpy as np
+
+from symdyn.errors import SymdynError
+
+# A run that would take longer is not made, s.
+LONGEST = 15.0
+# tolerance -> seconds inside its integrator, evaluations of the right-hand side (0: it does not tell), state at the end in
+# symdyn's order, (n_x,)
+Runner = Callable[[float], tuple[float, int, np.ndarray]]
+
+
+class Unfit(SymdynError):
+    """A peer that cannot run a mechanism; the message tells why, in one short sentence."""
+
+
+class Failed(SymdynError):
+    """A run of a peer that did not reach the end at this tolerance; the message tells what the peer said."""
+
+
+@contextmanager
+def fitting(program: str) -> Iterator[None]:
+    """What goes wrong while a program is prepared is a reason why it is left out: raises Unfit."""
+    try:
+        yield
+    except Unfit:
+        raise
+    except (SymdynError, ArithmeticError, RuntimeError, ValueError) as error:
+        raise Unfit(f"{program} does not take it: {next(iter(str(error).strip().splitlines()), type(error).__name__)}") from None
+
+
+class Peer(Protocol):
+    """One program with one integrator.
+
+    name    of the row, such as "heyoka" or "scipy LSODA"; title: the same with versions, for the legend
+    """
+
+    name: str
+    title: str
+
+    def available(self) -> bool | str:
+        """True, or why it cannot run here and what to install."""
+        ...
+
+    def prepare(self, equations: Any, params: np.ndarray, x0: np.ndarray, end: float, system: Any = None) -> Runner:
+        """What runs the motion; everything that is done once (derivation, compilation) is done here, outside the timing.
+
+        equations   of one formulation, symdyn.formulation.equations.Equations; its symbols give the order of params and x
+        params      (n_p,);  x0: (n_x,) consistent start [q; u; z] at t = 0;  end: s
+        system      the System they were derived from, for peers that take bodies and joints; None if there is none
+        Raises Unfit if the peer has no way to run this mechanism. The runner raises Failed.
+        """
+        ...

@@ -1,0 +1,95 @@
+"""What the bench is asked for, checked: all faults at once."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from symdyn.bench.work import against, methods
+from symdyn.bench.work.subject import Subject
+from symdyn.errors import ArgumentError
+
+TOLERANCES = tuple(10.0**-k for k in range(3, 16))
+TIGHTEST = 1e-15
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is measured, checked.
+
+    formulations   None: all;  steps: s, None: chosen after a trial run;  at: further times of interest, s
+    budget         s, None: no bound
+    """
+
+    formulations: tuple[str, ...] | None
+    methods: tuple[str, ...]
+    tolerances: tuple[float, ...]
+    steps: tuple[float, ...] | None
+    repeats: int
+    against: tuple[str, ...]
+    budget: float | None
+    at: tuple[float, ...]
+
+
+def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
+              steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = ()) -> list[str]:
+    """Everything that is wrong with what is asked for, a sentence each."""
+    known = list(dict.fromkeys(name for subject in subjects for name in subject.names))
+    faults = [*_unknown(formulations, known, "formulation"), *_unknown(method_names, methods.names(), "method"),
+              *_unknown(peers, against.names(), "peer")]
+    for value in tolerances or ():
+        if not (_is_number(value) and TIGHTEST <= value < 1):
+            faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and 1")
+    shortest = min((s.end for s in subjects), default=math.inf)
+    for value in steps or ():
+        if not (_is_number(value) and 0 < value <= shortest):
+            faults.append(f"the step {value!r} must be a time, s, of at most the motion's {shortest:g} s")
+    for value in at or ():
+        if not (_is_number(value) and 0 < value <= shortest):
+            faults.append(f"the time {value!r} at which errors are asked for must lie within the motion, 0 to {shortest:g} s")
+    if not (isinstance(repeats, int) and not isinstance(repeats, bool) and repeats >= 1):
+        faults.append(f"{repeats!r} repeats were asked for; pass a number from 1 on")
+    if budget is not None and not (_is_number(budget) and budget > 0):
+        faults.append(f"the budget {budget!r} must be a positive number of seconds")
+    for subject in subjects:
+        if not (math.isfinite(subject.end) and subject.end > 0):
+            faults.append(f"the end {subject.end!r} of {subject.name} must be a positive time, s")
+    return faults
+
+
+def checked(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
+            steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = ()) -> Asked:
+    """What is asked for. Raises ArgumentError that lists everything that is wrong with it."""
+    formulations, method_names, peers = _listed(formulations), _listed(method_names), _listed(peers)
+    tolerances, steps, at = _listed(tolerances), _listed(steps), _listed(at)
+    faults = faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at)
+    if faults:
+        raise ArgumentError("the bench cannot run: " + (faults[0] if len(faults) == 1 else
+                                                        f"{len(faults)} faults:\n  - " + "\n  - ".join(faults)))
+    once = lambda values: tuple(dict.fromkeys(values))
+    return Asked(once(formulations) if formulations else None, once(method_names or methods.usual()),
+                 tuple(sorted({float(v) for v in tolerances or TOLERANCES}, reverse=True)),
+                 tuple(sorted({float(v) for v in steps}, reverse=True)) if steps else None, repeats, once(peers or ()),
+                 budget, tuple(sorted({float(v) for v in at or ()})))
+
+
+def _listed(values: Any) -> Any:
+    """A single value as a list of one."""
+    return [values] if isinstance(values, (str, int, float)) else None if values is None else list(values)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _unknown(names: Any, known: Sequence[str], what: str) -> list[str]:
+    faults = []
+    for name in names or ():
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 3)
+            faults.append(f"there is no {what} {name!r}; " + (f"did you mean {' or '.join(near)}?" if near else
+                                                              f"there {'are ' + ', '.join(known) if known else 'is none'}"))
+    return faults

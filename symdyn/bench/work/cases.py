@@ -1,0 +1,142 @@
+"""The mechanisms of `symdyn bench --all`, and how a name becomes what is measured."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from symdyn import systems
+from symdyn.bench.work import closed_forms
+from symdyn.bench.work.bodies import free_body, heavy_top, lagrange_top
+from symdyn.bench.work.subject import Subject
+from symdyn.errors import ArgumentError
+from symdyn.formulation.equations import Equations
+from symdyn.model.system import System
+
+_ORIENTATION = "orientation"
+_ORIENTATIONS = ("angles", "parameters")
+# m/s, of the turbine.
+_WIND = 8.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One mechanism of the list.
+
+    make     gives the system, or its name in the catalogue; options: of it
+    end      s (default: the system's duration)
+    closed   closed form of the motion in the coordinates of the first formulation, with its source
+    """
+
+    make: str | Callable[..., System]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    end: float | None = None
+    closed: Callable[[Sequence[float]], Any] | None = None
+    source: str = ""
+
+    def maker(self) -> Callable[..., System]:
+        """The function that gives the system."""
+        return getattr(systems, self.make) if isinstance(self.make, str) else self.make  # type: ignore[no-any-return]
+
+
+def turbine_in_wind(orientation: str = "angles") -> System:
+    """The catalogue's floating turbine in a steady wind that begins at once."""
+    system = systems.get("floating_wind_turbine", orientation=orientation)
+    system.initial = {**system.initial, "v_w": _WIND}
+    return system
+
+
+CASES: dict[str, Case] = {
+    "pendulum": Case("pendulum", closed=closed_forms.pendulum, source="Jacobi's elliptic functions at 25 digits"),
+    "double_pendulum": Case("double_pendulum"),
+    "n_link_pendulum(5)": Case("n_link_pendulum", {"n": 5}),
+    "spatial_chain(6)": Case("spatial_chain", {"n": 6}, end=3.0),
+    "puma560": Case("puma560"),
+    "four_bar": Case("four_bar"),
+    "slider_crank": Case("slider_crank"),
+    "andrews_squeezer": Case("andrews_squeezer"),
+    "car_axis": Case("car_axis"),
+    "bricard": Case("bricard"),
+    "n_four_bar(2)": Case("n_four_bar", {"n": 2}, end=10.0),
+    "flyball_governor": Case("flyball_governor", end=1.0),
+    "lagrange_top": Case(lagrange_top, closed=closed_forms.lagrange_top,
+                         source="elliptic functions, precession and spin by quadrature at 25 digits"),
+    "heavy_top": Case(heavy_top),
+    "torque_free_body": Case(free_body, closed=closed_forms.free_body,
+                             source="elliptic functions, precession by quadrature at 25 digits"),
+    "floating_wind_turbine": Case(turbine_in_wind, end=30.0),
+}
+
+
+def known() -> list[str]:
+    """Every name that can be measured, besides options in parentheses."""
+    return list(dict.fromkeys([*CASES, *systems.names()]))
+
+
+def subject(name: str, end: float | None = None) -> Subject:
+    """What is measured under a name of the list, of the catalogue, or of the catalogue with its first option in parentheses,
+    such as n_link_pendulum(7).
+
+    Raises ArgumentError for a name that there is not.
+    """
+    case = CASES.get(name)
+    if case is None:
+        found = re.fullmatch(r"(\w+)(?:\((\w+)\))?", name)
+        if found is None or found[1] not in systems.names():
+            near = difflib.get_close_matches(name, known(), 3)
+            hint = f"did you mean {' or '.join(near)}? There are" if near else "there are"
+            raise ArgumentError(f"there is no mechanism {name!r} to measure; {hint} {', '.join(known())}, and Python files that "
+                                "define system()")
+        options = {}
+        if found[2]:
+            first = next(iter(inspect.signature(getattr(systems, found[1])).parameters.values()), None)
+            if first is None:
+                raise ArgumentError(f"{found[1]} takes no option, found {name!r}")
+            options = {first.name: int(found[2]) if found[2].isdigit() else found[2]}
+        case = Case(found[1], options)
+    made = from_maker(file_name(name), case.maker(), end or case.end, case.options)
+    return Subject(made.name, made.variants, made.end, closed=case.closed, source=case.source)
+
+
+def taken(system: Any, end: float | None = None) -> Subject:
+    """What is measured of a system, of equations or under a name.
+
+    Raises ArgumentError for anything else.
+    """
+    if isinstance(system, str):
+        return subject(system, end)
+    if isinstance(system, System):
+        return of_system(system, end)
+    if isinstance(system, Equations):
+        return of_equations(system, end)
+    raise ArgumentError(f"the bench takes a System, equations or a name of the catalogue, found {system!r}")
+
+
+def from_maker(name: str, make: Callable[..., System], end: float | None = None,
+               options: Mapping[str, Any] | None = None) -> Subject:
+    """What is measured of the systems that a function makes: if it has an option `orientation`, with Euler angles and with
+    Euler parameters."""
+    options = dict(options or {})
+    takes = {p.name: p.default for p in inspect.signature(make).parameters.values()}
+    both = _ORIENTATION in takes and takes[_ORIENTATION] in _ORIENTATIONS and _ORIENTATION not in options
+    variants = {v: make(**options, **({_ORIENTATION: v} if both else {})) for v in (_ORIENTATIONS if both else ("",))}
+    return Subject(name, variants, float(end or next(iter(variants.values())).duration))
+
+
+def of_system(system: System, end: float | None = None) -> Subject:
+    """What is measured of one system."""
+    return Subject(file_name(system.name), {"": system}, float(end or system.duration))
+
+
+def of_equations(equations: Equations, end: float | None = None) -> Subject:
+    """What is measured of equations, such as those of sd.embedding."""
+    return Subject(file_name(equations.name), {}, float(end or equations.symbols.duration), given=equations)
+
+
+def file_name(name: str) -> str:
+    """A name without parentheses, for files."""
+    return re.sub(r"\W+", "_", name).strip("_")

@@ -1,0 +1,97 @@
+"""`symdyn bench`: mechanism after mechanism, with a table of each and one page of all."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from symdyn.bench.work.asked import checked
+from symdyn.bench.work.benchmark import Benchmark
+from symdyn.bench.work.benchmark import run as run_one
+from symdyn.bench.work.cases import CASES, subject
+from symdyn.bench.work.page import write_page
+from symdyn.bench.work.subject import Subject
+from symdyn.errors import ArgumentError, MissingExtra, SymdynError
+
+FOLDER = Path("generated") / "bench"
+
+
+def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None], Subject]) -> int:
+    """Measure what was asked for; returns how many mechanisms could not be measured.
+
+    from_file   what is measured of a user's file
+    Raises ArgumentError that lists everything that is wrong with what was asked for.
+    """
+    names = list(dict.fromkeys([*arguments.systems, *(CASES if arguments.all else ())]))
+    subjects, faults = _subjects(names, arguments.end, from_file)
+    if not names:
+        faults.append(f"nothing is named; name mechanisms such as {', '.join(list(CASES)[:3])}, a Python file, or pass --all")
+    options = {"formulations": arguments.formulations, "method_names": arguments.methods, "tolerances": arguments.rtol,
+               "steps": arguments.steps, "repeats": arguments.repeats, "peers": arguments.against or (),
+               "budget": arguments.budget, "at": arguments.at or ()}
+    try:
+        asked = checked(subjects, **options)
+    except ArgumentError as error:
+        if not faults:
+            raise
+        faults.append(str(error))
+    if faults:
+        raise ArgumentError("\n".join(faults))
+    folder, begun = arguments.output or FOLDER, clock.perf_counter()
+    results: list[Benchmark] = []
+    pictures: list[Path] = []
+    failed = 0
+    for k, one in enumerate(subjects):
+        share = None
+        if asked.budget is not None:
+            left = asked.budget - (clock.perf_counter() - begun)
+            if left <= 0:
+                print(f"the budget of {asked.budget:g} s is used up: {', '.join(s.name for s in subjects[k:])} were not begun; "
+                      "run it again with the same output folder to go on", file=sys.stderr)
+                break
+            share = left / (len(subjects) - k)
+        try:
+            result = run_one(one, replace(asked, budget=share), _place(folder, one, subjects), arguments.progress, _tell)
+        except (ArgumentError, MissingExtra):
+            raise
+        except SymdynError as error:
+            failed += 1
+            print(f"symdyn: {error}", file=sys.stderr)
+            continue
+        print(result.table(), end="\n\n", flush=True)
+        try:
+            written = result.save(_place(folder, one, subjects))
+        except MissingExtra as error:
+            print(f"symdyn: {error}", file=sys.stderr)
+            continue
+        print("\n".join(f"wrote {path}" for path in written), flush=True)
+        results.append(result)
+        pictures.append(next(path for path in written if path.suffix == ".svg"))
+    if len(subjects) > 1 and results:
+        print(f"wrote {write_page(results, pictures, folder / 'report.html')}")
+    return failed
+
+
+def _subjects(names: Sequence[str], end: float | None, from_file: Callable[[Path, float | None], Subject]
+              ) -> tuple[list[Subject], list[str]]:
+    """What is measured, and what is wrong with the names."""
+    found, faults = [], []
+    for name in names:
+        try:
+            found.append(from_file(Path(name), end) if name.endswith(".py") else subject(name, end))
+        except SymdynError as error:
+            faults.append(str(error))
+    return found, faults
+
+
+def _place(folder: Path, one: Subject, subjects: Sequence[Subject]) -> Path:
+    """Of several mechanisms, and under the usual folder, each has a folder of its own."""
+    return folder / one.name if len(subjects) > 1 or folder == FOLDER else folder
+
+
+def _tell(text: str) -> None:
+    print(f"symdyn: {text}", file=sys.stderr, flush=True)

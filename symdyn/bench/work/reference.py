@@ -1,0 +1,101 @@
+"""What errors are measured by: a closed form, a stored or fresh run with more digits than floats have, or two runs that agree."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+import warnings
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from symdyn.bench.work import store
+from symdyn.bench.work.converged import converged, expected_seconds
+from symdyn.bench.work.record import Reference
+from symdyn.bench.work.subject import Formulation, Subject, Yardstick
+from symdyn.errors import SimulationWarning, SymdynError
+
+# Seconds that a run with more digits may take where no budget is given.
+PATIENCE = 120.0
+# Output times of a reference.
+N_TIMES = 10
+# Runs of which two must agree: tolerances of each formulation with each method.
+_TIGHT = (1e-12, 1e-13, 1e-14)
+_METHODS = ("dop853", "Radau", "DOP853")
+_SECONDS_OF_SCIPY = 20.0
+
+
+def default_times(subject: Subject) -> list[float]:
+    """Ten times, evenly over the motion, the last of them its end, and those that are asked for, s."""
+    even = [subject.end * k / N_TIMES for k in range(1, N_TIMES + 1)]
+    return sorted({*even, *[float(t) for t in subject.at]})
+
+
+def find_reference(subject: Subject, formulations: Sequence[Formulation], seconds: float = PATIENCE,
+                   told: Callable[[str], None] = lambda text: None) -> Reference:
+    """The best reference that there is, or that can be made within about so many seconds.
+
+    told   is called with what is going on
+    Raises SymdynError where nothing gives a reference.
+    """
+    first, times = formulations[0], default_times(subject)
+    if subject.closed is not None:
+        return Reference("closed form", tuple(times), subject.closed(times), 15.9, subject.source, first.coordinates)
+    found = store.find(subject.name, first, times)
+    if found is not None:
+        return found
+    why = ""
+    try:
+        expected = expected_seconds(first, subject.end)
+        if expected > seconds:
+            why = f"a run with more digits would take about {expected:.0f} s"
+        else:
+            told(f"a reference with more digits is made, about {expected:.0f} s; it is kept")
+            reference, text = converged(first, times, until=clock.perf_counter() + 2 * seconds)
+            store.keep(first, reference, text)
+            return reference
+    except SymdynError as error:
+        why = str(error)
+    told(f"{why}: taken are the two tightest runs that agree")
+    return agreement(formulations, times, why)
+
+
+def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: str) -> Reference:
+    """Of tight runs of different formulations or methods the two that agree best: the second of them, with the digits of the
+    agreement.
+
+    Raises SymdynError if there are no two.
+    """
+    first = formulations[0]
+    runs = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)
+        for formulation in formulations:
+            begun = clock.perf_counter()
+            for method in _METHODS:
+                if method != "dop853" and clock.perf_counter() - begun > _SECONDS_OF_SCIPY:
+                    continue
+                for rtol in _TIGHT if method == "dop853" else _TIGHT[:1]:
+                    try:
+                        sol = formulation.module.simulate(np.r_[0.0, times], rtol=rtol, method=method)
+                    except SymdynError:
+                        continue
+                    if sol.success:
+                        runs.append((formulation, method, rtol, sol.x[1:]))
+    best: tuple[float, str, int] | None = None
+    for k, (formulation, method, rtol, x) in enumerate(runs):
+        if formulation.coordinates != first.coordinates:
+            continue
+        yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 0.0, ""), formulation)
+        for other, other_method, other_rtol, y in runs:
+            if (other.name, other_method) == (formulation.name, method):
+                continue
+            differ = float(np.max(yardstick.errors(other, y)))
+            if math.isfinite(differ) and (best is None or differ < best[0]):
+                best = differ, (f"{formulation.name} with {method} at {rtol:g} and {other.name} with {other_method} at "
+                                f"{other_rtol:g} differ by {differ:.1e}"), k
+    if best is None:
+        raise SymdynError(f"{first.equations.name}: there is no reference: {why}, and no two runs of different formulations or "
+                          "methods got to the end; shorten the motion, or look at why they stop")
+    return Reference("agreement", tuple(times), runs[best[2]][3].tolist(), -math.log10(max(best[0], 1e-16)),
+                     f"{best[1]} ({why})", first.coordinates, True)

@@ -1,0 +1,146 @@
+"""References that were made before: those of the package, made by a command, and those of this user, in the cache folder.
+
+`python -m symdyn.bench.work.store NAME ...` makes references for the package anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import sys
+import time as clock
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symdyn.bench.work.record import Reference
+from symdyn.bench.work.subject import Formulation
+from symdyn.errors import EvaluationError, SymdynError
+from symdyn.runtime.cache import cache_dir
+
+STORE = Path(__file__).with_name("references.json")
+# Rates of the stored states may differ by this from the module's, relative to the largest, before they are another motion's.
+SAME = 1e-8
+
+
+def find(name: str, formulation: Formulation, times: Sequence[float], until: float = np.inf) -> Reference | None:
+    """A reference that holds all of these times for this very motion; None if there is none.
+
+    name   of the mechanism in the package's store
+    """
+    packaged = stored().get(name)
+    for data in (packaged, _read(_cached(formulation, times))):
+        if data is not None:
+            reference = _fitting(data, formulation, times)
+            if reference is not None:
+                return reference
+    return None
+
+
+def keep(formulation: Formulation, reference: Reference, text: Sequence[Sequence[str]]) -> None:
+    """Put a reference into the cache folder."""
+    _write(_cached(formulation, reference.times), record(formulation, reference, text))
+
+
+def record(formulation: Formulation, reference: Reference, text: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """What is stored: the numbers it depends on, times, states, digits, how they were shown."""
+    return {"how": reference.how, "digits": round(reference.digits, 1), "names": list(formulation.coordinates),
+            "given": _given(formulation), "times": list(reference.times), "x": [list(row) for row in text],
+            "rates": [[float(f"{v:.12g}") for v in row] for row in _rates(formulation, reference)]}
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """The package's references, by name."""
+    return _read(STORE) or {}
+
+
+def _given(formulation: Formulation) -> dict[str, float]:
+    module = formulation.module
+    metadata = module.metadata
+    return {**dict(zip(metadata["parameters"], module.default_parameters.tolist(), strict=True)),
+            **dict(zip(metadata["x"], formulation.x0.tolist(), strict=True)),
+            **{n: float(metadata["initial"].get(n, 0.0)) for n in metadata["inputs"]}}
+
+
+def _rates(formulation: Formulation, reference: Reference) -> np.ndarray:
+    module = formulation.module
+    given = [float(module.metadata["initial"].get(n, 0.0)) for n in module.metadata["inputs"]]
+    return np.array([module.rhs(t, np.array(x, dtype=float), None, given)
+                     for t, x in zip(reference.times, reference.x, strict=True)])
+
+
+def _fitting(data: dict[str, Any], formulation: Formulation, times: Sequence[float]) -> Reference | None:
+    """The stored motion at these times, if it is the motion of the formulation: same numbers, same rates at its states."""
+    if data["names"] != list(formulation.coordinates) or data["given"] != _given(formulation):
+        return None
+    places = [_index(data["times"], t) for t in times]
+    if None in places:
+        return None
+    reference = Reference("extended", tuple(data["times"]), [[float(v) for v in row] for row in data["x"]], data["digits"],
+                          data["how"], tuple(data["names"]))
+    try:
+        rates, known = _rates(formulation, reference), np.array(data["rates"])
+    except EvaluationError:
+        return None
+    if not np.abs(rates - known).max() <= SAME * np.abs(known).max():
+        return None
+    x = [reference.x[k] for k in places if k is not None]
+    return Reference("extended", tuple(float(t) for t in times), x, data["digits"], data["how"], tuple(data["names"]))
+
+
+def _index(times: Sequence[float], t: float) -> int | None:
+    return next((k for k, s in enumerate(times) if abs(s - t) <= 1e-12 * max(1.0, abs(t))), None)
+
+
+def _cached(formulation: Formulation, times: Sequence[float]) -> Path:
+    told = json.dumps([formulation.equations.name, list(formulation.coordinates), _given(formulation), [float(t) for t in times]])
+    stem = re.sub(r"[^A-Za-z0-9_-]", "_", formulation.equations.name)
+    return cache_dir() / "references" / f"{stem}-{hashlib.sha256(told.encode()).hexdigest()[:16]}.json"
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # not there, or a damaged file, which is made again
+        return None
+
+
+def _write(path: Path, data: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = re.sub(r"\[\s+([^\[\]{}]+?)\s+\]", lambda m: "[" + re.sub(r",\s+", ", ", m[1]) + "]", json.dumps(data, indent=1))
+    partial = path.with_name(f".{path.name}-{os.getpid()}.tmp")
+    partial.write_text(text + "\n", encoding="utf-8")
+    os.replace(partial, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command: makes references and puts them into the package."""
+    from symdyn.bench.work.cases import CASES, subject
+    from symdyn.bench.work.converged import DIGITS, converged
+    from symdyn.bench.work.reference import default_times
+
+    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.work.store", description="Make references of the bench anew.")
+    parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(CASES)} (default: all)")
+    parser.add_argument("--digits", type=int, default=DIGITS, help=f"of the local errors (default: {DIGITS})")
+    given = parser.parse_args(arguments)
+    for name in given.names or CASES:
+        about, begun = subject(name), clock.perf_counter()
+        first = about.first()
+        try:
+            reference, text = converged(first, default_times(about), given.digits)
+        except SymdynError as error:
+            print(f"{name}: {error}", flush=True)
+            continue
+        made = record(first, reference, text)
+        _write(STORE, dict(sorted({**stored(), about.name: made}.items())))
+        print(f"{name}: {reference}; {clock.perf_counter() - begun:.0f} s", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

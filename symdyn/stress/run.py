@@ -1,0 +1,179 @@
+"""Runs checks: those that any mechanism can be put to, and those that need one of their own."""
+
+from __future__ import annotations
+
+import difflib
+import time as clock
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from symdyn.errors import ArgumentError, MissingExtra
+from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
+from symdyn.stress.record import FAIL, NotApplicable, Row, StressReport
+from symdyn.stress.subject import Subject
+
+# In the short form, where the whole catalogue would take too long.
+SHORT = ("cart_pole", "pendulum_absolute")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check, or a family: run(subject, short) of any mechanism, or run(short) with mechanisms of its own.
+
+    short   whether the short form has it
+    """
+
+    name: str
+    run: Callable[..., Iterator[Row]]
+    of_system: bool = False
+    short: bool = True
+
+    @property
+    def title(self) -> str:
+        """The first line of what it says of itself."""
+        return (self.run.__doc__ or "").strip().splitlines()[0]
+
+
+CHECKS = {check.name: check for check in (
+    Check("rounding", rounding.rounding, True), Check("condition", motion.condition, True),
+    Check("energy", motion.energy, True), Check("constraints", motion.constraints, True),
+    Check("reversal", motion.reversal, True), Check("divergence", motion.divergence, True),
+    Check("units", units.units, True), Check("steps", extremes.steps, True), Check("denormals", extremes.denormals, True),
+    Check("masses", extremes.masses, True), Check("inputs", extremes.inputs, True),
+    Check("gimbal", attitude.gimbal), Check("flips", attitude.flips), Check("rotor", attitude.rotor),
+    Check("constraint_drift", long_runs.constraint_drift), Check("energy_drift", long_runs.energy_drift),
+    Check("stiffness", long_runs.stiffness), Check("massless", singular.massless),
+    Check("singular", singular.configurations, short=False), Check("redundant", singular.redundant, short=False),
+    Check("user_forces", singular.user_forces), Check("chaos", chains.chaos),
+    Check("long_chains", chains.long_chains, short=False),
+)}
+
+
+def stress(system: Any = None, short: bool = False, checks: Sequence[str] | None = None, progress: bool = False,
+           jobs: int = 1, show: Callable[[Row], None] | None = None) -> StressReport:
+    """Put a mechanism, or symdyn itself with its catalogue, under stress.
+
+    system     a System, Equations or the name of one of the catalogue, or a list of these; None: the catalogue, and the checks
+               that have mechanisms of their own
+    short      fewer states, systems and shorter runs: less than half a minute
+    checks     names of CHECKS; default: all that apply
+    progress   show a bar (needs tqdm); jobs: processes, for names of the catalogue and checks of their own
+    show       called with every row as soon as it is there
+
+    Returns a StressReport; `passed` is False if a row failed. A check that crashes is such a row.
+    Raises ArgumentError for an unknown check.
+    """
+    tasks = _tasks(system, short, _chosen(checks))
+    report, begun = StressReport(), clock.perf_counter()
+    bar = _bar(sum(len(names) for _, names, _ in tasks)) if progress else None
+    many = jobs > 1 and all(isinstance(task[0], str) for task in tasks)
+    for rows, left_out, n in _spread(tasks, jobs) if many else _in_turn(tasks):
+        report.rows += rows
+        report.left_out += left_out
+        if bar is not None:
+            bar.update(n)
+        if show is not None:
+            for row in rows:
+                show(row)
+    if bar is not None:
+        bar.close()
+    report.seconds = clock.perf_counter() - begun
+    return report
+
+
+Task = tuple[Any, tuple[str, ...], bool]
+Result = tuple[list[Row], list[str], int]
+
+
+def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
+    """What to run: a system ("" for none) with names of checks."""
+    own = tuple(c.name for c in chosen if not c.of_system and (c.short or not short))
+    of_system = tuple(c.name for c in chosen if c.of_system and (c.short or not short))
+    if system is not None:
+        listed = list(system) if isinstance(system, (list, tuple)) else [system]
+        if not of_system:
+            raise ArgumentError(f"the checks {', '.join(own)} have mechanisms of their own; leave out the system")
+        return [(one, of_system, short) for one in listed]
+    from symdyn.systems import names
+
+    listed = list(SHORT if short else names())
+    return [*[("", (name,), short) for name in own], *[(name, of_system, short) for name in listed if of_system]]
+
+
+def _chosen(names: Sequence[str] | None) -> list[Check]:
+    if names is None:
+        return list(CHECKS.values())
+    unknown = [name for name in names if name not in CHECKS]
+    if unknown:
+        near = difflib.get_close_matches(str(unknown[0]), CHECKS, 3)
+        hint = f"did you mean {' or '.join(near)}? There are" if near else "there are"
+        raise ArgumentError(f"there is no check {', '.join(map(repr, unknown))}; {hint} {', '.join(CHECKS)}")
+    return [CHECKS[name] for name in names]
+
+
+def _in_turn(tasks: Sequence[Task]) -> Iterator[Result]:
+    """One check after the other."""
+    for system, names, short in tasks:
+        subject: Any = system
+        for name in names:
+            rows, left_out, subject = _one(subject, name, short)
+            yield rows, left_out, 1
+
+
+def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any]:
+    """Rows of a check, what it leaves out, and the subject for the next one. Whatever a check raises is a row."""
+    check, rows = CHECKS[name], []
+    label = system if isinstance(system, str) else getattr(system, "name", repr(system))
+    try:
+        if check.of_system and not isinstance(system, Subject):
+            system = Subject(system)
+        label = system.name if isinstance(system, Subject) else "-"
+        for row in check.run(system, short) if check.of_system else check.run(short):
+            rows.append(row)
+    except NotApplicable as reason:
+        return rows, [f"{name}, {label}: {reason}"], system
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(last.filename).name}:{last.lineno}"
+        rows.append(Row(name, str(label), f"{type(error).__name__} in {where}", None, None,
+                        "", FAIL, f"the check itself ended early: {error}"[:400]))
+    return rows, [], system
+
+
+def _whole(task: Task) -> Result:
+    """All checks of one task, in a process of its own."""
+    system, names, short = task
+    rows: list[Row] = []
+    left_out: list[str] = []
+    subject: Any = system
+    for name in names:
+        found, reasons, subject = _one(subject, name, short)
+        rows += found
+        left_out += reasons
+    return rows, left_out, len(names)
+
+
+def _spread(tasks: Sequence[Task], jobs: int) -> Iterator[Result]:
+    """Several tasks at a time."""
+    with ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn")) as pool:
+        waiting = {pool.submit(_whole, task): task for task in tasks}
+        for done in as_completed(waiting):
+            system, names, _ = waiting[done]
+            try:
+                yield done.result()
+            except Exception as error:  # the process itself died
+                died = Row(", ".join(names), str(system) or "-", "its process", None, None, "", FAIL, f"it died: {error}"[:400])
+                yield [died], [], len(names)
+
+
+def _bar(total: int) -> Any:
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
+    return tqdm(total=total, desc="stress", unit="check")

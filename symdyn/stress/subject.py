@@ -1,0 +1,156 @@
+"""A mechanism under stress: its equations, generated code of its functions, runs of its motion."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+from symdyn.formulation.equations import Equations
+from symdyn.pipeline import FUNCTIONS, emit, has_function
+from symdyn.runtime.compiler import Compiler, find_compiler, plain
+from symdyn.runtime.module import Module
+from symdyn.runtime.solution import Solution
+from symdyn.runtime.unit import CUnit, PythonUnit
+
+EPS = 2.0**-53
+# Of runs that are compared: all but the last digits.
+RTOL = 1e-10
+# Derivatives, and forms for other purposes.
+IDENTIFICATION, LONG = ("regressor", "inertial_parameters", "base_regressor", "base_parameters"), 1000
+SELDOM = ("jacobian_x", "jacobian_inputs", "jacobian_params", "power_x", "reactions_by_lam", "residual", "watches",
+          "drawn_lengths", "events", "event_resets")
+
+
+class Subject:
+    """A mechanism with its usual parameters, start and duration.
+
+    system   a System, Equations, or the name of a system of the catalogue
+    """
+
+    def __init__(self, system: Any) -> None:
+        if isinstance(system, str):
+            from symdyn.systems import get
+
+            system = get(system)
+        self.equations: Equations = system if isinstance(system, Equations) else system.equations()
+        self.name = self.equations.name
+        self.symbols = self.equations.symbols
+        self._whole: Any = None
+        self._evaluators: dict[str, Any] = {}
+
+    @cached_property
+    def module(self) -> Module:
+        return self.equations.compile()  # type: ignore[no-any-return]
+
+    @cached_property
+    def everything(self) -> tuple[str, ...]:
+        """All functions but derivatives, which are compiled when they are asked for; of long equations also without those of
+        identification."""
+        long = self.equations.tape("rhs").operations > LONG
+        without = {*SELDOM, *IDENTIFICATION} if long else set(SELDOM)
+        return tuple(name for name in FUNCTIONS if name not in without and self.has(name))
+
+    @property
+    def constrained(self) -> bool:
+        return bool(self.equations.constraints)
+
+    @cached_property
+    def params(self) -> np.ndarray:
+        return self.module.parameters()
+
+    @cached_property
+    def inputs(self) -> np.ndarray:
+        """What inputs are while nothing else is said, (n_in,)."""
+        initial = self.module.metadata["initial"]
+        return np.array([initial.get(name, 0.0) for name in self.module.metadata["inputs"]], dtype=float)
+
+    @property
+    def duration(self) -> float:
+        return float(self.module.metadata["duration"])
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """The usual start, on the constraints, (n_x,)."""
+        metadata = self.module.metadata
+        x = np.array([metadata["initial"].get(name, 0.0) for name in metadata["x"]], dtype=float)
+        n_q, n_u = metadata["sizes"]["q"], metadata["sizes"]["u"]
+        for group in metadata.get("unit_groups", ()):
+            places = [metadata["x"].index(name) for name in group]
+            norm = np.linalg.norm(x[places])
+            x[places] = x[places] / norm if norm > 0 else [1.0, *[0.0] * (len(places) - 1)]
+        if self.constrained:
+            q, u = self.module.consistent(x[:n_q], x[n_q:n_q + n_u])
+            x[:n_q + n_u] = np.concatenate([q, u])
+        return x
+
+    def parts(self, x: np.ndarray) -> dict[str, np.ndarray]:
+        """A state as arguments of `simulate`."""
+        sizes = self.module.metadata["sizes"]
+        q, u, z = np.split(np.asarray(x, dtype=float), np.cumsum([sizes["q"], sizes["u"]]))
+        return {"q": q, "u": u, "z": z} if len(z) else {"q": q, "u": u}
+
+    def run(self, t: Any, x: np.ndarray | None = None, params: Any = None, rtol: float = RTOL, **options: Any) -> Solution:
+        """A motion; warnings are kept in `told` of the solution."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            sol = self.module.simulate(t, params=self.params if params is None else params, rtol=rtol,
+                                       **self.parts(self.start if x is None else x), **options)
+        sol.told = [str(w.message) for w in caught]  # type: ignore[attr-defined]
+        return sol  # type: ignore[no-any-return]
+
+    def has(self, name: str) -> bool:
+        return has_function(self.equations, name)
+
+    def evaluate(self, name: str, t: Any, x: np.ndarray, params: np.ndarray | None = None, inputs: Any = None,
+                 ud: Any = None) -> np.ndarray:
+        """A function at rows of states, (n, size); rows of NaN where it cannot be evaluated. Compiled without optimization."""
+        if name not in self._evaluators:
+            together = name in self.everything
+            if together and self._whole is None:
+                self._whole = self.unit(self.everything)
+            self._evaluators[name] = (self._whole if together else self.unit((name,))).evaluator(name)
+        return evaluated(self._evaluators[name], t, x, self.params if params is None else params,
+                         self.inputs if inputs is None else inputs, ud)
+
+    def unit(self, names: Sequence[str], backend: str = "", compiler: Compiler | None = None) -> Any:
+        """Generated code of functions, loaded.
+
+        backend   "c" or "numpy", default: C if there is a compiler; compiler: default the usual one, without optimization
+        """
+        compiler = compiler or find_compiler()
+        if backend == "numpy" or compiler is None:
+            source = emit(self.equations, "numpy", names, standalone=False)
+            return PythonUnit.from_source(next(iter(source.files.values())), source.metadata["name"])
+        source = emit(self.equations, "c", names, standalone=False, integrator=False)
+        return CUnit(next(iter(source.files.values())), source.metadata, plain(compiler) if not backend else compiler)
+
+
+def evaluated(evaluator: Any, t: Any, x: np.ndarray, params: np.ndarray, inputs: Any, ud: Any = None) -> np.ndarray:
+    """A function of a unit at rows of states, (n, size), NaN where it cannot be evaluated."""
+    sizes = evaluator.unit.metadata["sizes"]
+    rows = np.atleast_2d(np.asarray(x, dtype=float))
+    n = len(rows)
+    times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=float), (n,)))
+    free = np.ascontiguousarray(np.broadcast_to(np.atleast_2d(np.asarray(inputs, dtype=float)), (n, sizes["inputs"])))
+    given = np.zeros((n, sizes["ud"])) if ud is None else np.ascontiguousarray(np.asarray(ud, dtype=float))
+    if given.shape[1] != sizes["ud"]:
+        given = np.zeros((n, sizes["ud"]))
+    try:
+        evaluator.set_params(np.asarray(params, dtype=float))
+        found = evaluator.many(times, np.ascontiguousarray(rows), free, given)
+        return np.asarray(found, dtype=float).reshape(n, -1)
+    except EvaluationError:
+        pass
+    size = int(np.prod(evaluator.unit.metadata["shapes"][evaluator.name]))
+    found = np.full((n, size), np.nan)
+    for k in range(n):
+        try:
+            found[k] = np.asarray(evaluator.one(float(times[k]), rows[k], free[k], given[k])).ravel()
+        except EvaluationError:
+            continue
+    return found

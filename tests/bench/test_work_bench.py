@@ -1,0 +1,290 @@
+"""Work against error: what is asked for, rows, runs that go on, tables, pictures, the page, the command."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.bench.work import against, benchmark, picture
+from symdyn.bench.work.against.peer import Unfit
+from symdyn.bench.work.asked import checked
+from symdyn.bench.work.benchmark import Benchmark, _spread, run
+from symdyn.bench.work.cases import CASES, from_maker, subject
+from symdyn.bench.work.picture import COLORS, styles_of
+from symdyn.bench.work.record import Reference, Row
+from symdyn.bench.work.subject import Subject
+from symdyn.cli import main
+from symdyn.errors import ArgumentError, SymdynError
+
+ASKED = {"method_names": ["dop853"], "tolerances": [1e-4, 1e-7, 1e-10], "repeats": 2}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """The simple pendulum over 2 s in two formulations, and the folder of the results."""
+    folder = tmp_path_factory.mktemp("bench")
+    about = subject("pendulum", end=2.0)
+    result = run(about, checked([about], ["embedding", "augmented", "absolute"], at=[0.4], **ASKED), folder)
+    return result, folder
+
+
+def test_errors_fall_with_the_tolerance_and_work_rises(measured):
+    result, _ = measured
+    assert [(r.formulation, r.tolerance) for r in result.rows] == [
+        (f, t) for f in ("embedding", "absolute") for t in (1e-4, 1e-7, 1e-10)]
+    for rows in (result.rows[:3], result.rows[3:]):
+        assert rows[0].error > 100 * rows[1].error > 1e4 * rows[2].error
+        assert rows[0].evaluations < rows[1].evaluations < rows[2].evaluations
+        for row in rows:
+            assert row.error == max(row.error_q, row.error_u) == row.errors[-1] and len(row.errors) == 10
+            assert row.worst >= row.error < 100 * row.tolerance and row.energy_error < 100 * row.tolerance
+            assert 0 < row.least <= row.seconds < 1 and row.repeats >= 2 and row.steps > 0
+            assert row.operations == row.evaluations * result.operations[row.formulation]
+    assert all(math.isnan(r.constraint_error) for r in result.rows[:3])
+    assert all(r.constraint_error < 1e-13 for r in result.rows[3:])
+
+
+def test_what_a_mechanism_does_not_have_is_left_out_with_the_reason(measured):
+    (skipped,) = measured[0].skipped
+    assert skipped.formulation == "augmented" and "has no constraints" in skipped.why
+    (_,), (planar,) = subject("double_pendulum").formulated(["recursive", "absolute:angles"])
+    assert "one angle is all there is" in planar.why
+    _, (tied,) = subject("four_bar").formulated(["embedding"])
+    assert "takes trees only" in tied.why
+
+
+def test_the_best_below_an_error(measured):
+    result, _ = measured
+    good = [r for r in result.rows if r.error <= 1e-6]
+    assert result.best(1e-6) is min(good, key=lambda r: r.time)
+    assert result.best(1e-30) is None and result.best(1e-6, peer=True) is None
+    assert result.best(1.0, at=0.4).error_at(result.index(0.4)) <= 1.0
+    with pytest.raises(ArgumentError, match=r"errors are known at t = 0.2, 0.4, .*, not at 0.3"):
+        result.index(0.3)
+
+
+def test_table_tells_all(measured):
+    text = measured[0].table()
+    assert "reference: closed form, 15.9 digits" in text and "t=0.4" in text
+    assert text.endswith("of poses (q) and velocities (u) of all bodies")  # absolute coordinates take part
+    assert "left out: augmented" in text and "least time below an error, at t = 0.4 s" in text
+    assert str(measured[0]) == text
+
+
+def test_files_are_whole_and_stand_alone(measured):
+    result, folder = measured
+    paths = result.save(folder)
+    assert [p.name for p in paths] == ["results.json", "work_precision.png", "work_precision.svg", "report.html"]
+    data = json.loads((folder / "results.json").read_text())
+    assert data["complete"] and [Row.of(row).record() for row in data["rows"]] == data["rows"]
+    assert (folder / "work_precision.png").read_bytes()[:4] == b"\x89PNG"
+    page = (folder / "report.html").read_text()
+    assert "http" not in page.replace("http://www.w3.org", "") and "data:image/svg+xml;base64," in page
+    assert page.count("<tr") == page.count("</tr>") and "closed form, 15.9 digits" in page
+
+
+def test_an_unfinished_run_goes_on(measured, tmp_path, monkeypatch):
+    about = subject("pendulum", end=2.0)
+    asked = checked([about], ["embedding"], **ASKED)
+    made, original = [], benchmark.own
+
+    def stopping(*arguments):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(original(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(benchmark, "own", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        run(about, asked, tmp_path)
+    left = json.loads((tmp_path / "results.json").read_text())
+    assert not left["complete"] and len(left["rows"]) == 2
+    more = []
+    monkeypatch.setattr(benchmark, "own", lambda *arguments: more.append(original(*arguments)) or more[-1])
+    result = run(about, asked, tmp_path)
+    assert len(more) == 1 and not result.unfinished and [r.tolerance for r in result.rows] == [1e-4, 1e-7, 1e-10]
+    assert {r.key: r.seconds for r in made}.items() <= {r.key: r.seconds for r in result.rows}.items()
+    run(about, asked, tmp_path)  # complete: measured anew
+    assert len(more) == 4
+
+
+def test_results_of_another_motion_are_not_gone_on_with(tmp_path):
+    about = subject("pendulum", end=2.0)
+    tight = checked([about], ["embedding"], **{**ASKED, "tolerances": [1e-5]}, budget=1e-9)
+    assert run(about, tight, tmp_path).rows == []
+    data = json.loads((tmp_path / "results.json").read_text())
+    data["rows"] = [Row("embedding", "dop853", 1e-5, seconds=1.0).record()]
+    (tmp_path / "results.json").write_text(json.dumps(data))
+    assert run(about, tight, tmp_path).rows[0].seconds == 1.0
+    other = subject("pendulum", end=2.5)
+    assert run(other, tight, tmp_path).rows == []
+
+
+def test_budget_is_honoured_and_told(tmp_path):
+    about = subject("pendulum", end=2.0)
+    result = run(about, checked([about], ["embedding"], budget=1e-9, **ASKED))
+    assert result.rows == [] and result.unfinished == "3 of 3 runs were not made within the budget of 1e-09 s"
+    assert "unfinished: 3 of 3 runs" in result.table()
+
+
+def test_other_work_on_the_machine_is_told():
+    quiet, busy = Row("a", "b", 1e-6, seconds=1.2, least=1.0, repeats=5), Row("a", "b", 1e-6, seconds=3.0, least=1.0, repeats=5)
+    assert (quiet.disturbed, quiet.time) == (False, 1.2) and (busy.disturbed, busy.time) == (True, 1.0)
+    text = Benchmark("a", 1.0, [quiet, busy], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).table()
+    assert "of 1 of 2 rows the median is over 1.5 times the least time" in text and "1000*" in text
+
+
+def test_a_coarse_grid_comes_first():
+    assert _spread(range(10)) == [0, 4, 8, 2, 6, 1, 3, 5, 7, 9]
+
+
+def test_a_method_that_does_not_fit_is_left_out(monkeypatch):
+    about = subject("pendulum", end=2.0)
+
+    def unfit(*_):
+        raise ArgumentError("pendulum: the method takes no pendulums")
+
+    monkeypatch.setattr(benchmark, "own", unfit)
+    result = run(about, checked([about], ["embedding"], **ASKED))
+    assert result.rows == [] and str(result.skipped[-1]) == "embedding, dop853: pendulum: the method takes no pendulums"
+
+
+def test_slow_methods_are_not_asked_for_more(monkeypatch):
+    about = subject("pendulum", end=2.0)
+    monkeypatch.setattr(benchmark, "own", lambda f, m, t, *_: Row(f.name, m, t, seconds=3.0, least=3.0))
+    result = run(about, checked([about], ["embedding"], **ASKED))
+    assert [r.tolerance for r in result.rows] == [1e-4]
+    assert "not at tighter tolerances: a run took 3 s" in str(result.skipped[-1])
+
+
+class _Exact:
+    """A peer that is always right, and one that never fits."""
+
+    name = title = "exact"
+
+    def available(self):
+        return True
+
+    def prepare(self, equations, params, x0, end, system=None):
+        assert system.name == "pendulum" and params.tolist() and x0.tolist() == [2.0, 0.0]
+        x = np.array(CASES["pendulum"].closed([end])[0])
+        return lambda tolerance: (1e-3, 7, x + tolerance)
+
+
+class _Unfit(_Exact):
+    name = title = "unfit"
+
+    def prepare(self, *_):
+        raise Unfit("it takes no pendulums")
+
+
+class _Broken(_Exact):
+    name = title = "broken"
+
+    def prepare(self, *_):
+        def run(tolerance):
+            raise RuntimeError("it broke")
+
+        return run
+
+
+class _Missing(_Exact):
+    name = title = "missing"
+
+    def available(self):
+        return "it is not installed"
+
+
+def test_other_programs_run_beside(monkeypatch):
+    monkeypatch.setattr(against, "names", lambda: ["some"])
+    monkeypatch.setattr(against, "peers", lambda name: (_Exact(), _Unfit(), _Broken(), _Missing()))
+    about = subject("pendulum", end=2.0)
+    result = run(about, checked([about], ["embedding"], peers=["some"], at=[0.4, 2.0], **ASKED))
+    assert [r.message for r in result.rows if r.method == "broken"] == ["it broke"] * 3
+    rows = [r for r in result.rows if r.method == "exact"]
+    assert [(r.method, r.seconds, r.evaluations) for r in rows] == [("exact", 1e-3, 7)] * 3
+    size = max(abs(x[0]) for x in result.reference.x)
+    assert math.isclose(rows[0].error_q, 1e-4 / size, rel_tol=1e-9)
+    assert math.isclose(rows[0].error_at(result.index(0.4)), max(rows[0].error_q, rows[0].error_u), rel_tol=1e-9)
+    assert math.isnan(rows[0].error_at(0))
+    assert {str(s) for s in result.skipped} == {"unfit: it takes no pendulums", "missing: it is not installed"}
+    assert "times ours)" in result.table()
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(ArgumentError) as caught:
+        sd.bench("pendulum", formulations=["embeding"], methods=["dop85", "x"], tolerances=[2.0, 1e-20, "a"], steps=[-1.0],
+                 repeats=0, against=["heyok"], budget=-1.0, at=[50.0])
+    text = str(caught.value)
+    for part in ("11 faults", "no formulation 'embeding'; did you mean embedding", "no method 'dop85'; did you mean dop853",
+                 "no method 'x'; there are dop853", "the tolerance 2.0", "the tolerance 1e-20", "the tolerance 'a'",
+                 "the step -1.0", "50.0 at which errors", "0 repeats", "no peer 'heyok'; did you mean heyoka", "the budget -1.0"):
+        assert part in text
+    with pytest.raises(ArgumentError, match=r"the end -1\.0 of pendulum must be a positive time"):
+        sd.bench("pendulum", end=-1.0)
+    with pytest.raises(ArgumentError, match="takes a System, equations or a name of the catalogue, found 3"):
+        sd.bench(3)
+    with pytest.raises(ArgumentError, match="no mechanism 'double_pendulm' to measure; did you mean double_pendulum"):
+        sd.bench("double_pendulm")
+    with pytest.raises(ArgumentError, match="pendulum takes no option, found 'pendulum\\(3\\)'"):
+        sd.bench("pendulum(3)")
+
+
+def test_formulations_none_of_which_fits():
+    with pytest.raises(SymdynError, match="none of the formulations that were asked for fits"):
+        sd.bench("four_bar", formulations=["embedding", "recursive"])
+
+
+def test_mechanisms_of_the_list_and_their_variants():
+    tops = subject("heavy_top")
+    assert tops.names[-3:] == ["embedding:parameters", "recursive:parameters", "augmented:parameters"]
+    assert list(subject("floating_wind_turbine").variants) == ["angles", "parameters"]
+    assert subject("n_link_pendulum(3)").name == "n_link_pendulum_3" and list(subject("four_bar").variants) == [""]
+    made = from_maker("own", lambda n=1: sd.systems.get("pendulum"), end=1.0)
+    assert isinstance(made, Subject) and made.end == 1.0 and list(made.variants) == [""]
+
+
+def test_equations_by_hand():
+    equations = sd.systems.get("pendulum").embedding()
+    result = sd.bench(equations, methods=["dop853"], tolerances=[1e-6], repeats=1, end=1.0)
+    assert [r.formulation for r in result.rows] == ["given"] and result.rows[0].error < 1e-4
+
+
+def test_lines_are_told_apart_by_colour_marker_and_line():
+    rows = [Row(f, m, 1e-6) for f in ("embedding", "recursive", "absolute") for m in ("a", "b", "c", "d")]
+    styles = styles_of([*rows, Row("embedding", "other", 1e-6, peer=True)])
+    assert len(styles) == 13 and len({(s["color"], s["marker"], str(s["linestyle"])) for s in styles.values()}) == 13
+    assert {s["color"] for name, s in styles.items() if name != "other"} == set(COLORS[:4])
+
+
+def test_command(tmp_path, capsys, monkeypatch):
+    def drawn(result, folder):
+        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
+        for path in paths:
+            path.write_text(result.name)
+        return paths
+
+    monkeypatch.setattr(picture, "write_pictures", drawn)
+    text = "import symdyn as sd\n\ndef system():\n    return sd.systems.get('pendulum')\n"
+    (tmp_path / "mine.py").write_text(text)
+    code = main(["bench", str(tmp_path / "mine.py"), "pendulum", "--formulations", "embedding", "--methods", "dop853", "--rtol",
+                 "1e-6", "--repeats", "1", "--end", "1", "--output", str(tmp_path / "out")])
+    told = capsys.readouterr()
+    assert code == 0 and "mine, 1 s" in told.out and "pendulum, 1 s" in told.out
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"mine", "pendulum", "report.html"}
+    assert (tmp_path / "out" / "mine" / "report.html").is_file()
+
+
+def test_command_tells_all_faults(capsys):
+    assert main(["bench", "nothing_of_the_kind", "--methods", "none", "--rtol", "3"]) == 2
+    told = capsys.readouterr().err
+    assert "no mechanism 'nothing_of_the_kind'" in told and "no method 'none'" in told and "the tolerance 3.0" in told
+    assert main(["bench"]) == 2
+    assert "nothing is named" in capsys.readouterr().err
+
+
+def test_reference_prints():
+    assert str(Reference("closed form", (1.0,), [[0.0]], 15.9, "known")) == "closed form, 15.9 digits: known"
+    assert isinstance(Benchmark("a", 1.0, [], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).record(), dict)

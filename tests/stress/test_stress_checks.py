@@ -1,0 +1,289 @@
+"""Stress: the short form has no failures, and every check finds a thing that is broken on purpose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.runtime.compiler import find_compiler
+from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
+from symdyn.stress.record import FAIL, PASS, NotApplicable, Row
+from symdyn.stress.run import CHECKS
+from symdyn.stress.subject import Subject
+
+needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+
+@pytest.fixture(scope="module")
+def double() -> Subject:
+    return Subject("double_pendulum")
+
+
+@pytest.fixture(scope="module")
+def tied() -> Subject:
+    return Subject("pendulum_absolute")
+
+
+def verdicts(rows: Any) -> list[str]:
+    return [row.verdict for row in rows]
+
+
+def altered(subject: Subject, monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, tuple, dict], Any]) -> None:
+    """Have the subject's runs changed: change(solution, arguments, options)."""
+    run = subject.run
+
+    def changed(*arguments: Any, **options: Any) -> Any:
+        sol = run(*arguments, **options)
+        change(sol, arguments, options)
+        return sol
+
+    monkeypatch.setattr(subject, "run", changed)
+
+
+# -- of any mechanism
+
+
+@pytest.mark.slow
+@needs_c
+def test_short_form_has_no_failures() -> None:
+    report = sd.stress(short=True)
+    assert [row for row in report.rows if row.verdict == FAIL] == []
+    assert len(report.rows) > 80 and report.count()["pass"] > 70
+    assert {row.check for row in report.rows} >= {"rounding", "units", "gimbal lock", "flips", "stiffness", "chaos"}
+    assert all(row.why and (row.bound is None or row.origin) for row in report.rows)
+    assert "constraints, cart_pole: there are no constraints" in report.left_out
+
+
+@pytest.mark.parametrize("wrong", [lambda v: v * (1 + 1e-13), lambda v: v * np.where(np.arange(v.shape[1]) == 0, -1.0, 1.0)],
+                         ids=["noise", "sign"])
+@needs_c
+def test_rounding_finds_noise_and_a_wrong_sign(double: Subject, monkeypatch: pytest.MonkeyPatch, wrong: Callable) -> None:
+    original = rounding.evaluated
+    monkeypatch.setattr(rounding, "evaluated", lambda *given: wrong(original(*given)))
+    assert FAIL in verdicts(rounding.rounding(double, True))
+
+
+@needs_c
+def test_refused_states_must_be_singular(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    original = rounding.evaluated
+
+    def refuses(*given: Any) -> np.ndarray:
+        values = original(*given)
+        values[3] = np.nan
+        return values
+
+    monkeypatch.setattr(rounding, "evaluated", refuses)
+    rows = list(rounding.rounding(double, True))
+    assert [r.verdict for r in rows if r.check == "refused states"] and FAIL in verdicts(rows)
+
+
+@needs_c
+def test_energy_that_leaks_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    def leak(sol: Any, arguments: tuple, options: dict) -> None:
+        sol.x *= 1 + 1e-5 * np.linspace(0, 1, len(sol.t))[:, None]
+
+    altered(double, monkeypatch, leak)
+    assert verdicts(motion.energy(double, True)) == [FAIL]
+
+
+@needs_c
+def test_violated_constraints_are_found(tied: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    def off(sol: Any, arguments: tuple, options: dict) -> None:
+        sol.x[:] = sol.x * (1 + 1e-9)
+
+    altered(tied, monkeypatch, off)
+    assert FAIL in verdicts(motion.constraints(tied, True))
+
+
+@needs_c
+def test_constraints_do_not_count_in_metres(tied: Subject) -> None:
+    """A pendulum in x and y takes the same steps, and keeps its rod to rounding, whatever its size."""
+    steps = set()
+    for l in (1.0, 1e-3, 1e-6, 1e6):
+        sol = tied.module.simulate((0, 3), q=[-l, 0], params={"l": l, "g": 9.81 * l}, rtol=1e-10, atol=1e-10 * l, max_steps=1000)
+        assert np.abs(np.hypot(*sol.q.T) / l - 1).max() < 1e-12
+        steps.add(sol.n_steps)
+    assert len(steps) == 1
+
+
+@needs_c
+def test_another_way_back_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = double.run
+
+    def heavier(t: Any, x: Any = None, params: Any = None, **options: Any) -> Any:
+        return run(t, x, double.params * (1 + 1e-4) if t[-1] < t[0] else params, **options)
+
+    monkeypatch.setattr(double, "run", heavier)
+    # All masses and lengths alike change the motion by the root of the length only.
+    assert verdicts(motion.reversal(double, True)) == [FAIL]
+
+
+@needs_c
+def test_wrong_jacobian_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluate = double.evaluate
+
+    def wrong(name: str, *given: Any, **options: Any) -> np.ndarray:
+        values = evaluate(name, *given, **options)
+        if name == "jacobian_x":
+            values[:, 4 * 3] *= 1.05
+        return values
+
+    monkeypatch.setattr(double, "evaluate", wrong)
+    assert verdicts(motion.divergence(double, True)) == [FAIL]
+
+
+@needs_c
+def test_ill_conditioned_mechanism_degrades() -> None:
+    system = singular.two_points()
+    system.defaults[next(s for s in system.defaults if s.name == "m_1")] = 1e-9
+    system.initial[next(s for s in system.initial if s.name == "q2")] = 1e-4
+    system.duration = 1e-6
+    (row,) = motion.condition(Subject(system), False)
+    assert row.verdict == "degrade" and "ill-conditioned" in row.why and row.figure > 1e-8
+
+
+@pytest.mark.parametrize(("size", "verdict"), [(1e-13, "degrade"), (1e-3, FAIL)])
+@needs_c
+def test_thresholds_with_units_are_found(double: Subject, monkeypatch: pytest.MonkeyPatch, size: float, verdict: str) -> None:
+    def shift(sol: Any, arguments: tuple, options: dict) -> None:
+        sol.x[-1] += size  # as many of whatever unit
+
+    altered(double, monkeypatch, shift)
+    rows = list(units._bits(double, units.EXACT[2], units.factors(double, double.module.metadata["parameters"], units.EXACT[2]),
+                            units.factors(double, double.module.metadata["x"], units.EXACT[2]), True))
+    assert verdicts(rows) == [verdict]
+
+
+def test_powers_of_units() -> None:
+    assert units.powers("N m s/rad") == (1, 2, -1) and units.powers("kg/m^3") == (1, -3, 0) and units.powers("1") == (0, 0, 0)
+    with pytest.raises(NotApplicable, match="the unit 'furlong/s' is not known here"):
+        units.powers("furlong/s")
+
+
+@needs_c
+def test_numbers_with_units_are_not_scaled() -> None:
+    system = sd.System("numbers", gravity=[0, -9.81])
+    q, m = sd.coordinates("q"), sd.parameters("m")
+    rod = system.add_body("rod", mass=m, com=[0.5, 0])
+    system.add_joint(sd.Revolute("hinge", system.ground, rod, q))
+    system.defaults = {m: 1.0}
+    with pytest.raises(NotApplicable, match="holds numbers that have units"):
+        list(units.units(Subject(system), True))
+
+
+@needs_c
+def test_end_that_depends_on_the_first_step_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(sol: Any, arguments: tuple, options: dict) -> None:
+        if options.get("first_step") == 1e-300:
+            sol.x[-1] += 1e-2
+            sol.n_steps *= 3
+
+    altered(double, monkeypatch, late)
+    rows = [row for row in extremes.steps(double, True) if "1e-300" in row.done]
+    assert verdicts(rows)[:2] == [FAIL, FAIL]
+
+
+@needs_c
+def test_denormals_that_matter_are_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    def jump(sol: Any, arguments: tuple, options: dict) -> None:
+        if (np.abs(arguments[1]) == 5e-324).any():
+            sol.x[-1] += 1e-9
+
+    altered(double, monkeypatch, jump)
+    assert verdicts(extremes.denormals(double, True)) == [FAIL]
+
+
+@needs_c
+def test_mass_ratios_find_noise(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluate = double.evaluate
+    noise = np.random.default_rng(4)
+
+    def noisy(name: str, *given: Any, **options: Any) -> np.ndarray:
+        values = evaluate(name, *given, **options)
+        return values * (1 + 1e-3 * noise.normal(size=values.shape)) if name == "rhs" else values
+
+    def clean(*given: Any, **options: Any) -> Any:
+        measured = original(*given, **options)
+        monkeypatch.setattr(double, "evaluate", noisy)
+        return measured
+
+    original = extremes.Measured
+    monkeypatch.setattr(extremes, "Measured", clean)
+    assert verdicts(extremes.masses(double, True))[0] == FAIL
+
+
+class Stopped:
+    """What a stopped run tells."""
+
+    success, message = False, "cart: stopped at t = 0.5: gust is not finite; the state there: x = 1, x_dot = 2"
+    t, x = np.array([0.0, 0.5]), np.zeros((2, 2))
+    module = type("Module", (), {"metadata": {"x": ["x", "x_dot"]}})
+
+
+@pytest.mark.parametrize(("change", "told"), [
+    ({}, ""), ({"success": True}, "does not stop"), ({"message": "x = 1, x_dot = 2, gust"}, "no time"),
+    ({"message": "stopped at t = 0.5: gust"}, "no state"), ({"message": Stopped.message.replace("gust", "it")}, "does not name "
+                                                            "gust"),
+    ({"x": np.full((2, 2), math.nan)}, "not finite"), ({"t": np.array([0.0, 0.6])}, "too far")])
+def test_stops_must_tell_all(change: dict[str, Any], told: str) -> None:
+    sol = type("Sol", (Stopped,), change)
+    row = extremes.stopped("bad input", "cart", "gust", sol, 0.5, ("gust",))
+    assert row.verdict == (FAIL if told else PASS) and told in row.why
+
+
+# -- mechanisms of their own
+
+
+class Leaky(Subject):
+    """A mechanism whose runs are a little wrong at the end, but for those at the finest tolerances."""
+
+    finest = 0.0
+
+    def run(self, *arguments: Any, **options: Any) -> Any:
+        sol = super().run(*arguments, **options)
+        if options.get("rtol", 1.0) > self.finest:
+            sol.x *= 1 + 1e-2 * np.linspace(0, 1, len(sol.t))[:, None]
+        return sol
+
+
+class LeakyUnlessFine(Leaky):
+    finest = 1e-11
+
+
+@pytest.mark.parametrize(("home", "name"), [(attitude, "gimbal"), (attitude, "flips"), (attitude, "rotor"),
+                                            (long_runs, "constraint_drift"), (long_runs, "energy_drift"), (long_runs,
+                                                                                                           "stiffness"),
+                                            (singular, "massless"), (chains, "chaos")])
+@needs_c
+def test_wrong_motions_are_found(home: Any, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(home, "Subject", LeakyUnlessFine if name == "chaos" else Leaky)
+    if hasattr(home, "local_error"):  # that errors of steps are measured rightly leaves the end wrong
+        monkeypatch.setattr(home, "local_error", lambda *given: 1e-15)
+    assert FAIL in verdicts(getattr(home, name)(True))
+
+
+def test_lost_digits_at_gimbal_lock_must_be_told() -> None:
+    truth = np.tile(np.eye(3).ravel(), (2, 1))
+
+    class Near(Stopped):
+        success, n_steps, n_rejected, told = True, 500, 10, ()
+        frames = np.concatenate([np.zeros((2, 3)), truth + 1e-3], axis=1)[:, None]
+
+    subject = type("Named", (), {"name": "body"})
+    silent = attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9)
+    assert silent.verdict == FAIL and "without a word" in silent.why
+    Near.told = ("near gimbal lock of the ZYX angles",)
+    assert attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9).verdict == "degrade"
+    Near.success = False
+    Near.told = ()
+    assert "without naming gimbal lock" in attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9).why
+
+
+def test_every_check_says_what_it_does() -> None:
+    assert all(check.title.endswith(".") and check.title[0].isupper() for check in CHECKS.values())
+    assert isinstance(next(iter(singular.user_forces(True))), Row)

@@ -1,0 +1,95 @@
+"""Rows and reports of stress: verdicts, table, files; which checks run, and what a crash becomes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import symdyn as sd
+from symdyn.cli import main
+from symdyn.stress import run as stress_run
+from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, StressReport, within
+
+
+def row(verdict: str = PASS, check: str = "energy") -> Row:
+    return Row(check, "arm", "10 s in 5 steps", 1e-9, 1e-6, "steps times tolerance", verdict, "energy is kept")
+
+
+def test_verdict_follows_the_bound() -> None:
+    assert within("a", "b", "done", 1.0, 1.0, "", "why").verdict == PASS
+    beyond = within("a", "b", "done", 1.1, 1.0, "", "why", "too much")
+    assert (beyond.verdict, beyond.why) == (FAIL, "too much")
+    assert within("a", "b", "done", float("nan"), 1.0, "", "why").verdict == FAIL
+
+
+def test_report_passes_unless_a_row_fails() -> None:
+    assert StressReport([row(), row(DEGRADE)]).passed
+    assert not StressReport([row(), row(FAIL)]).passed
+    assert StressReport([row(), row(), row(FAIL)]).count() == {"pass": 2, "degrade": 0, "fail": 1}
+
+
+def test_table_and_files(tmp_path: Path) -> None:
+    report = StressReport([row(), Row("gimbal", "<top>", "stopped", None, None, "", DEGRADE, "named")], ["units, arm: no "
+                                                                                                         "unit"], 3.2)
+    table = report.table()
+    assert "pass    energy" in table and "1e-09     1e-06" in table and "bound: steps times tolerance" in table
+    assert "left out: units, arm: no unit" in table and "2 rows: 1 pass, 1 degrade, 0 fail; 1 left out; 3 s" in table
+    assert report.save(tmp_path / "a" / "s.txt").read_text(encoding="utf-8").strip() == table
+    stored = json.loads(report.save(tmp_path / "s.json").read_text(encoding="utf-8"))
+    assert stored["rows"][0]["figure"] == 1e-9 and stored["count"]["degrade"] == 1
+    page = report.save(tmp_path / "s.html").read_text(encoding="utf-8")
+    assert "&lt;top&gt;" in page and page.index("&lt;top&gt;") < page.index("energy is kept") and "steps times tolerance" in page
+    with pytest.raises(sd.ArgumentError, match=r"the ending must be \.json, \.txt or \.html"):
+        report.save(tmp_path / "s.csv")
+
+
+def test_numbers_that_json_lacks_are_text(tmp_path: Path) -> None:
+    endless = Row("a", "b", "c", float("inf"), 1.0, "", FAIL, "d")
+    text = StressReport([endless]).save(tmp_path / "s.json").read_text(encoding="utf-8")
+    assert json.loads(text, parse_constant=lambda name: pytest.fail(name))["rows"][0]["figure"] == "inf"
+
+
+def test_unknown_check_is_told_with_near_ones() -> None:
+    with pytest.raises(sd.ArgumentError, match="there is no check 'rouding'; did you mean rounding"):
+        sd.stress("pendulum", checks=["rouding"])
+    with pytest.raises(sd.ArgumentError, match="the checks flips have mechanisms of their own; leave out the system"):
+        sd.stress("pendulum", checks=["flips"])
+
+
+def test_crash_is_a_row_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crashes(short: bool) -> Iterator[Row]:
+        yield row(check="first")
+        raise RuntimeError("out of paper")
+
+    def leaves_out(short: bool) -> Iterator[Row]:
+        raise NotApplicable("no paper at all")
+        yield row()
+
+    checks = {"a": stress_run.Check("a", crashes), "b": stress_run.Check("b", leaves_out),
+              "c": stress_run.Check("c", lambda short: iter([row(check="last")]))}
+    monkeypatch.setattr(stress_run, "CHECKS", checks)
+    seen: list[Row] = []
+    report = sd.stress(show=seen.append)
+    assert [r.check for r in report.rows] == ["first", "a", "last"] and seen == report.rows
+    assert report.rows[1].verdict == FAIL and "RuntimeError in test_stress_record.py" in report.rows[1].done
+    assert "out of paper" in report.rows[1].why and report.left_out == ["b, -: no paper at all"]
+
+
+def test_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any) -> None:
+    monkeypatch.setattr(stress_run, "CHECKS", {"a": stress_run.Check("a", lambda short: iter([row(FAIL)]))})
+    assert main(["stress", "--jobs", "1", "--output", str(tmp_path)]) == 1
+    told = capsys.readouterr().out
+    assert told.startswith("verdict") and "fail    energy" in told and "1 rows: 0 pass" in told
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["stress.html", "stress.json", "stress.txt"]
+    assert main(["stress", "--jobs", "0"]) == 2 and "--jobs must be 1 or more, found 0" in capsys.readouterr().err
+    assert main(["stress", "no_such_system"]) == 2 and "no system 'no_such_system'" in capsys.readouterr().err
+
+
+def test_list_names_every_check(capsys: Any) -> None:
+    assert main(["stress", "--list"]) == 0
+    told = capsys.readouterr().out
+    assert all(name in told for name in stress_run.CHECKS) and "any mechanism" in told
