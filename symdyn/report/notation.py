@@ -81,13 +81,18 @@ def name_latex(name: str) -> str:
 
 
 def entry_latex(name: str, index: tuple[int, ...]) -> str:
-    r"""An entry of a quantity, counted from 1: \tilde{M}_{12}."""
+    r"""An entry of a quantity, counted from 1: \tilde{M}_{12}; of one that has an index already C_{r,12}."""
     letter = re.sub(r"\\(?:mathbf|boldsymbol)\{(\\?\w+)\}", r"\1", name_latex(name))
     places = [str(i + 1) for i in index]
-    return f"{letter}_{{{('' if all(len(p) == 1 for p in places) else ',').join(places)}}}"
+    told = ("" if all(len(p) == 1 for p in places) else ",").join(places)
+    indexed = re.fullmatch(r"(.+)_\{((?:[^{}]|\{[^{}]*\})+)\}", letter)
+    return f"{indexed[1]}_{{{indexed[2]},{told}}}" if indexed else f"{letter}_{{{told}}}"
 
 
 def _frame(name: str) -> str:
     """b2 is b with the index 2."""
-    letters, digits = re.fullmatch(r"(\D*)(\d*)", name).groups()  # type: ignore[union-attr]
+    found = re.fullmatch(r"(\D*)(\d*)", name)
+    if found is None:
+        return str(sp.latex(sp.Symbol(name)))
+    letters, digits = found.groups()
     return f"{letters}_{{{digits}}}" if letters and digits else name

@@ -6,6 +6,7 @@ import time as clock
 from typing import Any
 
 import sympy as sp
+from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.simplify.fu import TR10i
 
 from symdyn.model.symbols import Rate, Speed
@@ -98,7 +99,28 @@ def _collected(e: sp.Expr) -> dict[sp.Expr, sp.Expr]:
 
 
 def _general(e: sp.Expr) -> sp.Expr:
-    return sp.simplify(e) if sp.count_ops(e) <= _SHORT else e
+    """SymPy's own search, in which sums of angles take nearly all of the time; without products of sines there are none."""
+    if sp.count_ops(e) > _SHORT:
+        return e
+    if _degree(e) > 1:
+        return sp.simplify(e)
+    names = {f: sp.Dummy(real=f.is_real) for f in sorted(e.atoms(sp.sin, sp.cos), key=sp.default_sort_key)}
+    return sp.simplify(e.xreplace(names)).xreplace({name: f for f, name in names.items()})
+
+
+def _degree(e: sp.Expr) -> float:
+    """At most so many sines and cosines of angles, or of their sums and differences, are multiplied; inf: something else."""
+    if not e.has(TrigonometricFunction):
+        return 0
+    if isinstance(e, (sp.sin, sp.cos)):
+        return 1 if all(a.is_Atom or (-a).is_Atom for a in sp.Add.make_args(e.args[0])) else float("inf")
+    if e.is_Add:
+        return max(map(_degree, e.args))
+    if e.is_Mul:
+        return sum(map(_degree, e.args))
+    if e.is_Pow and e.exp.is_Integer and e.exp > 0:
+        return int(e.exp) * _degree(e.base)
+    return float("inf")
 
 
 def _length(e: sp.Expr) -> tuple[int, int]:

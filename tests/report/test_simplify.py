@@ -17,6 +17,9 @@ q1, q2 = sd.coordinates("q1 q2")
     (sp.cos(q1) * sp.cos(q2) - sp.sin(q1) * sp.sin(q2), sp.cos(q1 + q2)),
     (a * sp.sin(q1) * sp.cos(q1), a * sp.sin(q1) * sp.cos(q1)),
     ((a + b) ** 2 - a**2 - 2 * a * b, b**2),
+    ((a**2 - 1) / (a - 1) * sp.cos(q1), (a + 1) * sp.cos(q1)),
+    ((a**2 * sp.sin(q1 + q2) + a * b * sp.sin(q1 + q2)) / (a + b), a * sp.sin(q1 + q2)),
+    ((1 - sp.cos(q1) ** 2) / sp.sin(q1), sp.sin(q1)),
 ])
 def test_known_forms(given, wanted):
     assert simplified(given, 10) == wanted

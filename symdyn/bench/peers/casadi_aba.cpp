@@ -18,14 +18,14 @@ struct FewJoints {
     using JointModelPY = JointModelPrismaticTpl<S, O, 1>;
     using JointModelPZ = JointModelPrismaticTpl<S, O, 2>;
     using JointModelSpherical = JointModelSphericalTpl<S, O>;
+    // Pinocchio asks each joint whether it is one of these; with Boost's relaxed get the variant answers no.
     using JointModelMimic = JointModelMimicTpl<S, O, FewJoints>;
     using JointModelVariant = boost::variant<JointModelRX, JointModelRY, JointModelRZ, JointModelPX, JointModelPY, JointModelPZ,
-                                             JointModelSpherical, boost::recursive_wrapper<JointModelMimic>>;
-    using JointDataMimic = JointDataMimicTpl<S, O, FewJoints>;
+                                             JointModelSpherical>;
     using JointDataVariant = boost::variant<
         JointDataRevoluteTpl<S, O, 0>, JointDataRevoluteTpl<S, O, 1>, JointDataRevoluteTpl<S, O, 2>,
         JointDataPrismaticTpl<S, O, 0>, JointDataPrismaticTpl<S, O, 1>, JointDataPrismaticTpl<S, O, 2>,
-        JointDataSphericalTpl<S, O>, boost::recursive_wrapper<JointDataMimic>>;
+        JointDataSphericalTpl<S, O>>;
 };
 
 } // namespace peers
@@ -54,7 +54,8 @@ casadi::Function accelerations(const char *text, const SX &parameters)
     pinocchio::DataTpl<SX, 0, peers::FewJoints> data(model);
     const SX q = SX::sym("q", model.nq), u = SX::sym("u", model.nv);
     const auto torques = vector(SX::zeros(model.nv));
-    pinocchio::aba(model, data, vector(q), vector(u), torques);
+    // What pinocchio::aba calls by default. Calling that would compile the algorithm in world axes, too.
+    pinocchio::impl::abaLocalConvention(model, data, vector(q), vector(u), torques);
     SX result = SX::zeros(model.nv);
     for (casadi_int i = 0; i < model.nv; i++) result(i) = data.ddq[i];
     // Parameters that are numbers are no argument.

@@ -28,8 +28,8 @@ class CasadiPeer:
         self.casadi = casadi
         text = "".join(["#include <pinocchio/autodiff/casadi.hpp>\n", *[
             (SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "casadi_aba.cpp")]])
-        options = ["-O0", *include_flags("pinocchio", "boost", "eigen", "casadi"), "-Wl,--no-as-needed", f"-L{libraries[0]}",
-                   "-lcasadi", f"-Wl,-rpath,{libraries[0]}"]
+        options = ["-O0", "-DBOOST_VARIANT_USE_RELAXED_GET_BY_DEFAULT", *include_flags("pinocchio", "boost", "eigen", "casadi"),
+                   "-Wl,--no-as-needed", f"-L{libraries[0]}", "-lcasadi", f"-Wl,-rpath,{libraries[0]}"]
         self.library = build_cpp("casadi_aba", text, options, ("pin", "casadi"))
         self.library.casadi_aba.restype = ctypes.c_char_p
 
