@@ -5,12 +5,9 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from symdyn.cli.find import find_equations
-
-if TYPE_CHECKING:
-    from symdyn.formulation.motion_equations import MotionEquations
 
 # Quantities with more operations than this, written out, are counted and not printed: nobody reads them.
 READABLE = 1000
@@ -20,6 +17,8 @@ OF_CONSTRAINTS = ("C_r", "F_d", "C")
 
 def derive(arguments: argparse.Namespace) -> int:
     """Print the symbols, and every quantity that was asked for."""
+    from symdyn.report.full_equations import written_out
+
     equations = find_equations(arguments)
     tied = bool(equations.constraints)
     quantities = arguments.quantity or [*USUAL, *OF_CONSTRAINTS * tied]
@@ -35,7 +34,7 @@ def derive(arguments: argparse.Namespace) -> int:
         if tied:
             print(f"  constraints: {', '.join(equations.constraints)}")
     for name in quantities:
-        count, shape = _written_out(equations, name), equations.quantity(name).shape
+        count, shape = written_out(equations, name), equations.quantity(name).shape
         if count > READABLE and not arguments.force:
             size = " x ".join(map(str, shape)) or "a number"
             steps = equations.tape(name).operations
@@ -47,18 +46,6 @@ def derive(arguments: argparse.Namespace) -> int:
         else:
             print(f"\n{name} =\n{_pretty(equations.explicit(name, simplify=not arguments.no_simplify))}")
     return 0
-
-
-def _written_out(equations: MotionEquations, name: str) -> int:
-    """Operations of the quantity as explicit expressions, where nothing is shared."""
-    from symdyn.tape.node import Node
-
-    tape = equations.tape(name)
-    counts: dict[Node, int] = {}
-    for node in tape.steps:
-        below = sum(counts[a] for a in node.args if isinstance(a, Node)) if node.op != "leaf" else -1
-        counts[node] = 1 + below
-    return sum(counts[e] for e in tape.outputs[name].entries if isinstance(e, Node))
 
 
 def _pretty(value: Any) -> str:

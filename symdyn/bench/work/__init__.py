@@ -36,7 +36,7 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state
     repeats        timed runs of a row, of which the median counts; of very short ones up to eight times as many
     against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn"
-    budget         s after which no further run is begun
+    budget         s after which no further run is begun; two thirds of it are for the runs, however long the reference takes
     folder         where results are written, after every run; what an unfinished run left there is gone on with
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s

@@ -138,7 +138,9 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
                        {f.name: f.operations for f in formulations}, _about(), "it was interrupted",
                        _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE)
     kept = _kept(folder, result)
-    deadline = math.inf if asked.budget is None else begun + asked.budget
+    # A reference that took longer than its part leaves the runs theirs.
+    deadline = math.inf if asked.budget is None else max(begun + asked.budget,
+                                                         clock.perf_counter() + asked.budget * (1 - _OF_BUDGET))
     jobs = list(_jobs(formulations, asked, Yardstick(reference, first, bodies), result.skipped, subject))
     bar = _bar(subject.name, len(jobs)) if progress else None
     left, given_up = 0, dict[tuple[str, str], str]()
