@@ -115,11 +115,13 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         while (at := locator.first(begun, float(solver.t), between)) is not None:
             x, fired = between(at), locator.fired(at)
             after = locator.after(at, x, fired)
-            if after is not None and projector is not None:
-                after = projector(at, after)
+            if after is not None:  # onto the constraints, whatever keeps the steps there
+                after = Projector(module, request.p)(at, after)
             if after is not None or locator.over or locator.failed:
                 return at, x, after
             locator.begin(at, x, field(at, x), solver.direction * 1e-6 * solver.step_size, fired)
+            if at == solver.t:
+                return None
             begun = at
         return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import time as clock
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -13,9 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError, MissingExtra
+from symdyn.formulation.equations import Equations
+from symdyn.model.system import System
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
 from symdyn.stress.record import FAIL, NotApplicable, Row, StressReport
 from symdyn.stress.subject import Subject
+from symdyn.systems import get
+from symdyn.systems import names as catalogue
 
 # In the short form, where the whole catalogue would take too long.
 SHORT = ("cart_pole", "pendulum_absolute")
@@ -66,7 +70,7 @@ def stress(system: Any = None, short: bool = False, checks: Sequence[str] | None
     show       called with every row as soon as it is there
 
     Returns a StressReport; `passed` is False if a row failed. A check that crashes is such a row.
-    Raises ArgumentError for an unknown check.
+    Raises ArgumentError for an unknown check or something that is no mechanism, SymdynError for an unknown name.
     """
     tasks = _tasks(system, short, _chosen(checks))
     report, begun = StressReport(), clock.perf_counter()
@@ -96,18 +100,23 @@ def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
     of_system = tuple(c.name for c in chosen if c.of_system and (c.short or not short))
     if system is not None:
         listed = list(system) if isinstance(system, (list, tuple)) else [system]
+        for one in listed:
+            if isinstance(one, str):
+                get(one)  # an unknown name is told before anything is run
+            elif not isinstance(one, (System, Equations)):
+                raise ArgumentError(f"stress was given {one!r}; pass a System, Equations, or the name of one of the catalogue")
         if not of_system:
             raise ArgumentError(f"the checks {', '.join(own)} have mechanisms of their own; leave out the system")
         return [(one, of_system, short) for one in listed]
-    from symdyn.systems import names
-
-    listed = list(SHORT if short else names())
+    listed = list(SHORT if short else catalogue())
     return [*[("", (name,), short) for name in own], *[(name, of_system, short) for name in listed if of_system]]
 
 
 def _chosen(names: Sequence[str] | None) -> list[Check]:
     if names is None:
         return list(CHECKS.values())
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise ArgumentError(f"checks is {names!r}; pass a list of names: {', '.join(CHECKS)}")
     unknown = [name for name in names if name not in CHECKS]
     if unknown:
         near = difflib.get_close_matches(str(unknown[0]), CHECKS, 3)

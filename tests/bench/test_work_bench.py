@@ -213,6 +213,13 @@ def test_other_programs_run_beside(monkeypatch):
     assert "times ours)" in result.table()
 
 
+@pytest.mark.parametrize(("asked", "told"), [({"end": "late"}, "the end is 'late'; pass a time, s"),
+                                             ({"folder": 3}, "of the folder is 3")])
+def test_end_and_folder_that_make_no_sense(asked, told):
+    with pytest.raises(ArgumentError, match=told):
+        sd.bench("pendulum", **asked)
+
+
 def test_all_faults_are_told_at_once():
     with pytest.raises(ArgumentError) as caught:
         sd.bench("pendulum", formulations=["embeding"], methods=["dop85", "x"], tolerances=[2.0, 1e-20, "a"], steps=[-1.0],

@@ -158,3 +158,30 @@ def test_event_that_is_not_finite() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert module.simulate((0, 5), q=[1.0], u=[0.0], events=["below"]).success
+
+
+def test_event_at_the_very_end_of_a_step() -> None:
+    y = sd.coordinates("y")
+    s = sd.System("falling", gravity=[0, -10])
+    body = s.add_body("ball", mass=1)
+    s.add_joint(sd.Prismatic("fall", s.ground, body, y, axis=[0, 1]))
+    s.add_event("clock", sd.t - 1)
+    equations = s.embedding()
+    for backend, method in METHODS[:4]:
+        run = equations.compile(backend=backend).simulate((0, 1), method=method)
+        assert run.events["clock"].t == pytest.approx([1.0], abs=1e-15), method
+
+
+@pytest.mark.parametrize(("method", "way"), [("dop853", "baumgarte"), ("dop853", "none"), ("RK45", "baumgarte"), ("LSODA", None)])
+def test_reset_is_put_onto_the_constraints_whatever_keeps_the_steps_there(method: str, way: str | None) -> None:
+    x, y = sd.coordinates("x y")
+    s = sd.System("circling", gravity=[0, -G])
+    rail, particle = s.add_body("rail", mass=1), s.add_body("particle", mass=1)
+    s.add_joint(sd.Prismatic("along", s.ground, rail, x, axis=[1, 0]))
+    s.add_joint(sd.Prismatic("up", rail, particle, y, axis=[0, 1]))
+    s.add_constraint(x**2 + y**2 - 1, "circle")
+    s.initial = {x: 1}
+    s.add_event("bottom", x, reset={x.dot: -x.dot / 2, y.dot: 3})  # upwards, which the circle does not let it go
+    run = s.augmented().compile(backend="c").simulate((0, 1.2), method=method, stabilization=way, rtol=1e-9)
+    assert run.success and len(run.events["bottom"].t) == 1
+    assert np.abs(run["x"] ** 2 + run["y"] ** 2 - 1).max() < 1e-7 and np.abs(run.velocity_violation).max() < 1e-7

@@ -60,6 +60,14 @@ def test_unknown_check_is_told_with_near_ones() -> None:
         sd.stress("pendulum", checks=["flips"])
 
 
+def test_what_is_no_mechanism_or_no_list_is_told() -> None:
+    for arguments, told in (({"system": 3}, "stress was given 3; pass a System"), ({"system": ["pendulum", "nope"]},
+                             "no system 'nope'"),
+                            ({"checks": 3}, "checks is 3; pass a list of names"), ({"checks": "units"}, "checks is 'units'")):
+        with pytest.raises(sd.SymdynError, match=told):
+            sd.stress(**arguments)
+
+
 def test_crash_is_a_row_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def crashes(short: bool) -> Iterator[Row]:
         yield row(check="first")

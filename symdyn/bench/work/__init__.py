@@ -13,8 +13,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.paths import as_path
 
 if TYPE_CHECKING:
     from symdyn.bench.work.benchmark import Benchmark
@@ -47,9 +49,11 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     from symdyn.bench.work.benchmark import run
     from symdyn.bench.work.cases import taken
 
+    if end is not None and (isinstance(end, bool) or not isinstance(end, (int, float))):
+        raise ArgumentError(f"the end is {end!r}; pass a time, s")
     subject = taken(system, end)
     asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at)
-    result = run(subject, asked, None if folder is None else Path(folder), progress)
+    result = run(subject, asked, None if folder is None else as_path(folder, "of the folder", "generated/bench/arm"), progress)
     if folder is not None:
         result.save(folder)
     return result
