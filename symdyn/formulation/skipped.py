@@ -23,6 +23,8 @@ def skipped(equations: Equations) -> list[str]:
         notes.append("time: nothing depends on t, so no function takes it")
     if not kinds & INPUT:
         notes.append("inputs: there are none")
+    if equations.events:
+        notes.append("events: files that stand alone do not look for them, simulations do")
     if equations.constraints:
         notes += _constraints(equations, tape)
     if equations.formulation != "recursive":

@@ -15,12 +15,21 @@ from symdyn.runtime.arguments import take
 
 @dataclass(frozen=True)
 class Inputs:
-    """One of: constant (n_in,), table over times (linear between rows, ends held), function f(t, x) -> (n_in,)."""
+    """One of: constant (n_in,), table over times (linear between rows, ends held), function f(t, x) -> (n_in,).
+
+    The function of inputs that are given one by one looks into their tables: of_tables.
+    """
 
     constant: np.ndarray
     times: np.ndarray | None = None
     table: np.ndarray | None = None
     function: Callable[[float, np.ndarray], Any] | None = None
+    of_tables: bool = False
+
+    @property
+    def has_kinks(self) -> bool:
+        """Whether any is linear between rows."""
+        return self.table is not None or self.of_tables
 
     def at(self, t: float, x: np.ndarray) -> np.ndarray:
         """The inputs at a time and state."""
@@ -95,7 +104,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
             values[place] = source(t, x)
         return values
 
-    return Inputs(constant, function=mixed)
+    return Inputs(constant, function=mixed, of_tables=not all(map(callable, varying.values())))
 
 
 def _interpolate(times: np.ndarray, column: np.ndarray, t: float, x: np.ndarray) -> float:

@@ -40,19 +40,31 @@ def _constrained(module: Module, request: Request) -> str:
             "coordinates that need no constraints")
 
 
+def _switching(module: Module) -> str:
+    """Why steps of high order go wrong without a sign of it; empty if the right-hand side is smooth."""
+    reason = module.metadata.get("not_smooth", "")
+    return f"{reason}, and has no Taylor series there; use method='{DEFAULT}'" if reason else ""
+
+
 def _not_expanded(module: Module, request: Request) -> str:
     """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
-    instead = f"use method='{DEFAULT}'"
     if request.inputs.function is not None or request.inputs.table is not None:
-        return f"inputs that vary have no Taylor series; {instead}, or write them as expressions of the time t"
-    reason = module.metadata.get("not_smooth", "")
-    return f"{reason}, and has no Taylor series there; {instead}" if reason else ""
+        return f"inputs that vary have no Taylor series; use method='{DEFAULT}', or write them as expressions of the time t"
+    return _switching(module)
+
+
+def _not_collocated(module: Module, request: Request) -> str:
+    """Constant steps do not end at kinks; inputs by functions may be smooth, those by tables are linear between rows."""
+    if request.inputs.has_kinks:
+        return (f"inputs by a table have a kink at each of its times, which constant steps go across; use method='{DEFAULT}', "
+                "a smooth function of t and x, or expressions of the time t")
+    return _constrained(module, request) or _switching(module)
 
 
 COMPILED = {m.name: m for m in (
     CompiledMethod("dop853", "explicit, order 8: tolerances of 1e-6 to 1e-13"),
     CompiledMethod("bs54", "explicit, order 5: tolerances from 1e-5 on"),
-    CompiledMethod("gauss", "symmetric, order 16, constant steps: very long conservative motion", unfit=_constrained),
+    CompiledMethod("gauss", "symmetric, order 16, constant steps: very long conservative motion", unfit=_not_collocated),
     CompiledMethod("taylor", "series by recurrences: short right-hand sides, smallest errors", unfit=_not_expanded),
     CompiledMethod("radau", "implicit, order 9, with the exact Jacobian: stiff systems", ("jacobian_x",)),
 )}
@@ -76,9 +88,9 @@ def is_compiled(method: object) -> bool:
 def check_compiled(module: Module, request: Request, method: str) -> None:
     """Raises ArgumentError where a compiled method does not fit, with the reason and what to use instead."""
     if module.backend != "c":
-        instead = f"'{method.upper()}'" if method == DEFAULT else "one of SciPy's ('DOP853', stiff: 'Radau')"
+        instead = "'Radau'" if method == "radau" else "'DOP853'"
         raise ArgumentError(f"{module.name}: the compiled integrator {method!r} needs the C backend; this module "
-                            f"runs on {module.backend}. Use method={instead}, or compile(backend='c')")
+                            f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
     record = COMPILED[method]
     missing = [n for n in record.needs if n not in module.metadata.get("functions", record.needs)]
     why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)

@@ -9,6 +9,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+import sympy as sp
 
 import symdyn as sd
 from symdyn.backend.methods.gauss import COEFFICIENTS
@@ -172,3 +173,32 @@ def test_constraints_are_refused() -> None:
     with pytest.raises(ArgumentError, match=r"four_bar: method 'gauss' does not fit: .*corrections back onto constraints \(.*"
                                             r"use method='dop853'"):
         constrained("four_bar").simulate((0, 1), **GAUSS)
+
+
+def test_inputs_by_a_table_are_refused_by_a_function_taken() -> None:
+    """An oscillator of 1 kg and 1 N/m, F = sin(2 t): x = (2 sin t - sin 2t)/3."""
+    q = sd.coordinates("q")
+    F = sd.inputs("F")
+    system = sd.System("pushed")
+    slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))
+    system.add_joint_force(slider, F - q)
+    module = system.embedding().compile("c")
+    times = np.linspace(0, 5, 51)
+    rows = np.sin(2 * times)
+    for table in ({"F": (times, rows)}, (times, rows[:, None])):
+        with pytest.raises(ArgumentError, match=r"pushed: method 'gauss' does not fit: inputs by a table have a kink at each of "
+                                                r"its times, .*use method='dop853', a smooth function of t and x, or expr"):
+            module.simulate([0.0, 5.0], inputs=table, **GAUSS)
+    for smooth in ({"F": lambda t, x: np.sin(2 * t)}, lambda t, x: [np.sin(2 * t)]):
+        found = module.simulate(times[::10], inputs=smooth, rtol=1e-11, **GAUSS)
+        np.testing.assert_allclose(found.q[:, 0], ((2 * np.sin(times) - rows) / 3)[::10], rtol=0, atol=1e-9)
+
+
+def test_right_hand_sides_that_switch_are_refused() -> None:
+    q = sd.coordinates("q")
+    system = sd.System("rubbed")
+    slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))
+    system.add_joint_force(slider, -sp.Abs(q.dot) * q.dot)
+    with pytest.raises(ArgumentError, match=r"rubbed: method 'gauss' does not fit: the right-hand side switches \(abs\), .*"
+                                            r"use method='dop853'"):
+        system.embedding().compile("c").simulate((0, 1), **GAUSS)

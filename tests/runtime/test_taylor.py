@@ -195,6 +195,77 @@ def test_a_pole_is_not_stepped_over(moved: Any) -> None:
     assert "the step became too small" in found.message
 
 
+# -- what coefficients do not tell
+
+
+def quadratic_drag(velocity: list[Any], c: Any) -> list[Any]:
+    """A force -c |v| v whose |v| is a square root: no function that switches, but a kink at v = 0."""
+    speed = sp.sqrt(sum(v**2 for v in velocity))
+    return [-c * speed * v for v in velocity]
+
+
+@pytest.fixture(scope="module")
+def thrown(pendulum: Any) -> Any:
+    x, y = sd.coordinates("x y")
+    s = sd.System("thrown", gravity=[0, -GRAVITY])
+    carriage, ball = s.add_body("carriage"), s.add_body("ball", mass=1)
+    s.add_joint(sd.Prismatic("along", s.ground, carriage, x, axis=[1, 0]))
+    s.add_joint(sd.Prismatic("up", carriage, ball, y, axis=[0, 1]))
+    s.add_force(ball, quadratic_drag([x.dot, y.dot], sp.Rational(1, 10)))
+    return s.embedding().compile("c")
+
+
+@pytest.mark.parametrize("aside", [0.0, 1e-6, 1e-3])
+def test_a_kink_and_what_is_nearly_one(aside: float, thrown: Any) -> None:
+    """Straight up the speed is v = w tan, then -w tanh; with a bit of motion aside the kink is a sharp bend."""
+    w, rise = np.sqrt(GRAVITY / 0.1), 10.0
+    top = np.arctan(rise / w) * w / GRAVITY
+    assert thrown.metadata["not_smooth"] == ""
+    found = thrown.simulate([0.0, 2.0], u=[aside, rise], rtol=1e-9, atol=1e-9, **TAYLOR)
+    assert found.u[-1, 1] == pytest.approx(-w * np.tanh((2.0 - top) * GRAVITY / w), abs=max(1e-7, aside**2))
+    tight = thrown.simulate([0.0, 2.0], u=[aside, rise], **TIGHT)
+    np.testing.assert_allclose(found.x[-1], tight.x[-1], rtol=0, atol=1e-7)
+    assert found.n_rejected > 0 and found.n_steps < 40
+
+
+def test_kinks_at_turning_points(pendulum: Any) -> None:
+    q = sd.coordinates("q")
+    s = sd.System("braked", gravity=[0, -GRAVITY])
+    bob = s.add_body("bob", mass=1)
+    s.add_joint(sd.Revolute("hinge", s.ground, bob, q, child_point=[0, 1]))
+    s.add_force(bob, quadratic_drag([sp.cos(q) * q.dot, sp.sin(q) * q.dot], sp.Rational(1, 2)))
+    module = s.embedding().compile("c")
+    found, wanted = (module.simulate([0.0, 10.0], [1.2], [0.1], rtol=rtol, atol=rtol, method=m)
+                     for m, rtol in (("taylor", 1e-9), ("dop853", 1e-12)))
+    np.testing.assert_allclose(found.x[-1], wanted.x[-1], rtol=0, atol=1e-7)
+
+
+def test_a_branch_cut_is_not_stepped_over(pendulum: Any) -> None:
+    """A force that jumps where q changes sign; on each side energy is kept, of a potential with a kink at q = 0."""
+    q = sd.coordinates("q")
+    s = sd.System("cut")
+    slider = s.add_joint(sd.Prismatic("slider", s.ground, s.add_body("block", mass=1), q, axis=[1, 0]))
+    s.add_joint_force(slider, -4 * q + sp.atan2(q, -1) / 4)
+    found = s.embedding().compile("c").simulate(np.linspace(0, 5, 21), [0.7], [0.2], rtol=1e-9, atol=1e-9, **TAYLOR)
+    x, u = np.abs(found.q[:, 0]), found.u[:, 0]
+    energy = u**2 / 2 + 2 * x**2 - (np.pi * x - x * np.arctan(x) + np.log1p(x**2) / 2) / 4
+    assert np.abs(energy - energy[0]).max() < 1e-7 and (np.diff(np.sign(found.q[:, 0])) != 0).sum() > 2
+
+
+def test_smooth_motion_is_not_slowed_down(double: Any) -> None:
+    for tolerance in (1e-6, 1e-9, 1e-12, 1e-15):
+        found = double.simulate([0.0, 10.0], [0.3, 0.5], rtol=tolerance, atol=tolerance, **TAYLOR)
+        assert found.n_rejected == 0 and found.n_steps < 600
+
+
+@pytest.mark.parametrize("q", [(0.3, 0.5), (0.0, 0.5), (0.0, 0.0), (-np.pi / 2, 0.0)])
+def test_from_rest_without_absolute_tolerance(q: tuple[float, float], double: Any) -> None:
+    """Speeds of 0, coordinates of 0 and the position of equilibrium have no size to go by."""
+    found = double.simulate([0.0, 2.0], q, rtol=1e-9, atol=0.0, **TAYLOR)
+    assert found.success and found.n_steps < 80 and found.n_rejected < 10
+    np.testing.assert_allclose(found.x[-1], double.simulate([0.0, 2.0], q, **TIGHT).x[-1], rtol=0, atol=1e-7)
+
+
 # -- what it does not take
 
 
