@@ -103,7 +103,7 @@ def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
         for one in listed:
             if isinstance(one, str):
                 get(one)  # an unknown name is told before anything is run
-            elif not isinstance(one, (System, Equations)):
+            elif not isinstance(one, (System, Equations, Subject)):
                 raise ArgumentError(f"stress was given {one!r}; pass a System, Equations, or the name of one of the catalogue")
         if not of_system:
             raise ArgumentError(f"the checks {', '.join(own)} have mechanisms of their own; leave out the system")

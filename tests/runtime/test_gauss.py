@@ -14,7 +14,6 @@ import sympy as sp
 import symdyn as sd
 from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.errors import ArgumentError
-from symdyn.systems import get
 from tests.runtime.constrained import module as constrained
 
 GAUSS = {"method": "gauss"}
@@ -22,23 +21,8 @@ GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
-def pendulum(compiled: Callable[..., Any]) -> Any:
-    return compiled("pendulum", "c")
-
-
-@pytest.fixture(scope="module")
 def double(compiled: Callable[..., Any]) -> Any:
     return compiled("double_pendulum", "c")
-
-
-@pytest.fixture(scope="module")
-def fast() -> Any:
-    """The pendulum as users have it: without the flags that have tests compile quickly."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("SYMDYN_CC", raising=False)
-        module = get("pendulum").embedding().compile("c")
-        module.simulate([0.0, 1.0], **GAUSS)
-    return module
 
 
 def swing(t: float, release: float) -> float:
