@@ -1,14 +1,18 @@
-"""What several tests share: numbers for the inputs of a tape, and closeness at 30 digits."""
+"""What several tests share: numbers for the inputs of a tape, closeness at 30 digits, a pendulum in closed
+form, a browser."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
 
 import mpmath
 import numpy as np
+import pytest
 import sympy as sp
 
 from symdyn.formulation.equations import Equations
@@ -20,6 +24,7 @@ TOLERANCE = mpmath.mpf(10) ** -25
 # For derivatives by central differences: the error is about STEP^2, and HIGH - 20 digits are left.
 HIGH = 80
 STEP = mpmath.mpf(10) ** -20
+GRAVITY = 9.81
 
 
 def numbers(names: Sequence[str], seed: int, low: float = 0.2, high: float = 1.2) -> dict[str, Fraction]:
@@ -118,3 +123,25 @@ def twists(equations: Equations, values: Mapping[str, Any]) -> np.ndarray:
             W = frames_dot[k, 3:].reshape(3, 3) @ frames[k, 3:].reshape(3, 3).T
             rows.append([*v[k], W[2, 1], W[0, 2], W[1, 0]])
         return np.array(rows, dtype=object).reshape(-1, 6)
+
+
+def swing(t: float, release: float) -> float:
+    """Angle of a pendulum of 1 m, released at rest."""
+    with mpmath.workdps(30):
+        k, w = mpmath.sin(mpmath.mpf(release) / 2), mpmath.sqrt(mpmath.mpf(GRAVITY))
+        quarter = mpmath.ellipk(k**2)
+        phase = mpmath.fmod(w * mpmath.mpf(t), 4 * quarter)
+        return float(2 * mpmath.asin(k * mpmath.ellipfun("sn", quarter - phase, k**2)))
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Chromium through Playwright; the test is skipped without them."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("no Chromium on this machine")
+    with playwright.sync_playwright() as p:
+        opened = p.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield opened
+        opened.close()

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import symdyn
 from symdyn.choice import formulated
 from symdyn.errors import ArgumentError, EvaluationWarning, MissingExtra, ModelWarning, SimulationWarning, SymdynError
-from symdyn.folders import templates_folder
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
+from symdyn.pages import page_environment, write_text
 from symdyn.report import full_condition, full_equations, full_pictures, full_work
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.run_tables import facts
@@ -58,11 +58,7 @@ def full_report(system: Any, path: Any, budget: float = BUDGET, formulation: str
     given = isinstance(system, Equations)
     name = "" if given else "absolute" if coordinates == "absolute" else equations.formulation
     text = page(equations, system, name, budget, verify, told)
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ArgumentError(f"the report cannot be written to {target}: {error.strerror}") from None
-    return target
+    return write_text(target, text, "the report")
 
 
 def _target(path: Any) -> Path:
@@ -109,8 +105,6 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
 
     system        what sd.bench takes; formulation: the equations' as it names them, empty where it takes equations
     """
-    import jinja2
-
     subject = Subject(equations)
     makers: dict[str, tuple[str, Callable[[Part], None]]] = {
         "equations": ("Equations of motion", lambda part: _show_equations(part, equations)),
@@ -121,8 +115,7 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
     if verify:
         makers["proof"] = ("Proof by identities", lambda part: part.shown.update(result=equations.verify()))
     parts = {key: _made(title, make, told) for key, (title, make) in makers.items()}
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True)
+    environment = page_environment()
     environment.filters["number"] = number
     return environment.get_template("report/full.html.jinja").render(
         name=equations.name, version=symdyn.__version__, formulation=equations.formulation, frames=equations.frames, parts=parts,

@@ -81,7 +81,9 @@ class Locator:
         self.records = module.metadata[EVENTS]
         self.resolution = AT_ONCE * abs(span)
         self.side, self.left = np.zeros(len(look)), np.zeros(len(look))
+        self.starts = np.cumsum([0, *[len(record["reset"]) for record in self.records]])
         self.latest, self.repeated = np.inf, 0  # of resets
+        self.fired: list[int] = []  # the events of the latest time
         self.happened: list[tuple[int, float, np.ndarray]] = []
         self.over = ""  # why the run ends at an event
         self.failed = ""  # or fails at it
@@ -90,13 +92,13 @@ class Locator:
         """What vanishes at the events, (n_e,)."""
         return self.module.evaluate(EVENTS, t, x[:self.n_state], self.p, self.given(t, x[:self.n_state]))
 
-    def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float, fired: Sequence[int] = ()) -> None:
+    def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float) -> None:
         """Note on which side of zero every quantity is, or, at zero, which it goes to; step: a small one, with sign."""
         value = self.values(t, x)
         change = self.values(t + step, x + step * xd) - value
         # What has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it from there.
         left = 2 * np.abs(self.left) + np.abs(change)
-        at_zero = (value == 0) | (np.isin(np.arange(len(value)), fired) & (np.abs(value) <= left))
+        at_zero = (value == 0) | (np.isin(np.arange(len(value)), self.fired) & (np.abs(value) <= left))
         self.side = np.sign(np.where(at_zero, change, value))
 
     def first(self, t_old: float, t_new: float, between: Between) -> float | None:
@@ -112,22 +114,16 @@ class Locator:
             left = float(s)
         return None
 
-    def after(self, t: float, x: np.ndarray, fired: Sequence[int]) -> np.ndarray | None:
+    def after(self, t: float, x: np.ndarray) -> np.ndarray | None:
         """The state that the motion goes on from; None if no event changed it."""
-        places = [(k, self.records[k]["reset"]) for k in range(len(self.records))]
-        starts = np.cumsum([0, *[len(r) for _, r in places]])
-        changed = [k for k in fired if self.records[k]["reset"]]
+        changed = [k for k in self.fired if self.records[k]["reset"]]
         if not changed:
             return None
         becomes = self.module.evaluate(RESETS, t, x[:self.n_state], self.p, self.given(t, x[:self.n_state]))
         state = x.copy()
         for k in changed:
-            state[self.records[k]["reset"]] = becomes[starts[k]:starts[k + 1]]
+            state[self.records[k]["reset"]] = becomes[self.starts[k]:self.starts[k + 1]]
         return state
-
-    def fired(self, t: float) -> list[int]:
-        """The events that were noted at a time."""
-        return [k for k, s, _ in self.happened if s == t]
 
     def _root(self, k: int, left: float, right: float, between: Between) -> float:
         """The zero of one quantity, which leaves its side between left and right."""
@@ -148,8 +144,8 @@ class Locator:
         t = min(roots.values(), key=lambda s: abs(s - t_old))
         before = between(t)
         self.left = self.values(t, before)
-        events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
-        self.happened += [(int(k), t, before) for k in events]
+        self.fired = events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
+        self.happened += [(k, t, before) for k in events]
         if any(self.records[k]["reset"] for k in events):
             near = abs(t - self.latest) <= CHATTER / AT_ONCE * self.resolution
             self.repeated, self.latest = self.repeated + 1 if near else 1, t

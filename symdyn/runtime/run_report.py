@@ -9,7 +9,7 @@ import numpy as np
 
 import symdyn
 from symdyn.errors import ArgumentError
-from symdyn.folders import templates_folder
+from symdyn.pages import page_environment, write_text
 from symdyn.runtime import run_tables
 from symdyn.runtime.paths import as_path
 
@@ -28,26 +28,16 @@ def write_report(solution: Solution, path: Any) -> Path:
     target = as_path(path, "where to write the report", "run.html")
     if target.suffix.lower() not in (".html", ".htm"):
         raise ArgumentError(f"cannot write the report to {target.name}: the ending must be .html")
-    text = page(solution)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ArgumentError(f"the report cannot be written to {target}: {error.strerror}") from None
-    return target
+    return write_text(target, page(solution), "the report")
 
 
 def page(solution: Solution) -> str:
     """The text of the report."""
-    import jinja2
-
     from symdyn.runtime.pictures import embedded
 
     module = solution.module
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True)
     energy = run_tables.energy(solution)
-    return environment.get_template("report/run.html.jinja").render(
+    return page_environment().get_template("report/run.html.jinja").render(
         name=module.name, version=symdyn.__version__, success=solution.success, message=solution.message,
         fallback=module.fallback, facts=run_tables.facts(solution), parameters=run_tables.parameters(solution),
         start=run_tables.start(solution), extremes=run_tables.extremes(solution), constraints=run_tables.constraints(solution),

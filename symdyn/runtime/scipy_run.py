@@ -113,13 +113,13 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
         assert locator is not None
         begun = before
         while (at := locator.first(begun, float(solver.t), between)) is not None:
-            x, fired = between(at), locator.fired(at)
-            after = locator.after(at, x, fired)
+            x = between(at)
+            after = locator.after(at, x)
             if after is not None:  # onto the constraints, whatever keeps the steps there
                 after = Projector(module, request.p)(at, after)
             if after is not None or locator.over or locator.failed:
                 return at, x, after
-            locator.begin(at, x, field(at, x), solver.direction * 1e-6 * solver.step_size, fired)
+            locator.begin(at, x, field(at, x), solver.direction * 1e-6 * solver.step_size)
             if at == solver.t:
                 return None
             begun = at
@@ -188,7 +188,7 @@ def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_nam
                     step = solver.direction * 1e-6 * solver.step_size
                     spent += int(solver.nfev)
                     solver = solver_class(field, here, state, t_end, **{k: v for k, v in options.items() if k != "first_step"})
-                    locator.begin(here, state, field(here, state), step, locator.fired(here))
+                    locator.begin(here, state, field(here, state), step)
                 if bar is not None:
                     bar.update(abs(solver.t - before))
                 if watch is not None and watch(here, state):

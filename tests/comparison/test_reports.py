@@ -12,6 +12,7 @@ from symdyn.comparison.result import Comparisons
 from symdyn.comparison.typeset import Lines, formula_latex, mathml, width
 from symdyn.comparison.verdict import Verdict
 from symdyn.report.latex import letters
+from tests.helpers import browser
 
 q = sd.coordinates("q1")
 m, l, g = sd.parameters("m l g", positive=True)
@@ -181,14 +182,8 @@ def test_the_document_compiles_with_formulas_of_a_readable_size(comparisons, bar
 
 @pytest.fixture(scope="module")
 def page():
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield browser.new_page(viewport={"width": 1300, "height": 900})
-        browser.close()
+    with browser() as opened:
+        yield opened.new_page(viewport={"width": 1300, "height": 900})
 
 
 @pytest.mark.parametrize("name", ["comparison.html", "errata.html"])

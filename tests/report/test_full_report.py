@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import sys
 from html import unescape
 from pathlib import Path
@@ -28,6 +27,7 @@ from symdyn.stress.record import Row as StressRow
 from symdyn.stress.record import StressReport
 from symdyn.stress.run import stress
 from symdyn.stress.subject import Subject
+from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
@@ -374,13 +374,8 @@ def test_wrong_commands(arguments: list[str], message: str, tmp_path: Path, monk
 
 
 def test_the_page_opens_in_a_browser_without_network_or_errors(written: tuple[Path, list[str]]) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1300, "height": 900})
+    with browser() as opened:
+        page = opened.new_page(viewport={"width": 1300, "height": 900})
         requests: list[str] = []
         complaints: list[str] = []
         page.on("request", lambda r: requests.append(r.url))
@@ -392,4 +387,3 @@ def test_the_page_opens_in_a_browser_without_network_or_errors(written: tuple[Pa
         assert [r for r in requests if not r.startswith(("file:", "data:"))] == [] and complaints == []
         sizes = page.evaluate("[...document.images].map(i => [i.naturalWidth, i.naturalHeight, i.alt.length])")
         assert len(sizes) == 4 and all(w > 50 and h > 30 and alt > 0 for w, h, alt in sizes)
-        browser.close()

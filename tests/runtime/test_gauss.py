@@ -6,7 +6,6 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -14,24 +13,15 @@ import sympy as sp
 import symdyn as sd
 from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.errors import ArgumentError
+from tests.helpers import GRAVITY, swing
 from tests.runtime.constrained import module as constrained
 
 GAUSS = {"method": "gauss"}
-GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
 def double(compiled: Callable[..., Any]) -> Any:
     return compiled("double_pendulum", "c")
-
-
-def swing(t: float, release: float) -> float:
-    """Angle of a pendulum of 1 m, released at rest."""
-    with mpmath.workdps(30):
-        k, w = mpmath.sin(mpmath.mpf(release) / 2), mpmath.sqrt(mpmath.mpf(GRAVITY))
-        quarter = mpmath.ellipk(k**2)
-        phase = mpmath.fmod(w * mpmath.mpf(t), 4 * quarter)
-        return float(2 * mpmath.asin(k * mpmath.ellipfun("sn", quarter - phase, k**2)))
 
 
 # -- coefficients

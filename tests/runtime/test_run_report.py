@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from html import unescape
 from pathlib import Path
@@ -20,6 +19,7 @@ from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime import run_report, run_tables
 from symdyn.runtime.module import Module
 from symdyn.runtime.solution import Solution
+from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
@@ -234,15 +234,10 @@ def test_the_command_line_writes_a_report(tmp_path: Path, capsys: pytest.Capture
 
 @pytest.fixture
 def open_page() -> Iterator[Callable[[Path, int], Any]]:
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with browser() as opened:
 
         def show(path: Path, width: int) -> Any:
-            page = browser.new_page(viewport={"width": width, "height": 900})
+            page = opened.new_page(viewport={"width": width, "height": 900})
             page.requests, page.complaints = [], []
             page.on("request", lambda r: page.requests.append(r.url))
             page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
@@ -251,7 +246,6 @@ def open_page() -> Iterator[Callable[[Path, int], Any]]:
             return page
 
         yield show
-        browser.close()
 
 
 def test_the_report_opens_in_a_browser_without_network_or_errors(open_page: Callable[[Path, int], Any], report: Path) -> None:

@@ -13,12 +13,12 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning, UnsupportedExpression
 from symdyn.pipeline import emit
+from tests.helpers import GRAVITY, swing
 from tests.oracles.random_trees import random_tree
 from tests.runtime.constrained import module as constrained
 
 TAYLOR = {"method": "taylor"}
 TIGHT = {"rtol": 1e-13, "atol": 1e-13}
-GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +49,6 @@ def driven() -> sd.System:
 @pytest.fixture(scope="module")
 def moved(pendulum: Any) -> Any:
     return driven().embedding().compile("c")
-
-
-def swing(t: float, release: float) -> float:
-    """Angle of a pendulum of 1 m, released at rest."""
-    with mpmath.workdps(30):
-        k, w = mpmath.sin(mpmath.mpf(release) / 2), mpmath.sqrt(mpmath.mpf(GRAVITY))
-        quarter = mpmath.ellipk(k**2)
-        phase = mpmath.fmod(w * mpmath.mpf(t), 4 * quarter)
-        return float(2 * mpmath.asin(k * mpmath.ellipfun("sn", quarter - phase, k**2)))
 
 
 # -- accuracy

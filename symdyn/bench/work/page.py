@@ -13,8 +13,7 @@ from symdyn.bench.work.benchmark import Benchmark
 from symdyn.bench.work.picture import title
 from symdyn.bench.work.record import DISTURBED, Row
 from symdyn.bench.work.table import LEVELS, figure, milliseconds
-from symdyn.errors import ArgumentError
-from symdyn.folders import templates_folder
+from symdyn.pages import page_environment, write_text
 
 
 def write_page(benchmarks: Sequence[Benchmark], pictures: Sequence[Path], path: Path) -> Path:
@@ -22,23 +21,13 @@ def write_page(benchmarks: Sequence[Benchmark], pictures: Sequence[Path], path: 
 
     Raises ArgumentError where it cannot be written.
     """
-    text = page(benchmarks, pictures)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ArgumentError(f"the page of the bench cannot be written to {path}: {error.strerror}") from None
-    return path
+    return write_text(path, page(benchmarks, pictures), "the page of the bench")
 
 
 def page(benchmarks: Sequence[Benchmark], pictures: Sequence[Path]) -> str:
     """The text of the page."""
-    import jinja2
-
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder()), undefined=jinja2.StrictUndefined,
-                                     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True)
     parts = [part(benchmark, picture) for benchmark, picture in zip(benchmarks, pictures, strict=True)]
-    return environment.get_template("report/bench.html.jinja").render(version=symdyn.__version__, parts=parts)
+    return page_environment().get_template("report/bench.html.jinja").render(version=symdyn.__version__, parts=parts)
 
 
 def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
