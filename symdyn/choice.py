@@ -27,9 +27,9 @@ from symdyn.tape.tape import Tape
 if TYPE_CHECKING:
     from symdyn.model.system import System
 
-# Nanoseconds for each of the `terms` of a tape. `python -m symdyn.bench.cost_model` measures the compiled right-hand sides
-# of all candidates of 40 systems and fits these by non-negative least squares of the relative errors; here with gcc 12 on
-# an AMD EPYC of 3.4 GHz (Zen 3). Of the models that it compares, this one lost the least time where it had not been fitted.
+# Nanoseconds for each of the `terms` of a tape. `symdyn bench costs` measures the compiled right-hand sides of all candidates
+# of 40 systems and fits these by non-negative least squares of the relative errors; here with gcc 12 on an AMD EPYC of
+# 3.4 GHz (Zen 3). Of the models that it compares, this one lost the least time where it had not been fitted.
 COSTS = {"cycles": 0.302, "beyond": 0.167, "sines": 24.2, "angles": 4.22}
 # Instructions that the processor keeps decoded; all further ones are decoded in every evaluation.
 KEPT_DECODED = 900
@@ -207,8 +207,8 @@ def least_time_with_mass_matrix(model: Model, recursion: Derived) -> float:
     """Nanoseconds that the embedding takes at the least, without deriving it.
 
     Factorizing and solving are counted, and nothing waits. Forces and forming the mass matrix take no fewer than half of the
-    instructions of the recursion (0.52 to 1.35 of them in the systems of symdyn.bench.cost_model with more than two speeds);
-    if all pivots are constant, solving alone is left.
+    instructions of the recursion (0.52 to 1.73 of them in the systems of `symdyn bench costs` with more than two speeds); if all
+    pivots are constant, solving alone is left.
     """
     least = float(solving_instructions(model))
     if any(pivot.mask & ~PARAMETER for pivot in recursion.equations.recorder.checks):

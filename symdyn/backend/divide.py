@@ -31,6 +31,9 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
         core = unsigned(e)
         if where.get(core, len(stretches) - 1) != len(stretches) - 1:
             last_use[core] = len(stretches) - 1
+    over: dict[int, list[Node]] = {}
+    for node, k in last_use.items():
+        over.setdefault(k, []).append(node)
     slots: dict[Node, int] = {}
     free: list[int] = []
     count = 0
@@ -42,7 +45,7 @@ def divide(body: Sequence[Node], entries: Sequence[Any], longest: int) -> tuple[
                 slots[node] = free.pop()
             else:
                 slots[node], count = count, count + 1
-        free += sorted((slots[node] for node in slots if last_use[node] == k), reverse=True)
+        free += sorted((slots[node] for node in over.get(k, ())), reverse=True)
         result.append((stretch, kept))
     return result, slots, count
 

@@ -106,9 +106,10 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     running = {*tape.running, *late}
     body = [n for n in tape.steps if n in running and n not in hoisted and n.op != "leaf"]
     operations = count_of(body)
+    checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in late)])
     if dialect.parts is None or len(body) <= dialect.parts.whole:
         writer = Writer(dialect, tape, places, hoisted, codes, late, wanted)
-        part = writer.part(body, output.entries, writer.results_of(output.entries))
+        part = writer.part(body, output.entries, writer.results_of(output.entries), checks)
         return Function(name, title, output.shape, part.arguments, part.loads, part.sections, part.results, operations,
                         tape.longest_chain(), inlined=frozenset(writer.printer.inline))
     parts: list[Part] = []
@@ -118,9 +119,9 @@ def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]
     for k, (stretch, kept) in enumerate(stretches):
         writer = Writer(dialect, tape, places, {**hoisted, **earlier}, codes, late, wanted)
         if k == len(stretches) - 1:
-            parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries)))
+            parts.append(writer.part(stretch, output.entries, writer.results_of(output.entries), checks))
         else:
-            parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots)))
+            parts.append(writer.part(stretch, kept, partial(writer.keep, kept, slots), checks))
         earlier |= {node: ("w", slots[node]) for node in kept}
         found |= writer.printer.inline
     groups = {g for part in parts for g in part.arguments}

@@ -207,7 +207,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         strided = {"t": "frame->t[i * frame->t_stride]", "p": "frame->p", "c": "frame->c",
                    "ud": f"frame->ud + i * frame->ud_stride * {sizes['ud']}",
                    "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes['inputs']}"}
-        return ", ".join([strided.get(g) or state(g, "x") for g in f.arguments] + [f"frame->out + i * {f.size}"])
+        x = f"frame->x + i * frame->x_stride * {n_x}"
+        return ", ".join([strided.get(g) or state(g, x) for g in f.arguments] + [f"frame->out + i * {f.size}"])
 
     def field_call(function: str, result: str) -> str:
         """Arguments of a call from the integrator, at t and x."""

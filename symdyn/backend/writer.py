@@ -55,9 +55,10 @@ class Writer:
         self.n_unnamed = 0
         self.n_calls = 0
 
-    def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]]) -> Part:
-        """Statements for the steps of `body`, of which `entries` are used afterwards."""
-        self.checks = checks_of(self.tape, [*self.tape.running, *(n for n in self.tape.prologue if n in self.late)])
+    def part(self, body: Sequence[Node], entries: Sequence[Any], results: Callable[[], tuple[str, ...]],
+             checks: Mapping[Node, str]) -> Part:
+        """Statements for the steps of `body`, of which `entries` are used afterwards; checks: of the whole function."""
+        self.checks = checks
         self._count(body, entries)
         # Only what the sines and cosines need is read before them; anything else would wait in registers, or be spilled.
         at_once = self._at_once(body)

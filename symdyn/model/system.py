@@ -241,7 +241,8 @@ class System:
         direction  1: only upwards through zero, -1: only downwards, 0: either way
         stop       end the motion there
         reset      coordinates, speeds and extra states with expressions for what they become, from the state before the
-                   event: {v: -e*v} for a ball that bounces
+                   event: {v: -e*v} for a ball that bounces. Events at the same time make their resets in the order in which
+                   they were added, each from the state before all of them: of two for one speed the later counts
         """
         self.events.append(make_event(self._faults, name, value, direction, stop, reset, self.planar))
 

@@ -16,6 +16,7 @@ from symdyn.runtime.batch import UNIT, input_rows, parameter_rows, tables_of, wi
 from symdyn.runtime.batch_arguments import take_rows, together
 from symdyn.runtime.batch_solution import BatchSolution
 from symdyn.runtime.batch_watches import outside
+from symdyn.runtime.charts import CHARTS, locked
 from symdyn.runtime.events import wanted
 from symdyn.runtime.inputs import take_inputs
 from symdyn.runtime.masses import negative_masses
@@ -32,7 +33,8 @@ METHOD, OPTIONS = "dop853", ("method", "max_steps", "stabilization", "events")
 NO_VECTORS = "the C compiler has no vectors"
 TOLD = 3
 _DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
-_STATUS, _REASON, _BAD, _T, _H, _T_FAIL, _STEPS, _REJECTED, _X = range(9)
+# A report: the status and what simulation_report tells, x and x_fail from _X on and 8 numbers behind them.
+_STATUS, _T, _H, _STEPS, _REJECTED, _, _REASON, _BAD, _T_FAIL, _X = range(10)
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
 
     A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
     raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning tells in how many motions loads
-    leave what they are meant for, at the states that are kept. Raises ArgumentError for what does not fit.
+    leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
+    ArgumentError for what does not fit.
     """
     metadata = module.metadata
     unknown = [o for o in options if o not in OPTIONS]
@@ -101,7 +104,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
         warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
     given = take_inputs(inputs, metadata["inputs"], initial, module.name).rows if by_time else fixed
-    for sentence in outside(module, times, solution.x, asked.params, given):
+    near = locked(module, times, solution.x, asked.rtol) if metadata.get(CHARTS) else []
+    for sentence in outside(module, times, solution.x, asked.params, given) + near:
         warnings.warn(sentence, SimulationWarning, stacklevel=3)
     return solution
 
@@ -156,7 +160,7 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     unit: Any = module.unit(UNIT)
     n, n_x = asked.n, module.metadata["sizes"]["x"]
     x = np.full((n, len(asked.times), n_x), np.nan)
-    report = np.full((n, _X + n_x), np.nan)
+    report = np.full((n, _X + 2 * n_x + 8), np.nan)
     size = unit.function("batch_size")
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
@@ -206,13 +210,15 @@ def _message(unit: Any, row: np.ndarray) -> str:
     reason, bad = unit.reason(int(row[_REASON])), int(row[_BAD])
     if status == _NO_CONSTANTS:
         return f"{metadata['name']}: {reason}; check the parameters"
-    x = row[_X:]
+    n_x, failed = metadata["sizes"]["x"], status in (_FIELD_FAILED, _NOT_FINITE)
+    x = row[_X + n_x * failed:][:n_x]
     if status == _BAD_START:
         wrong = [name for name, value in zip(metadata["x"], x, strict=True) if not np.isfinite(value)]
         return f"{metadata['name']}: the start is not finite: {', '.join(wrong)}"
     why = {_FIELD_FAILED: reason, _STEP_TOO_SMALL: f"the step became too small ({row[_H]:.3g} s) for the tolerances",
            _NOT_FINITE: f"the derivative of {metadata['x'][bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
-    return describe_stop(metadata, row[_T_FAIL], x, why.get(int(status), f"the integrator refused (status {int(status)})"))
+    t = row[_T_FAIL if failed else _T]
+    return describe_stop(metadata, t, x, why.get(int(status), f"the integrator refused (status {int(status)})"))
 
 
 # -- one by one

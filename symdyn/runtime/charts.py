@@ -39,6 +39,27 @@ def at_lock(module: Module, x: np.ndarray) -> str:
                    for (joint, sequence, *_), d in zip(charts, distances(module, x).ravel(), strict=True) if d < AT)
 
 
+def _limit(rtol: float, speeds: str) -> float:
+    """The distance from gimbal lock below which rounding errors of the angles' rates exceed rtol, see warn_near_lock."""
+    return (EPS / rtol) ** (0.5 if speeds == "rates" else 1.0)
+
+
+def locked(module: Module, t: np.ndarray, x: np.ndarray, rtol: float) -> list[str]:
+    """A sentence for every chart whose angles are too near to gimbal lock in some of many motions, at the states that are kept:
+    t (n_t,), x (n, n_t, n_x), NaN where there is no state."""
+    told = []
+    found = distances(module, x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
+    for k, (joint, sequence, speeds, _) in enumerate(module.metadata.get(CHARTS, ())):
+        near = np.where(np.isfinite(found[..., k]), found[..., k], np.inf)
+        wrong = np.flatnonzero((near < _limit(rtol, speeds)).any(axis=1))
+        if len(wrong):
+            worst, i = divmod(int(near.argmin()), len(t))
+            told.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, the {sequence} "
+                        f"angles of joint {joint} came too near to gimbal lock, in motion {worst} at t = {t[i]:.9g} within "
+                        f"{near.min():.2g} rad: rounding errors of their rates exceed rtol = {rtol:g} there; {INSTEAD}")
+    return told
+
+
 def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarray, run: Callable[[Request], Outcome],
                    level: int = 2) -> None:
     """Give a SimulationWarning for angles that came nearer to gimbal lock than the tolerance allows.
@@ -52,7 +73,7 @@ def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarra
         return
     here = distances(module, x)
     for k, (joint, sequence, speeds, name) in enumerate(charts):
-        limit = (EPS / request.rtol) ** (0.5 if speeds == "rates" else 1.0)
+        limit = _limit(request.rtol, speeds)
         angle = x[:, module.metadata["x"].index(name)]
         # The angle turns back where it comes near, so that two outputs on the same side tell nothing; its rate hardly changes.
         before = np.abs(np.gradient(angle, t, edge_order=1))

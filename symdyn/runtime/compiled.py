@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.runtime.events import EVENTS, at_once, ended
+from symdyn.runtime.events import EVENTS, at_once, ended, not_known
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
-from symdyn.runtime.methods import unit_name
+from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, not_converged
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
@@ -65,9 +65,9 @@ class _Run:
         self.kept: list[Any] = [request.x0, request.atol]
         self._inputs(request)
         span = np.array([*request.span, request.rtol, request.first_step, request.max_step])
-        self.status = unit.function("simulation_start")(
-            self.address, ctypes.byref(self.problem), ctypes.c_void_p(span.ctypes.data),
-            ctypes.c_void_p(request.x0.ctypes.data), ctypes.c_void_p(request.atol.ctypes.data))
+        self.seconds = 0.0
+        self.status = self._timed("simulation_start", ctypes.byref(self.problem), ctypes.c_void_p(span.ctypes.data),
+                                  ctypes.c_void_p(request.x0.ctypes.data), ctypes.c_void_p(request.atol.ctypes.data))
         self.written = ctypes.c_long(0)
         self.happened: list[tuple[int, float, np.ndarray]] = []
         self.rows: np.ndarray | None = None
@@ -103,21 +103,28 @@ class _Run:
 
     def at(self, times: np.ndarray, x: np.ndarray, limit: int) -> int:
         """Go on, writing states at the requested times."""
-        return self._go("simulation_at", limit, times, len(times), x)
+        return self._go(0, limit, times, len(times), x)
 
     def steps(self, t: np.ndarray, x: np.ndarray, limit: int) -> int:
         """Go on, writing every accepted step."""
-        return self._go("simulation_steps", limit, t, x, len(t))
+        return self._go(1, limit, t, len(t), x)
 
-    def _go(self, name: str, limit: int, *rest: Any) -> int:
+    def _go(self, every: int, limit: int, *rest: Any) -> int:
         arguments = [ctypes.c_long(a) if isinstance(a, int) else ctypes.c_void_p(a.ctypes.data) for a in (limit, *rest)]
         with self.guard:
-            status = int(self.unit.function(name)(self.address, *arguments, ctypes.byref(self.written)))
+            status = self._timed("simulation_go", ctypes.c_int(every), *arguments, ctypes.byref(self.written))
         if self.rows is not None:
             take = self.unit.function("simulation_events")
             take.restype = ctypes.c_long
             n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
             self.happened += [(int(row[0]), float(row[1]), row[2:].copy()) for row in self.rows[:n]]
+        return status
+
+    def _timed(self, name: str, *arguments: Any) -> int:
+        function = self.unit.function(name)
+        begun = clock.perf_counter()
+        status = int(function(self.address, *arguments))
+        self.seconds += clock.perf_counter() - begun
         return status
 
     def report(self) -> np.ndarray:
@@ -133,8 +140,8 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     An exception of an input function ends the run; it is raised again unless it is a KeyboardInterrupt.
     """
     unit: Any = module.unit(unit_name(field, method))
-    run = _Run(unit, request)
-    interrupted, seconds, stopped = False, 0.0, False
+    run = _Run(unit, with_own_tolerances(request, method))
+    interrupted, stopped = False, False
     times, n_x = request.times, run.n_x
     stored: list[tuple[np.ndarray, np.ndarray]] = []
     x_out = np.empty((len(times), n_x)) if times is not None else np.empty((STEPS_AT_ONCE, n_x))
@@ -148,9 +155,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
                 stopped = True
                 break
             limit = PIECE if left is None else min(PIECE, left)
-            begun = clock.perf_counter()
             status = run.at(t_out, x_out, limit) if times is not None else run.steps(t_out, x_out, limit)
-            seconds += clock.perf_counter() - begun
             if times is None and (status == _STORE_FULL or run.written.value == len(t_out)):
                 n = run.written.value
                 stored.append((t_out[:n].copy(), x_out[:n].copy()))
@@ -182,9 +187,19 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     if over or not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
     dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
-    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), seconds,
+    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), run.seconds,
                    Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),
-                   int(report[15 + 2 * n_x]))
+                   int(report[15 + 2 * n_x]), _doubt(module, method, report) if status >= 0 else "")
+
+
+def _doubt(module: Module, method: str, report: np.ndarray) -> str:
+    """What to say of steps whose errors the method did not see; for "gauss" bad_index counts them, see its template."""
+    rough = -1 - int(report[6])
+    if method != "gauss" or rough < 1:
+        return ""
+    return (f"{module.name}: method 'gauss' went across kinks or jumps of the right-hand side, the latest of them just before "
+            f"t = {report[7]:.9g} s: of the steps that were done again by halves, {rough} differ by more than ten times the "
+            f"tolerance; use method='{DEFAULT}'")
 
 
 def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
@@ -197,7 +212,7 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
     if status == _EVENT_AT_ONCE:
         return describe_stop(metadata, t, x, at_once(module, run.happened[-1][0]))
     if status == _EVENT_FAILED:
-        why = run.unit.reason(int(report[5])) if report[5] else "events cannot be evaluated: the result is not finite"
+        why = run.unit.reason(int(report[5])) if report[5] else not_known(module, int(report[6]))
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _FIELD_FAILED:
         x_fail = report[8 + n:8 + 2 * n]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -68,6 +68,11 @@ def at_once(module: Module, k: int) -> str:
             "comes to rest there; give it stop=True, or a reset that lets the quantity leave zero")
 
 
+def not_known(module: Module, k: int) -> str:
+    """What to say where the quantity of an event is not a number."""
+    return f"event {module.metadata[EVENTS][k]['name']} cannot be evaluated: the result is not finite"
+
+
 class Locator:
     """Looks for events in the steps of a run.
 
@@ -85,12 +90,26 @@ class Locator:
         self.latest, self.repeated = np.inf, 0  # of resets
         self.fired: list[int] = []  # the events of the latest time
         self.happened: list[tuple[int, float, np.ndarray]] = []
+        self.known = 0.0  # up to when the quantities are known
+        self.apart = module.unit(EVENTS).evaluator(EVENTS)
+        self.apart.set_params(p)
         self.over = ""  # why the run ends at an event
         self.failed = ""  # or fails at it
 
     def values(self, t: float, x: np.ndarray) -> np.ndarray:
-        """What vanishes at the events, (n_e,)."""
-        return self.module.evaluate(EVENTS, t, x[:self.n_state], self.p, self.given(t, x[:self.n_state]))
+        """What vanishes at the events, (n_e,); NaN where that is not known of one that is not looked for.
+
+        Raises EvaluationError where it is not known of one that is.
+        """
+        state, inputs = x[:self.n_state], self.given(t, x[:self.n_state])
+        try:
+            return self.module.evaluate(EVENTS, t, state, self.p, inputs)
+        except EvaluationError:
+            values = self.apart.each(t, state, inputs)
+        lost = self.look & ~np.isfinite(values)
+        if lost.any():
+            raise EvaluationError(not_known(self.module, int(lost.argmax())))
+        return values
 
     def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float) -> None:
         """Note on which side of zero every quantity is, or, at zero, which it goes to; step: a small one, with sign."""
@@ -100,6 +119,7 @@ class Locator:
         left = 2 * np.abs(self.left) + np.abs(change)
         at_zero = (value == 0) | (np.isin(np.arange(len(value)), self.fired) & (np.abs(value) <= left))
         self.side = np.sign(np.where(at_zero, change, value))
+        self.known = t
 
     def first(self, t_old: float, t_new: float, between: Between) -> float | None:
         """The time of the first events in a step, which are noted; between(s): the state within it. None: there is none."""
@@ -111,7 +131,7 @@ class Locator:
             if passed:
                 return self._note({k: self._root(k, left, float(s), between) for k in passed}, t_old, between)
             self.side = np.where(now != 0, now, self.side)
-            left = float(s)
+            left = self.known = float(s)
         return None
 
     def after(self, t: float, x: np.ndarray) -> np.ndarray | None:
@@ -144,6 +164,7 @@ class Locator:
         t = min(roots.values(), key=lambda s: abs(s - t_old))
         before = between(t)
         self.left = self.values(t, before)
+        self.known = t
         self.fired = events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
         self.happened += [(k, t, before) for k in events]
         if any(self.records[k]["reset"] for k in events):

@@ -49,6 +49,7 @@ class Outcome:
     """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
 
     happened   events in order: which, when, the state (n_x,) just before
+    doubt      what to warn of in a run that went on
     """
 
     t: np.ndarray
@@ -64,3 +65,4 @@ class Outcome:
     happened: Sequence[tuple[int, float, np.ndarray]] = ()
     n_jacobians: int = 0
     n_factorizations: int = 0
+    doubt: str = ""

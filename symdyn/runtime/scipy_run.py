@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.events import Locator
-from symdyn.runtime.inputs import Inputs, not_finite
+from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
@@ -42,179 +42,255 @@ def takes_changed_states(solver_class: Any) -> bool:
     return issubclass(solver_class, (RungeKutta, Radau))
 
 
-def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
-    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
-    from scipy import integrate
+class _Field:
+    """The right-hand side as SciPy calls it; it keeps why the step under way could not be evaluated."""
 
-    solver_class = solver_class_of(module, method)
-    bound = module.bind(request.p)
-    evaluator = module.unit(field_name).evaluator("rhs")
-    evaluator.set_params(request.field_p)
-    projector = Projector(module, request.p) if request.stabilization.way == "projection" else None
-    watch = Watch(module, request.p) if request.stabilization.way == "baumgarte" else None
-    n_state = request.n_state
-    free: Inputs = request.inputs
-    n_in = len(free.constant)
-    options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
-    if request.max_step:
-        options["max_step"] = request.max_step
-    if request.first_step:
-        options["first_step"] = request.first_step
-    trouble: list[str] = []  # why the step under way could not be evaluated
-    failed: list[tuple[float, np.ndarray]] = []  # where
-    raised: list[Exception] = []
+    def __init__(self, module: Module, request: Request, name: str) -> None:
+        self.module, self.request = module, request
+        self.bound = module.bind(request.p)
+        self.evaluator = module.unit(name).evaluator("rhs")
+        self.evaluator.set_params(request.field_p)
+        self.n_in = len(request.inputs.constant)
+        self.trouble: list[str] = []
+        self.failed: list[tuple[float, np.ndarray]] = []  # where
+        self.raised: list[Exception] = []  # by functions of the user
 
-    def given(s: float, x: np.ndarray) -> np.ndarray:
+    def given(self, t: float, x: np.ndarray) -> Any:
+        """Inputs at a state of the mechanism."""
+        if not self.n_in:
+            return ()
         try:
-            return free.at(s, x)
+            return self.request.inputs.at(t, x)
         except Exception as error:
-            raised.append(error)
+            self.raised.append(error)
             raise
 
-    def jacobian(s: float, x: np.ndarray) -> np.ndarray:
-        """Exact; the work, if it is integrated too, is one more row, and nothing depends on it."""
-        state = x[:n_state]
-        inputs = given(s, state) if n_in else ()
-        J = bound.jacobian_x(s, state, inputs)
-        if len(x) == n_state:
-            return J
-        bordered = np.zeros((len(x), len(x)))
-        bordered[:n_state, :n_state] = J
-        bordered[n_state, :n_state] = module.evaluate("power_x", s, state, request.p, inputs)
-        return bordered
-
-    exact = request.stabilization.way != "baumgarte" and "jacobian_x" in module.functions
-    if solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and exact:
-        options["jac"] = jacobian
-
-    def field(s: float, x: np.ndarray) -> np.ndarray:
-        inputs = given(s, x[:n_state]) if n_in else None
+    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+        inputs = self.given(t, x[:self.request.n_state]) if self.n_in else None
         try:
-            return evaluator.one(s, x, inputs)
+            return self.evaluator.one(t, x, inputs)
         except EvaluationError as error:
             if np.isfinite(x).all():
-                trouble.append(str(error).removeprefix(f"{module.name}: ") + not_finite(module.metadata["inputs"], inputs, s))
-                failed[:] = [(s, x.copy())]
+                told = not_finite(self.module.metadata["inputs"], inputs, t)
+                self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + told)
+                self.failed[:] = [(t, x.copy())]
             return np.full(len(x), np.nan)
 
-    def dependent(x: np.ndarray) -> str:
+    def jacobian(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Exact; the work, if it is integrated too, is one more row, and nothing depends on it."""
+        n = self.request.n_state
+        state = x[:n]
+        inputs = self.given(t, state)
+        J = self.bound.jacobian_x(t, state, inputs)
+        if len(x) == n:
+            return J
+        bordered = np.zeros((len(x), len(x)))
+        bordered[:n, :n] = J
+        bordered[n, :n] = self.module.evaluate("power_x", t, state, self.request.p, inputs)
+        return bordered
+
+
+class _Cut(NamedTuple):
+    """Where an event ends a step early: the time, the state before; the one to go on from, None where the run ends."""
+
+    t: float
+    before: np.ndarray
+    after: np.ndarray | None
+
+
+class _Run:
+    """One run of a solver, with what is stored of it."""
+
+    def __init__(self, module: Module, request: Request, method: Any, field_name: str) -> None:
+        self.module, self.request = module, request
+        self.solver_class = solver_class_of(module, method)
+        self.metadata = module.unit(field_name).metadata
+        self.field = _Field(module, request, field_name)
+        self.options = self._options()
+        way = request.stabilization.way
+        self.projector = Projector(module, request.p) if way == "projection" else None
+        self.watch = Watch(module, request.p) if way == "baumgarte" else None
+        self.locator: Locator | None = None
+        if request.look is not None and request.look.any():
+            span = request.span[1] - request.span[0]
+            self.locator = Locator(module, request.p, request.look, self.field.given, request.n_state, span)
+        self.here, self.state = request.span[0], request.x0
+        self.ts, self.xs = [self.here], [self.state]
+        self.pending = list(request.times[1:]) if request.times is not None else []
+        self.accepted, self.spent, self.message, self.over = 0, 0, "", False
+        self.solver: Any = None
+        self.dense: Any = None
+
+    def _options(self) -> dict[str, Any]:
+        from scipy import integrate
+
+        request = self.request
+        options: dict[str, Any] = {"rtol": request.rtol, "atol": request.atol}
+        if request.max_step:
+            options["max_step"] = request.max_step
+        span = abs(request.span[1] - request.span[0])
+        if request.first_step and span:  # as in C: no longer than the run, no shorter than can matter in it
+            options["first_step"] = min(max(request.first_step, float(np.finfo(float).eps) ** 2 * span), span)
+        exact = request.stabilization.way != "baumgarte" and "jacobian_x" in self.module.functions
+        if self.solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and exact:
+            options["jac"] = self.field.jacobian
+        return options
+
+    def start(self) -> None:
+        t0, t_end = self.request.span
+        if self.projector is not None:
+            self.xs[0] = self.state = self.projector(t0, self.request.x0)
+        if not np.isfinite(self.field(t0, self.state)).all():  # SciPy would look for a first step for ever
+            raise EvaluationError(self.field.trouble[-1])
+        self.solver = self.solver_class(self.field, t0, self.state, t_end, **self.options)
+        if self.locator is not None:
+            self.locator.begin(t0, self.state, self.field(t0, self.state), 1e-9 * (t_end - t0))
+
+    def step(self) -> None:
+        """One step, its events and outputs; a message if it is the last one."""
+        solver, begun, start = self.solver, float(self.solver.t), self.state
+        note = solver.step()
+        if solver.status == "failed" or not np.isfinite(solver.y).all():
+            self.message = self._why_failed(note)
+            return
+        self.field.trouble.clear()
+        # The polynomial of the step ends where the step did, before the projection.
+        passed = self.pending and (self.pending[0] - solver.t) * solver.direction < 0
+        self.dense = solver.dense_output() if passed or self.locator is not None else None
+        self._project()
+        self.accepted += 1
+        self.here, self.state = float(solver.t), solver.y.copy()
+        cut = self._look(begun, start) if self.locator is not None else None
+        if cut is not None:
+            self.here, self.state = cut.t, cut.before
+        self._store()
+        if cut is not None:
+            self._go_on(cut)
+        if not self.message and self.watch is not None and self.watch(self.here, self.state):
+            self.message = self.watch(self.here, self.state) + self.dependent()
+        if not self.message and self.accepted == self.request.max_steps and self.solver.status == "running":
+            self.message = f"stopped after {self.accepted} steps, as asked"
+
+    def _why_failed(self, note: str | None) -> str:
+        if self.field.trouble:
+            why = self.field.trouble[-1]
+        elif note:
+            state = self.state[:self.request.n_state]
+            why = note.rstrip(".") + nearly_singular(self.module, self.here, state, self.request.p)
+        else:
+            why = "the state is not finite"
+        return why + self.dependent()
+
+    def dependent(self) -> str:
         """What to add to a message where constraints depend on each other, unlike at the start."""
-        places = [(here, x), *(failed if trouble else ())]
-        told = (lost_rank(module, s, at[:n_state], request.p, request.x0[:n_state], t0) for s, at in places)
+        n, p, start = self.request.n_state, self.request.p, self.request.x0
+        places = [(self.here, self.state), *(self.field.failed if self.field.trouble else ())]
+        told = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
         return next(filter(None, told), "")
 
-    def between(s: float) -> np.ndarray:
-        """The state within the latest step."""
-        x = dense(s)
-        return projector(s, x) if projector is not None else x
+    def _project(self) -> None:
+        solver = self.solver
+        if self.projector is not None:
+            tolerated = self.request.atol + self.request.rtol * np.abs(solver.y)
+            projected, moved = self.projector.step(float(solver.t), solver.y, tolerated)
+            if moved:
+                solver.f = solver.fun(solver.t, projected)
+            solver.y = projected
 
-    def cut_by_event() -> tuple[float, np.ndarray, np.ndarray | None] | None:
-        """Where the latest step ends early: the time, the state before and the one to go on from, if there is one."""
+    def between(self, t: float) -> np.ndarray:
+        """The state within the latest step."""
+        x: np.ndarray = self.dense(t)
+        return self.projector(t, x) if self.projector is not None else x
+
+    def _look(self, begun: float, start: np.ndarray) -> _Cut | None:
+        """Look for events in the latest step, from the state `start` at `begun`: where it ends early, if it does."""
+        locator, solver = self.locator, self.solver
         assert locator is not None
-        begun = before
-        while (at := locator.first(begun, float(solver.t), between)) is not None:
-            x = between(at)
-            after = locator.after(at, x)
-            if after is not None:  # onto the constraints, whatever keeps the steps there
-                after = Projector(module, request.p)(at, after)
-            if after is not None or locator.over or locator.failed:
-                return at, x, after
-            locator.begin(at, x, field(at, x), solver.direction * 1e-6 * solver.step_size)
-            if at == solver.t:
-                return None
-            begun = at
+        left = begun
+        try:
+            while (at := locator.first(left, float(solver.t), self.between)) is not None:
+                x = self.between(at)
+                after = locator.after(at, x)
+                if after is not None:  # onto the constraints, whatever keeps the steps there
+                    after = Projector(self.module, self.request.p)(at, after)
+                if after is not None or locator.over or locator.failed:
+                    return _Cut(at, x, None if locator.over or locator.failed else after)
+                locator.begin(at, x, self.field(at, x), solver.direction * 1e-6 * solver.step_size)
+                if at == solver.t:
+                    return None
+                left = at
+        except (EvaluationError, ProjectionFailed) as error:
+            if error in self.field.raised:
+                raise
+            locator.failed = str(error).removeprefix(f"{self.module.name}: ")
+            trusted = locator.known
+            return _Cut(trusted, start if trusted == begun else self.between(trusted), None)
         return None
 
-    t0, t_end = request.span
-    locator = None
-    if request.look is not None and request.look.any():
-        locator = Locator(module, request.p, request.look, lambda s, x: given(s, x) if n_in else (), n_state, t_end - t0)
-    ts, xs = [t0], [request.x0]
-    pending = list(request.times[1:]) if request.times is not None else []
-    accepted, spent, message, interrupted, over = 0, 0, "", False, False
-    here, state = t0, request.x0
-    solver: Any = None
-    dense: Any = None
-    before = t0
+    def _store(self) -> None:
+        """The latest step, or the output times that it has passed."""
+        if self.request.times is None and not (self.locator and self.locator.failed):
+            self.ts.append(self.here)
+            self.xs.append(self.state)
+        while self.pending and (self.pending[0] - self.here) * self.solver.direction <= 0:
+            self.xs.append(self.state if self.pending[0] == self.here or self.dense is None else self.between(self.pending[0]))
+            self.ts.append(self.pending.pop(0))
+
+    def _go_on(self, cut: _Cut) -> None:
+        """From the state after an event, by a new solver; or not."""
+        locator, solver, t_end = self.locator, self.solver, self.request.span[1]
+        assert locator is not None
+        if cut.after is None:
+            self.over, self.message = bool(locator.over), locator.over or locator.failed
+            return
+        self.state = cut.after
+        if self.request.times is None:
+            self.ts.append(self.here)
+            self.xs.append(self.state)
+        if self.here == t_end:
+            return
+        step = solver.direction * 1e-6 * solver.step_size
+        self.spent += int(solver.nfev)
+        later = {k: v for k, v in self.options.items() if k != "first_step"}
+        self.solver = self.solver_class(self.field, self.here, self.state, t_end, **later)
+        locator.begin(self.here, self.state, self.field(self.here, self.state), step)
+
+    @property
+    def running(self) -> bool:
+        return not self.message and self.solver.status == "running"
+
+    def outcome(self, interrupted: bool) -> Outcome:
+        done = not self.message or self.over
+        n = min(len(self.ts), len(self.xs))  # an interrupt may come between the two
+        message = self.message if done else describe_stop(self.metadata, self.here, self.state, self.message)
+        t, x = np.array(self.ts[:n]), np.array(self.xs[:n])
+        if not done or self.over:
+            t, x = with_last(t, x, self.here, self.state)
+        used = (0, 0, 0) if self.solver is None else (self.solver.nfev, self.solver.njev, self.solver.nlu)
+        return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, 0, self.spent + int(used[0]),
+                       corrections=self.projector.corrections if self.projector is not None else Corrections(),
+                       happened=self.locator.happened if self.locator is not None else (),
+                       n_jacobians=int(used[1]), n_factorizations=int(used[2]))
+
+
+def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
+    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
+    run = _Run(module, request, method, field_name)
+    interrupted = False
     try:
         with np.errstate(all="ignore"):
-            if projector is not None:
-                xs[0] = state = projector(t0, request.x0)
-            if not np.isfinite(field(t0, state)).all():  # SciPy would look for a first step for ever
-                raise EvaluationError(trouble[-1])
-            solver = solver_class(field, t0, state, t_end, **options)
-            if locator is not None:
-                locator.begin(t0, state, field(t0, state), 1e-9 * (t_end - t0))
-            while solver.status == "running":
-                before = solver.t
-                note = solver.step()
-                if solver.status == "failed" or not np.isfinite(solver.y).all():
-                    message = trouble[-1] if trouble else note.rstrip(".") + nearly_singular(
-                        module, here, state[:n_state], request.p) if note else "the state is not finite"
-                    message += dependent(state)
-                    break
-                trouble.clear()
-                # The polynomial of the step ends where the step did, before the projection.
-                passed = pending and (pending[0] - solver.t) * solver.direction < 0
-                dense = solver.dense_output() if passed or locator is not None else None
-                if projector is not None:
-                    tolerated = request.atol + request.rtol * np.abs(solver.y)
-                    projected, moved = projector.step(float(solver.t), solver.y, tolerated)
-                    if moved:
-                        solver.f = solver.fun(solver.t, projected)
-                    solver.y = projected
-                accepted += 1
-                here, state = float(solver.t), solver.y.copy()
-                cut = cut_by_event() if locator is not None else None
-                if cut is not None:
-                    here, state = cut[:2]
-                if request.times is None:
-                    ts.append(here)
-                    xs.append(state)
-                while pending and (pending[0] - here) * solver.direction <= 0:
-                    xs.append(state if pending[0] == here or dense is None else between(pending[0]))
-                    ts.append(pending.pop(0))
-                if cut is not None and locator is not None:
-                    if locator.over or locator.failed:
-                        over, message = bool(locator.over), locator.over or locator.failed
-                        break
-                    assert cut[2] is not None
-                    state = cut[2]
-                    if request.times is None:
-                        ts.append(here)
-                        xs.append(state)
-                    if here == t_end:
-                        break
-                    step = solver.direction * 1e-6 * solver.step_size
-                    spent += int(solver.nfev)
-                    solver = solver_class(field, here, state, t_end, **{k: v for k, v in options.items() if k != "first_step"})
-                    locator.begin(here, state, field(here, state), step)
+            run.start()
+            while run.running:
+                before = run.here
+                run.step()
                 if bar is not None:
-                    bar.update(abs(solver.t - before))
-                if watch is not None and watch(here, state):
-                    message = watch(here, state) + dependent(state)
-                    break
-                if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
-                    message = f"stopped after {accepted} steps, as asked"
-                    break
+                    bar.update(abs(run.here - before))
     except KeyboardInterrupt:
-        interrupted, message = True, "interrupted"
+        interrupted, run.message = True, "interrupted"
     except ProjectionFailed as error:
-        message = str(error) + dependent(state)
+        run.message = str(error) + run.dependent()
     except (ValueError, ArithmeticError) as error:
-        if error in raised:
+        if error in run.field.raised:
             raise
-        message = (trouble[-1] if trouble else str(error)) + dependent(state)
-    done = not message or over
-    n = min(len(ts), len(xs))  # an interrupt may come between the two
-    if not done:
-        message = describe_stop(module.unit(field_name).metadata, here, state, message)
-    t, x = np.array(ts[:n]), np.array(xs[:n])
-    if not done or over:
-        t, x = with_last(t, x, here, state)
-    return Outcome(t, x, done, message or "reached the end", interrupted, accepted, 0,
-                   spent + (int(solver.nfev) if solver is not None else 0),
-                   corrections=projector.corrections if projector is not None else Corrections(),
-                   happened=locator.happened if locator is not None else (),
-                   n_jacobians=int(solver.njev) if solver is not None else 0,
-                   n_factorizations=int(solver.nlu) if solver is not None else 0)
+        run.message = (run.field.trouble[-1] if run.field.trouble else str(error)) + run.dependent()
+    return run.outcome(interrupted)

@@ -198,8 +198,8 @@ def chosen_gain(trial: Callable[[], np.ndarray], span: tuple[float, float]) -> f
     trial   gives the times of its steps; each step counts by its length, so that those do not that a method makes while it
             looks for its step, or near a singular position
     With alpha = beta = a violations decay as (1 + a t) exp(-a t). One over a single step, as usual for fixed steps, makes the
-    error control shorten them: a pendulum in x and y at rtol 1e-6 and 1e-9 took 1.1 to 3 times the steps (BDF, Radau, LSODA,
-    DOP853), with RK45 3 to 9 times. One over twenty costs 0 to 20 %, and violations stay within about ten times the tolerance.
+    error control shorten them. One over twenty costs few more, and violations stay near the tolerance: see
+    `symdyn bench figures --only stabilization`.
     Source: Flores, Machado, Seabra, Silva, A parametric study on the Baumgarte stabilization method for forward dynamics of
     constrained multibody systems, ASME J. Comput. Nonlinear Dyn. 6 (2011).
     """

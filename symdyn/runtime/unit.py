@@ -36,6 +36,9 @@ class Evaluator(Protocol):
     def many(self, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray) -> np.ndarray:
         """Results at rows of states; arguments with one row hold for all."""
 
+    def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
+        """The result at one state, NaN or infinite where it cannot be evaluated."""
+
 
 class Unit(Protocol):
     """Generated code that is loaded."""
@@ -140,6 +143,10 @@ class CEvaluator:
                                   + (f" (row {k} of {n})" if n > 1 else ""))
         return out.reshape(n, *self.shape)
 
+    def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
+        self.t[0], self.x[:], self.inputs[:] = t, x, inputs
+        return self.result.copy() if self.call(self.address) in (0, NOT_FINITE) else np.full(self.shape, np.nan)
+
 
 class PythonUnit:
     """A generated Python module: plain floats for one state, NumPy for many."""
@@ -213,6 +220,16 @@ class PythonEvaluator:
         rows = [np.broadcast_to(a, (n, *np.shape(a)[1:])) for a in (t, x, inputs, ud)]
         with np.errstate(all="ignore"):
             return self._evaluate(*rows)
+
+    def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
+        sizes = self.unit.metadata["sizes"]
+        rows = [np.atleast_2d(np.asarray(a, dtype=float)) for a in (x, inputs, np.zeros(sizes["ud"]))]
+        with np.errstate(all="ignore"):
+            try:
+                result: np.ndarray = self.unit.module.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
+            except (ArithmeticError, ValueError):
+                result = np.full(self.unit.metadata["shapes"][self.name], np.nan)
+        return result
 
     def _evaluate(self, t: Any, x: Any, inputs: Any, ud: Any) -> np.ndarray:
         try:

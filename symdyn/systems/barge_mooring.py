@@ -31,8 +31,7 @@ def line_weight(gravity: Any = GRAVITY, density: Any = WATER_DENSITY) -> Any:
 def barge_mooring(body: Any, friction: Any = FRICTION, gravity: Any = GRAVITY, density: Any = WATER_DENSITY) -> list[MooringLine]:
     """The lines, for `system.add_load`; the origin of the body is in the still water plane, z = 0, when it is not displaced.
 
-    friction   with the seabed; 0 makes the lines conservative and takes 0.14 % from the horizontal and 0.04 % from the vertical
-               force at rest
+    friction   with the seabed; 0 makes the lines conservative, and their forces at rest a little smaller
     gravity    m/s^2; density: of the water, kg/m^3
     The other six lines are the first two turned by 90, 180 and 270 degrees about the vertical.
     """

@@ -91,6 +91,9 @@ class _Balancer:
         """When a value is ready."""
         if not isinstance(value, Node) or value.op == "leaf" or not value.mask & ~PARAMETER:
             return 0
+        known = self.ready.get(value)
+        if known is not None:
+            return known
         stack = [value]
         while stack:
             node = stack[-1]
@@ -110,7 +113,9 @@ def _inner_sums(tape: Tape) -> Mapping[Node, None]:
     uses: Counter = Counter()
     for node in tape.steps:
         if node.op != "neg":
-            uses.update(core for core in map(unsigned, node.args) if isinstance(core, Node))
+            for a in node.args:
+                if isinstance(a, Node):
+                    uses[a.args[0] if a.op == "neg" else a] += 1
     uses.update(core for o in tape.outputs.values() for core in map(unsigned, o.entries) if isinstance(core, Node))
     kept = {**tape.recorder.names, **tape.recorder.checks}
     inner: dict[Node, None] = {}

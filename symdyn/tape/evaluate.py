@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
@@ -44,7 +45,7 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
             done[node] = done[node.args[0]][node.args[1]]
         else:
             try:
-                done[node] = functions[node.op](*[number(a) for a in node.args])
+                done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else number(a) for a in node.args])
             except ZeroDivisionError:  # harmless in a branch that is not taken
                 done[node] = context.nan
     result = {}
@@ -87,12 +88,10 @@ def functions_of(context: Any) -> dict[str, Callable]:
         "pi": lambda: +context.pi,
         "select": lambda c, a, b: a if c else b,
         "guard": lambda value, margin: value if margin > 0 else context.nan,
-        "lt": lambda a, b: a < b, "le": lambda a, b: a <= b, "gt": lambda a, b: a > b, "ge": lambda a, b: a >= b,
-        "eq": lambda a, b: a == b, "ne": lambda a, b: a != b,
+        "lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq, "ne": operator.ne,
         "and": lambda a, b: a and b, "or": lambda a, b: a or b, "not": lambda a: not a,
         "min": min, "max": max,
-        "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
-        "neg": lambda a: -a,
+        "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg,
     }
     return {op: special[op] if op in special else getattr(context, row.mpmath) for op, row in OPERATIONS.items()
             if op in special or row.mpmath}

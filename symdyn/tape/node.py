@@ -30,28 +30,28 @@ class Node:
         self.section = section
 
     def __add__(self, other: Any) -> Any:
-        return self.recorder.add(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+        return self.recorder.add(self, other) if isinstance(other, _OPERANDS) else NotImplemented
 
     def __radd__(self, other: Any) -> Any:
-        return self.recorder.add(other, self) if isinstance(other, Number) else NotImplemented
+        return self.recorder.add(other, self) if isinstance(other, _NUMBERS) else NotImplemented
 
     def __sub__(self, other: Any) -> Any:
-        return self.recorder.sub(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+        return self.recorder.sub(self, other) if isinstance(other, _OPERANDS) else NotImplemented
 
     def __rsub__(self, other: Any) -> Any:
-        return self.recorder.sub(other, self) if isinstance(other, Number) else NotImplemented
+        return self.recorder.sub(other, self) if isinstance(other, _NUMBERS) else NotImplemented
 
     def __mul__(self, other: Any) -> Any:
-        return self.recorder.mul(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+        return self.recorder.mul(self, other) if isinstance(other, _OPERANDS) else NotImplemented
 
     def __rmul__(self, other: Any) -> Any:
-        return self.recorder.mul(other, self) if isinstance(other, Number) else NotImplemented
+        return self.recorder.mul(other, self) if isinstance(other, _NUMBERS) else NotImplemented
 
     def __truediv__(self, other: Any) -> Any:
-        return self.recorder.div(self, other) if isinstance(other, (Node, Number)) else NotImplemented
+        return self.recorder.div(self, other) if isinstance(other, _OPERANDS) else NotImplemented
 
     def __rtruediv__(self, other: Any) -> Any:
-        return self.recorder.div(other, self) if isinstance(other, Number) else NotImplemented
+        return self.recorder.div(other, self) if isinstance(other, _NUMBERS) else NotImplemented
 
     def __neg__(self) -> Any:
         return self.recorder.neg(self)
@@ -73,6 +73,11 @@ class Node:
     def label(self) -> str:
         """Its name, or its number on the recorder."""
         return str(self.args[1]) if self.op == "leaf" else self.recorder.names.get(self, f"#{self.index}")
+
+
+# Usual types first: only what is none of them is looked up among the abstract ones, which takes long.
+_NUMBERS = (int, float, Fraction, Number)
+_OPERANDS = (Node, *_NUMBERS)
 
 
 def exact(value: Any) -> int | Fraction:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -136,8 +137,10 @@ def reachable(entries: Iterable[Any]) -> tuple[Node, ...]:
         if node in seen:
             continue
         seen.add(node)
-        stack.extend(a for a in node.args if isinstance(a, Node) and a not in seen)
-    return tuple(sorted(seen, key=lambda n: n.index))
+        for a in node.args:
+            if isinstance(a, Node) and a not in seen:
+                stack.append(a)  # takes two thirds of the time of extend with a generator
+    return tuple(sorted(seen, key=attrgetter("index")))
 
 
 def count_of(nodes: Iterable[Node]) -> dict[str, int]:

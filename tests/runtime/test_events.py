@@ -148,16 +148,56 @@ def test_loop_and_reset_that_is_projected(method: str) -> None:
     assert np.abs(energy[before]).max() < 1e-6 * np.abs(run.energy).max()
 
 
-def test_event_that_is_not_finite() -> None:
+@pytest.fixture(scope="module")
+def strange() -> dict[str, Any]:
+    """The pendulum with the logarithm of its angle, which is no number once it has passed below."""
     s, q = swinging()
     s.add_event("strange", sp.log(q))
-    module = s.embedding().compile(backend="c")
-    for method in ("dop853", "RK45"):
-        with pytest.warns(SimulationWarning, match="events cannot be evaluated: the result is not finite"):
-            assert not module.simulate((0, 5), q=[1.0], u=[0.0], method=method).success
+    equations = s.embedding()
+    return {backend: equations.compile(backend=backend) for backend in ("c", "numpy")}
+
+
+UNKNOWN = [("c", "dop853"), ("c", "radau"), ("c", "RK45"), ("numpy", "DOP853")]
+
+
+@pytest.mark.parametrize(("backend", "method"), UNKNOWN)
+def test_an_event_that_is_not_finite_ends_the_run_where_it_was_known(backend: str, method: str, strange: Any) -> None:
+    """The state that is told is one of the motion, before the angle is 0."""
+    for steps in (True, False):
+        with pytest.warns(SimulationWarning, match=r"pendulum: stopped at t = 0\.5\d*: event strange cannot be evaluated: the "
+                                                   r"result is not finite; the state there: q1 = "):
+            run = strange[backend].simulate((0, 5), q=[1.0], u=[0.0], method=method, steps=steps, rtol=1e-9)
+        assert not run.success and (np.diff(run.t) > 0).all() and 0 < run.q[-1, 0] < 0.2
+        exact = strange["c"].simulate(np.array([0.0, run.t[-1]]), q=[1.0], u=[0.0], events=False, rtol=1e-12)
+        np.testing.assert_allclose(run.x[-1], exact.x[-1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("backend", "method"), UNKNOWN)
+def test_an_event_that_is_not_finite_but_not_looked_for_does_not_matter(backend: str, method: str, strange: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert module.simulate((0, 5), q=[1.0], u=[0.0], events=["below"]).success
+        run = strange[backend].simulate((0, 2), q=[1.0], u=[0.0], method=method, events=["below"])
+    free = strange[backend].simulate((0, 2), q=[1.0], u=[0.0], method=method, events=False)
+    assert run.success and len(run.events["below"].t) >= 2 and len(run.events["strange"].t) == 0
+    np.testing.assert_allclose(run.x[-1], free.x[-1], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("declared", ["ab", "ba"])
+def test_resets_of_two_events_at_once_are_made_in_the_order_of_declaration(declared: str) -> None:
+    """Both are computed from the state before, u = 1; what both set is as the last has it."""
+    y, n = sd.coordinates("y n")
+    s = sd.System("twice")
+    s.add_joint(sd.Prismatic("along", s.ground, s.add_body("block", mass=1), y, axis=[1, 0]))
+    s.add_state(n, 0)
+    resets = {"a": {y.dot: 2 * y.dot, n: y.dot}, "b": {y.dot: 3 * y.dot}}
+    for name in declared:
+        s.add_event(name, y - 1, direction=1, reset=resets[name])
+    s.initial = {y.dot: 1}
+    equations = s.embedding()
+    for backend, method in METHODS[:4]:
+        run = equations.compile(backend=backend).simulate((0, 2), method=method)
+        assert run.events["a"].t == pytest.approx([1.0]) and run.events["b"].t == pytest.approx([1.0])
+        assert run.x[-1] == pytest.approx([1 + (3 if declared == "ab" else 2), 3 if declared == "ab" else 2, 1])
 
 
 def test_event_at_the_very_end_of_a_step() -> None:

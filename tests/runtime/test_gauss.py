@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -12,7 +13,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.backend.methods.gauss import COEFFICIENTS
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, SimulationWarning
 from tests.helpers import GRAVITY, swing
 from tests.runtime.constrained import module as constrained
 
@@ -149,14 +150,19 @@ def test_constraints_are_refused() -> None:
         constrained("four_bar").simulate((0, 1), **GAUSS)
 
 
-def test_inputs_by_a_table_are_refused_by_a_function_taken() -> None:
-    """An oscillator of 1 kg and 1 N/m, F = sin(2 t): x = (2 sin t - sin 2t)/3."""
+def pushed() -> Any:
+    """An oscillator of 1 kg and 1 N/m that is pushed."""
     q = sd.coordinates("q")
     F = sd.inputs("F")
     system = sd.System("pushed")
     slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))
     system.add_joint_force(slider, F - q)
-    module = system.embedding().compile("c")
+    return system.embedding().compile("c")
+
+
+def test_inputs_by_a_table_are_refused_by_a_function_taken() -> None:
+    """F = sin(2 t): x = (2 sin t - sin 2t)/3."""
+    module = pushed()
     times = np.linspace(0, 5, 51)
     rows = np.sin(2 * times)
     for table in ({"F": (times, rows)}, (times, rows[:, None])):
@@ -176,3 +182,34 @@ def test_right_hand_sides_that_switch_are_refused() -> None:
     with pytest.raises(ArgumentError, match=r"rubbed: method 'gauss' does not fit: the right-hand side switches \(abs\), .*"
                                             r"use method='dop853'"):
         system.embedding().compile("c").simulate((0, 1), **GAUSS)
+
+
+def test_kinks_that_the_equations_do_not_tell_are_warned_of() -> None:
+    """By functions of the user: linear between points, a ramp that sets in, a stop, a jump; with steps chosen and given."""
+    module = pushed()
+    points = [0, 1, 1.7, 2.9, 5.05, 7.33, 20], [0, 1, 0.3, 0.5, -1, 0, 0.4]
+    forces = (lambda t, x: [np.interp(t, *points)], lambda t, x: [max(0, t - 3.21)], lambda t, x: [-10 * max(0, x[0] - 0.5)],
+              lambda t, x: [float(t > 3.21)])
+    for force in forces:
+        for given in ({"rtol": 1e-8}, {"first_step": 0.1}):
+            with pytest.warns(SimulationWarning, match=r"pushed: method 'gauss' went across kinks or jumps .*latest of them just "
+                                                       r"before t = [\d.]* s: .*[1-9]\d* differ .*; use method='dop853'"):
+                found = module.simulate(np.array([0.0, 20.0]), [0.6], inputs=force, **GAUSS, **given)
+            assert found.success and found.n_steps < 260
+
+
+@pytest.mark.parametrize("force", [lambda t: np.sin(3 * t), lambda t: np.tanh(20 * (t - 3)), lambda t: 1e-5 * np.sin(20 * t)])
+def test_smooth_inputs_are_not_warned_of(force: Any) -> None:
+    module = pushed()
+    for given in ({"rtol": 1e-8}, {"rtol": 1e-13}, {"first_step": 0.1}):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            module.simulate(np.array([0.0, 20.0]), [0.6], inputs=lambda t, x: [force(t)], **GAUSS, **given)
+
+
+def test_chaotic_motion_is_not_warned_of(double: Any) -> None:
+    """Rough steps are done again by halves, few of them, and those agree."""
+    for given in ({"rtol": 1e-6}, {"rtol": 1e-10}, {"first_step": 0.1}):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert double.simulate(np.array([0.0, 20.0]), **GAUSS, **given).success

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -38,9 +39,9 @@ def mass() -> Any:
     return system.embedding().compile(backend="c")
 
 
-def radau(module: Any, *args: Any, **options: Any) -> Any:
-    solution = module.simulate(*args, method="radau", **options)
-    assert solution.success and solution.method == "radau"
+def radau(module: Any, *args: Any, method: str = "radau", **options: Any) -> Any:
+    solution = module.simulate(*args, method=method, **options)
+    assert solution.success and solution.method == method
     return solution
 
 
@@ -65,6 +66,16 @@ def test_transients_are_followed_and_left(exponent: int, mass: Any) -> None:
     assert found.n_steps + found.n_rejected < 130
 
 
+def test_three_stages_pay_at_loose_tolerances_only(mass: Any) -> None:
+    """Nonlinear and stiff, at two tolerances: evaluations, and errors against a tight run."""
+    start = {"q": {"q": 1.0}, "params": {"k": 1e5, "c": 2e3, "b": -1e4}}
+    exact = radau(mass, (0, 1), **start, rtol=1e-13)
+    for rtol, bounds in ((1e-2, (0.0, 0.8)), (1e-8, (2.0, 4.0))):
+        five, three = (radau(mass, (0, 1), **start, rtol=rtol, method=method) for method in ("radau", "radau5"))
+        assert bounds[0] < three.nfev / five.nfev < bounds[1]
+        assert np.abs(three.x[-1] - exact.x[-1]).max() < rtol
+
+
 @pytest.mark.parametrize("damping", [0.0, 1e-3])
 def test_fast_vibration_of_small_amplitude_is_left_out(damping: float, mass: Any) -> None:
     """Within the tolerance: an explicit method would take w / 2 steps a second."""
@@ -73,16 +84,20 @@ def test_fast_vibration_of_small_amplitude_is_left_out(damping: float, mass: Any
     assert found.n_steps < 20 and np.abs(found["q"] - np.sin(found.t)).max() < 1e-6
 
 
-def test_order_9_and_6_between_steps(mass: Any) -> None:
+@pytest.mark.parametrize(("method", "at_ends", "between", "steps"), [("radau", 9, 6, (1.0, 0.5, 0.25)),
+                                                                         ("radau5", 5, 4, (0.25, 0.125, 0.0625))])
+def test_order_at_the_ends_of_steps_and_between(method: str, at_ends: int, between: int, steps: tuple[float, ...],
+                                                mass: Any) -> None:
     """Equal steps on a linear oscillator, which Newton's iteration solves at once."""
     ends, middle = [], []
-    for h in (1.0, 0.5, 0.25):
-        found = radau(mass, np.linspace(0, 4, 33), {"q": 0.2}, params={"k": 4}, rtol=0.9, atol=1e3, first_step=h, max_step=h)
+    for h in steps:
+        found = radau(mass, np.linspace(0, 4, 32 * round(1 / h) + 1), {"q": 0.2}, params={"k": 4}, rtol=0.1, atol=1e3,
+                      first_step=h, max_step=h, method=method)
         assert found.n_steps == 4 / h and found.nfev < 16 * found.n_steps + 16
         error = np.abs(found["q"] - np.sin(found.t) - 0.2 * np.cos(2 * found.t))
         ends.append(error[-1])
         middle.append(error.max())
-    for errors, order in ((ends, 9), (middle, 6)):
+    for errors, order in ((ends, at_ends), (middle, between)):
         assert order - 0.3 < np.log2(errors[0] / errors[-1]) / 2 < order + 1.2
 
 
@@ -129,6 +144,18 @@ def test_smooth_motion_at_all_tolerances(compiled: Callable[..., Any]) -> None:
     assert radau(double, (0, 1), q=[0, 0], u=[0, 0], rtol=1e-9, atol=0).n_steps > 0
 
 
+@pytest.mark.parametrize(("c", "end", "rtol", "stiff"), [
+    (1e3, 10, 1e-4, True), (1e3, 10, 1e-8, True), (1e2, 10, 1e-4, True), (10, 1, 1e-4, False), (10, 1, 1e-8, False),
+    (0, 1, 1e-8, False)])
+def test_auto_sees_through_a_vibration_that_dies_out(c: float, end: float, rtol: float, stiff: bool, mass: Any) -> None:
+    """1e4 rad/s from 1.2 m, which takes 0.02 to 0.2 s or more than there is: then q = sin t, and explicit steps stay short."""
+    found = mass.simulate(np.array([0.0, end]), {"q": 1.2}, params={"k": 1e8, "c": c}, rtol=rtol, method="auto")
+    assert found.success and (found.method == "radau") == stiff
+    if stiff:
+        assert "the motion is stiff (eigenvalues up to 1e+04 1/s ring for 0." in found.why
+        assert found.n_steps < 5000 and found["q"][-1] == pytest.approx(np.sin(end), abs=100 * rtol)
+
+
 # -- inputs, work, constraints
 
 
@@ -141,6 +168,24 @@ def test_inputs(mass: Any) -> None:
     np.testing.assert_allclose(found["q"][late], np.sin(found.t[late]) + 5e-4, rtol=0, atol=1e-8)
     held = radau(mass, (0, 3), {"q": 0.1}, params={"k": 3}, inputs=lambda t, x: [-6 * (x[0] - np.sin(t))], rtol=1e-9)
     np.testing.assert_allclose(held["q"], np.sin(held.t) + 0.1 * np.cos(3 * held.t), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("given", "most"), [({"k": 1}, 2), ({"k": 25, "c": 1}, 2), ({"k": 1e6, "c": 2e3}, 10)])
+def test_kinks_of_tables_are_seen_as_by_the_explicit_method(given: dict[str, float], most: float, mass: Any) -> None:
+    """F is linear between random rows: errors against steps that end at each of them. In stiff motion what is left of a kink for
+    some milliseconds is less exact."""
+    errors: dict[str, list[float]] = {"dop853": [], "radau": []}
+    for seed in range(2, 4):
+        rng = np.random.default_rng(seed)
+        rows = np.sort(np.append(rng.uniform(0, 10, 13), [0, 10])), rng.normal(size=(15, 1))
+        times = np.union1d(rows[0], rows[0][:-1] + 0.7 * np.diff(rows[0]))
+        x = [np.array([0.0, 1.0, 1.0])]
+        for pair in itertools.pairwise(times):
+            x.append(mass.simulate(np.array(pair), x[-1][:1], x[-1][1:2], given, z=[1], inputs=rows, rtol=1e-13).x[-1])
+        for method, rtol in itertools.product(errors, (1e-4, 1e-6, 1e-8)):
+            found = mass.simulate(times, params=given, inputs=rows, rtol=rtol, method=method)
+            errors[method].append(np.abs(found.x - x).max() / rtol)
+    assert max(errors["radau"]) < most * max(errors["dop853"])
 
 
 def test_work(mass: Any) -> None:

@@ -8,33 +8,24 @@
 // The default parameters of the reference, or arbitrary ones where there is no default.
 static const double p[] = { 9.81, 1.0, 0.4, 0.053333333333333344, 2.0, 1.0, 0.6666666666666666, 1.5, 0.8, 0.32000000000000006, 0.8, 2.0, 2.0, 1.6 };
 
-// Largest difference, relative to the largest entry of the reference.
-static double difference(const double *found, const double *wanted, int n) {
-    double largest = 0.0, error = 0.0;
-    for (int i = 0; i < n; i++) largest = fmax(largest, fabs(wanted[i]));
-    for (int i = 0; i < n; i++) {
-        const double e = fabs(found[i] - wanted[i]);
-        if (!(e <= error)) error = e;
-    }
-    return largest > 0.0 ? error / largest : error;
-}
-
+// Whether the largest difference, relative to the largest entry of the reference, is above the tolerance.
 static int check(const char *name, int code, const double *found, const double *wanted, int n, double tolerance) {
-    const double e = code ? INFINITY : difference(found, wanted, n);
-    const int good = e <= tolerance;
-    printf("%-18s %-5s difference %.1e, tolerance %.1e%s%s\n", name, good ? "ok" : "WRONG", e, tolerance, code ? ": " : "",
+    double largest = 0.0, error = code ? INFINITY : 0.0;
+    for (int i = 0; i < n; i++) largest = fmax(largest, fabs(wanted[i]));
+    for (int i = 0; i < n && !code; i++)
+        if (!(fabs(found[i] - wanted[i]) <= error)) error = fabs(found[i] - wanted[i]);
+    error /= largest > 0.0 ? largest : 1.0;
+    const int good = error <= tolerance;
+    printf("%-18s %-5s difference %.1e, tolerance %.1e%s%s\n", name, good ? "ok" : "WRONG", error, tolerance, code ? ": " : "",
            code ? four_bar_reason(code) : "");
-    return good ? 0 : 1;
+    return !good;
 }
 
 int main(void) {
     int wrong = 0;
     double c[9];
     int code = four_bar_prologue(p, c);
-    if (code) {
-        printf("prologue: %s\n", four_bar_reason(code));
-        return 1;
-    }
+    if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
     {
         const double q[] = { 0.44308, -0.542476, 0.890541 };
         const double u[] = { 0.802855, -0.93882, -0.949108 };

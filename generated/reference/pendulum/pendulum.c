@@ -37,15 +37,22 @@ double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(dou
 #else
 #define SYMDYN_EXPORT
 #endif
+#if !defined(__GNUC__)
+#define __attribute__(list)
+#endif
+
+static int pendulum_all_finite(const double *values, int n) {
+    for (int i = 0; i < n; i++)
+        if (!(fabs(values[i]) <= 1.7976931348623157e308)) return 0;
+    return 1;
+}
 
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
-//
 // The angle is reduced to h + l = x - n*pi/2 with |h| <= pi/4, where l is what rounding cuts off h. pi/2 has three parts,
 // the first two of 37 bits, so that their products with n are exact. Polynomials in z = h*h give sin(h + l) and cos(h + l);
 // the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler can take
 // several angles at once, and nothing but IEEE arithmetic in the order written: the same bits from every compiler that does
 // not contract products and sums.
-//
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
 // (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
@@ -65,8 +72,7 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     const unsigned long long exchange = (a.bits ^ b.bits) & (0u - (shifted.bits & 1u));
     a.bits ^= exchange ^ ((shifted.bits & 2u) << 62);
     b.bits ^= exchange ^ (((shifted.bits + 1u) & 2u) << 62);
-    *sine = a.value;
-    *cosine = b.value;
+    *sine = a.value, *cosine = b.value;
 }
 
 // Larger angles, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
@@ -81,12 +87,8 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
     for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= SYMDYN_SMALL_ANGLE;
-    if (small) return;
-    for (int i = 0; i < n; i++) {
-        if (fabs(angles[i]) <= SYMDYN_SMALL_ANGLE) continue;
-        sines[i] = sin(angles[i]);
-        cosines[i] = cos(angles[i]);
-    }
+    for (int i = 0; !small && i < n; i++)
+        if (!(fabs(angles[i]) <= SYMDYN_SMALL_ANGLE)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
 }
 
 // Constants: everything that depends on parameters only; 3 operations, once per set of parameters.
@@ -243,17 +245,10 @@ typedef struct {
 
 enum { pendulum_NOT_FINITE = -1 };
 
-static int pendulum_all_finite(const double *values, int n) {
-    for (int i = 0; i < n; i++)
-        if (!(fabs(values[i]) <= 1.7976931348623157e308)) return 0;
-    return 1;
-}
-
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
-        const double *x = frame->x + i * frame->x_stride * 2;
-        int code = pendulum_rhs(x, x + 1, frame->p, frame->c, frame->out + i * 2);
+        int code = pendulum_rhs(frame->x + i * frame->x_stride * 2, frame->x + i * frame->x_stride * 2 + 1, frame->p, frame->c, frame->out + i * 2);
         if (!code && !pendulum_all_finite(frame->out + i * 2, 2)) code = pendulum_NOT_FINITE;
         if (code) return frame->failed = i, code;
     }
@@ -283,8 +278,7 @@ SYMDYN_EXPORT int pendulum_k_tilde_rows(pendulum_frame *frame) {
 SYMDYN_EXPORT int pendulum_F_tilde_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_F_tilde_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
-        const double *x = frame->x + i * frame->x_stride * 2;
-        int code = pendulum_F_tilde(x, frame->p, frame->c, frame->out + i * 1);
+        int code = pendulum_F_tilde(frame->x + i * frame->x_stride * 2, frame->p, frame->c, frame->out + i * 1);
         if (!code && !pendulum_all_finite(frame->out + i * 1, 1)) code = pendulum_NOT_FINITE;
         if (code) return frame->failed = i, code;
     }
@@ -294,8 +288,7 @@ SYMDYN_EXPORT int pendulum_F_tilde_rows(pendulum_frame *frame) {
 SYMDYN_EXPORT int pendulum_J_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_J_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
-        const double *x = frame->x + i * frame->x_stride * 2;
-        int code = pendulum_J(x, frame->p, frame->out + i * 3);
+        int code = pendulum_J(frame->x + i * frame->x_stride * 2, frame->p, frame->out + i * 3);
         if (!code && !pendulum_all_finite(frame->out + i * 3, 3)) code = pendulum_NOT_FINITE;
         if (code) return frame->failed = i, code;
     }
@@ -305,8 +298,7 @@ SYMDYN_EXPORT int pendulum_J_rows(pendulum_frame *frame) {
 SYMDYN_EXPORT int pendulum_energy_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_energy_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
-        const double *x = frame->x + i * frame->x_stride * 2;
-        int code = pendulum_energy(x, x + 1, frame->p, frame->c, frame->out + i * 2);
+        int code = pendulum_energy(frame->x + i * frame->x_stride * 2, frame->x + i * frame->x_stride * 2 + 1, frame->p, frame->c, frame->out + i * 2);
         if (!code && !pendulum_all_finite(frame->out + i * 2, 2)) code = pendulum_NOT_FINITE;
         if (code) return frame->failed = i, code;
     }
@@ -316,8 +308,7 @@ SYMDYN_EXPORT int pendulum_energy_rows(pendulum_frame *frame) {
 SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
-        const double *x = frame->x + i * frame->x_stride * 2;
-        int code = pendulum_inverse_dynamics(x, frame->ud + i * frame->ud_stride * 1, frame->p, frame->c, frame->out + i * 1);
+        int code = pendulum_inverse_dynamics(frame->x + i * frame->x_stride * 2, frame->ud + i * frame->ud_stride * 1, frame->p, frame->c, frame->out + i * 1);
         if (!code && !pendulum_all_finite(frame->out + i * 1, 1)) code = pendulum_NOT_FINITE;
         if (code) return frame->failed = i, code;
     }
@@ -326,17 +317,16 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
 
 // Integration of x_dot = pendulum_rhs without leaving this file.
 
-typedef struct pendulum_problem pendulum_problem;
-
 // What the right-hand side needs besides t and x. Inputs come from the first of these that is there: a function
 // (returns 0, or not to stop the run), a table over time (rows of inputs, linear between rows, its ends held), constants.
-struct pendulum_problem {
-    const double *p, *c;
-    const double *inputs;
+typedef struct {
+    const double *p, *c, *inputs;
     long n_table;
     const double *table_t, *table;
     int (*function)(double t, const double *x, double *inputs);
-};
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} pendulum_problem;
 
 enum { pendulum_INPUT_STOPPED = 100000 };
 
@@ -364,7 +354,8 @@ enum {
     pendulum_dop853_PROJECTION_FAILED = -6  // even at the smallest step, no way back onto the constraints
 };
 
-typedef struct pendulum_dop853 {
+typedef struct {
+    pendulum_problem problem;
     double t, t_low;             // present time, and what rounding has cut off it: the time is t + t_low
     double t_end, direction;     // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
     double t_slack, h_floor;     // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
@@ -382,6 +373,13 @@ typedef struct pendulum_dop853 {
     int reason;
     long bad_index;
     double t_fail, x_fail[2];
+    // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
+    // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
+    double dq, du, residual, largest_dq, largest_du;
+    int worst, of_speeds;
+    long n_corrected, n_corrections, n_jacobians, n_factorizations;
+    // Steps tried across a position of lost rank; the latest step went across one; the best of those tried.
+    int n_crossing, crossed;
     double k[16][2];  // stages of the latest step; k[12] at its end
     double dense[7][2];  // polynomial of the latest step, if dense_ready
 } pendulum_dop853;
@@ -397,10 +395,10 @@ static int pendulum_dop853_fail(pendulum_dop853 *run, int status, int reason, lo
 
 // Evaluate the right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that it can be inlined
 // whatever its size.
-static int pendulum_dop853_eval(pendulum_dop853 *run, const pendulum_problem *problem, double t, const double *y, double *xd) {
+static int pendulum_dop853_eval(pendulum_dop853 *run, double t, const double *y, double *xd) {
     int bad = 0, first = 0;
     run->n_evaluations++;
-    const int reason = pendulum_field(problem, t, y, xd);
+    const int reason = pendulum_field(&run->problem, t, y, xd);
     for (int i = 0; i < 2; i++) bad |= !(fabs(y[i]) <= pendulum_dop853_huge) | !(fabs(xd[i]) <= pendulum_dop853_huge);  // comparisons with NaN are false
     if (!reason && !bad) return 0;
     while (!reason && fabs(y[first]) <= pendulum_dop853_huge && fabs(xd[first]) <= pendulum_dop853_huge) first++;
@@ -418,97 +416,75 @@ static inline double pendulum_dop853_root(double v) {
     return sqrt(sqrt(sqrt(v)));
 }
 
-static int pendulum_dop853_begin(pendulum_dop853 *run, const pendulum_problem *problem) {
-    (void)run, (void)problem;
-    return 0;
-}
-
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
-static int pendulum_dop853_try(pendulum_dop853 *run, const pendulum_problem *problem, double h, double t_new,
-    double *restrict x_new, double *restrict xd_new, double *restrict err) {
-    const double t = run->t;
-    const double *restrict const x = run->x;
-    double (*restrict const k)[2] = run->k;
-    double y[2], sum = 0.0, sum2 = 0.0;
+static int pendulum_dop853_try(pendulum_dop853 *run, double h, double t_new, double *restrict x_new, double *restrict xd_new,
+    double *restrict err) {
+    const double t = run->t, *restrict const x = run->x;
+    double (*restrict const k)[2] = run->k, y[2], sum = 0.0, sum2 = 0.0;
     int failure;
     for (int i = 0; i < 2; i++) k[0][i] = run->xd[i];
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.05260015195876773*k[0][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.05260015195876773*h, y, k[1]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.05260015195876773*h, y, k[1]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.0197250569845379*k[0][i] + 0.0591751709536137*k[1][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.0789002279381516*h, y, k[2]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.0789002279381516*h, y, k[2]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.02958758547680685*k[0][i] + 0.08876275643042054*k[2][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.1183503419072274*h, y, k[3]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.1183503419072274*h, y, k[3]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.2413651341592667*k[0][i] - 0.8845494793282861*k[2][i] + 0.924834003261792*k[3][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.2816496580927726*h, y, k[4]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.2816496580927726*h, y, k[4]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.037037037037037035*k[0][i] + 0.17082860872947386*k[3][i] + 0.12546768756682242*k[4][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.3333333333333333*h, y, k[5]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.3333333333333333*h, y, k[5]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.037109375*k[0][i] + 0.17025221101954405*k[3][i] + 0.06021653898045596*k[4][i]
             - 0.017578125*k[5][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.25*h, y, k[6]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.25*h, y, k[6]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.03709200011850479*k[0][i] + 0.17038392571223998*k[3][i] + 0.10726203044637328*k[4][i]
             - 0.015319437748624402*k[5][i] + 0.008273789163814023*k[6][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.3076923076923077*h, y, k[7]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.3076923076923077*h, y, k[7]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.6241109587160757*k[0][i] - 3.3608926294469414*k[3][i] - 0.868219346841726*k[4][i]
             + 27.59209969944671*k[5][i] + 20.154067550477894*k[6][i] - 43.48988418106996*k[7][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.6512820512820513*h, y, k[8]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.6512820512820513*h, y, k[8]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.47766253643826434*k[0][i] - 2.4881146199716677*k[3][i] - 0.590290826836843*k[4][i]
             + 21.230051448181193*k[5][i] + 15.279233632882423*k[6][i] - 33.28821096898486*k[7][i]
             - 0.020331201708508627*k[8][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.6*h, y, k[9]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.6*h, y, k[9]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(-0.9371424300859873*k[0][i] + 5.186372428844064*k[3][i] + 1.0914373489967295*k[4][i]
             - 8.149787010746927*k[5][i] - 18.52006565999696*k[6][i] + 22.739487099350505*k[7][i]
             + 2.4936055526796523*k[8][i] - 3.0467644718982196*k[9][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.8571428571428571*h, y, k[10]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.8571428571428571*h, y, k[10]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(2.273310147516538*k[0][i] - 10.53449546673725*k[3][i] - 2.0008720582248625*k[4][i]
             - 17.9589318631188*k[5][i] + 27.94888452941996*k[6][i] - 2.8589982771350235*k[7][i]
             - 8.87285693353063*k[8][i] + 12.360567175794303*k[9][i] + 0.6433927460157636*k[10][i]);
-    failure = pendulum_dop853_eval(run, problem, t_new, y, k[11]);
-    if (failure) return failure;
-    (void)xd_new;
+    if ((failure = pendulum_dop853_eval(run, t_new, y, k[11]))) return failure;
     for (int i = 0; i < 2; i++) {
-        const double slope = 0.054293734116568765*k[0][i] + 4.450312892752409*k[5][i] + 1.8915178993145003*k[6][i]
-            - 5.801203960010585*k[7][i] + 0.3111643669578199*k[8][i] - 0.1521609496625161*k[9][i]
-            + 0.20136540080403034*k[10][i] + 0.04471061572777259*k[11][i];
         const double e = 0.01312004499419488*k[0][i] - 1.2251564463762044*k[5][i] - 0.4957589496572502*k[6][i]
             + 1.6643771824549864*k[7][i] - 0.35032884874997366*k[8][i] + 0.3341791187130175*k[9][i]
             + 0.08192320648511571*k[10][i] - 0.022355307863886294*k[11][i];
+        const double slope = 0.054293734116568765*k[0][i] + 4.450312892752409*k[5][i] + 1.8915178993145003*k[6][i]
+            - 5.801203960010585*k[7][i] + 0.3111643669578199*k[8][i] - 0.1521609496625161*k[9][i]
+            + 0.20136540080403034*k[10][i] + 0.04471061572777259*k[11][i];
         const double e2 = slope -0.2440944881889764*k[0][i] - 0.7338466882816118*k[8][i] - 0.022058823529411766*k[11][i];
-
         x_new[i] = x[i] + h*slope;
         const double scale = pendulum_dop853_scale(run, i, x_new[i]);
-        sum += (e*scale)*(e*scale);
-        sum2 += (e2*scale)*(e2*scale);
+        sum += (e*scale)*(e*scale), sum2 += (e2*scale)*(e2*scale);
     }
-    sum2 = sum + 0.01*sum2;
+    (void)xd_new, sum2 = sum + 0.01*sum2;
     *err = sum2 > 0.0 ? fabs(h)*sum/sqrt(sum2*2.0) : 0.0;
     return 0;
 }
 
 // The state at s within the latest step.
-static int pendulum_dop853_between(pendulum_dop853 *run, const pendulum_problem *problem, double s, double *x_out) {
-    const double t = run->t_old, h = run->h_old, theta = (s - t)/h, rest = 1.0 - theta;
-    const double *restrict const x = run->x_old;
+static int pendulum_dop853_between(pendulum_dop853 *run, double s, double *x_out) {
+    const double t = run->t_old, h = run->h_old, theta = (s - t)/h, rest = 1.0 - theta, *restrict const x = run->x_old;
     double (*restrict const k)[2] = run->k, (*restrict const d)[2] = run->dense;
     if (!run->dense_ready) {
         double y[2];
@@ -518,25 +494,20 @@ static int pendulum_dop853_between(pendulum_dop853 *run, const pendulum_problem 
         y[i] = x[i] + h*(0.056167502283047954*k[0][i] + 0.25350021021662483*k[6][i] - 0.2462390374708025*k[7][i]
             - 0.12419142326381637*k[8][i] + 0.15329179827876568*k[9][i] + 0.00820105229563469*k[10][i]
             + 0.007567897660545699*k[11][i] - 0.008298*k[12][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.1*h, y, k[13]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.1*h, y, k[13]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(0.03183464816350214*k[0][i] + 0.028300909672366776*k[5][i] + 0.053541988307438566*k[6][i]
             - 0.05492374857139099*k[7][i] - 0.00010834732869724932*k[10][i] + 0.0003825710908356584*k[11][i]
             - 0.00034046500868740456*k[12][i] + 0.1413124436746325*k[13][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.2*h, y, k[14]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.2*h, y, k[14]))) return failure;
     for (int i = 0; i < 2; i++)
         y[i] = x[i] + h*(-0.42889630158379194*k[0][i] - 4.697621415361164*k[5][i] + 7.683421196062599*k[6][i]
             + 4.06898981839711*k[7][i] + 0.3567271874552811*k[8][i] - 0.0013990241651590145*k[12][i]
             + 2.9475147891527724*k[13][i] - 9.15095847217987*k[14][i]);
-    failure = pendulum_dop853_eval(run, problem, t + 0.7777777777777778*h, y, k[15]);
-    if (failure) return failure;
+    if ((failure = pendulum_dop853_eval(run, t + 0.7777777777777778*h, y, k[15]))) return failure;
         for (int i = 0; i < 2; i++) {
             const double dx = run->x[i] - x[i];
-            d[0][i] = dx;
-            d[1][i] = h*k[0][i] - dx;
-            d[2][i] = 2.0*dx - h*(k[0][i] + k[12][i]);
+            d[0][i] = dx, d[1][i] = h*k[0][i] - dx, d[2][i] = 2.0*dx - h*(k[0][i] + k[12][i]);
             d[3][i] = h*(-8.428938276109013*k[0][i] + 0.5667149535193777*k[5][i] - 3.0689499459498917*k[6][i]
             + 2.38466765651207*k[7][i] + 2.117034582445028*k[8][i] - 0.871391583777973*k[9][i]
             + 2.2404374302607883*k[10][i] + 0.6315787787694688*k[11][i] - 0.08899033645133331*k[12][i]
@@ -556,25 +527,24 @@ static int pendulum_dop853_between(pendulum_dop853 *run, const pendulum_problem 
         }
         run->dense_ready = 1;
     }
-    (void)problem;
     for (int i = 0; i < 2; i++)
         x_out[i] = x[i] + theta*(d[0][i] + rest*(d[1][i] + theta*(d[2][i] + rest*(d[3][i] + theta*(d[4][i] + rest*(d[5][i] + theta*d[6][i]))))));
     return 0;
 }
 
 // The state at s within the latest step, on the constraints. Returns 0 or a failure.
-static int pendulum_dop853_state_at(pendulum_dop853 *run, const pendulum_problem *problem, double s, double *x) {
+static int pendulum_dop853_state_at(pendulum_dop853 *run, double s, double *x) {
     int failure;
     if (!run->dense_ready && run->rejected) return pendulum_dop853_BAD_OUTPUT_TIME;  // stages are those of an attempt from t
-    if ((failure = pendulum_dop853_between(run, problem, s, x))) return failure;
+    if ((failure = pendulum_dop853_between(run, s, x))) return failure;
     return 0;
 }
 
 // Length of the first step (Hairer, Norsett, Wanner, section II.4), from the size of the state, its derivative and the change of
 // the derivative over a small Euler step.
-static double pendulum_dop853_first_step(pendulum_dop853 *run, const pendulum_problem *problem) {
+static double pendulum_dop853_first_step(pendulum_dop853 *run) {
     const double span = fabs(run->t_end - run->t);
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, h0, h1, y[2], yd[2], scale[2];
+    double d0 = 0.0, d1 = 0.0, d2 = 0.0, y[2], yd[2], scale[2];
     for (int i = 0; i < 2; i++) {
         const double tolerated = run->atol[i] + run->rtol*fabs(run->x[i]);
         scale[i] = tolerated > 0.0 ? 1.0/tolerated : 0.0;  // x = 0 without atol: no say
@@ -582,51 +552,46 @@ static double pendulum_dop853_first_step(pendulum_dop853 *run, const pendulum_pr
         d1 += run->xd[i]*scale[i]*run->xd[i]*scale[i]/2.0;
     }
     d0 = sqrt(d0), d1 = sqrt(d1);
-    h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01*d0/d1;
-    h0 = h0 <= span ? h0 : span;
+    const double guess = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01*d0/d1, h0 = guess <= span ? guess : span;
     for (int i = 0; i < 2; i++) y[i] = run->x[i] + run->direction*h0*run->xd[i];
-    if (pendulum_dop853_eval(run, problem, run->t + run->direction*h0, y, yd)) return h0;  // the step control will find a way round
+    if (pendulum_dop853_eval(run, run->t + run->direction*h0, y, yd)) return h0;  // the step control will find a way round
     for (int i = 0; i < 2; i++) d2 += (yd[i] - run->xd[i])*scale[i]*(yd[i] - run->xd[i])*scale[i]/2.0;
     d2 = sqrt(d2)/h0;
-    if (d1 <= 1e-15 && d2 <= 1e-15) h1 = h0*1e-3 > 1e-6 ? h0*1e-3 : 1e-6;
-    else h1 = pendulum_dop853_root(0.01/(d1 > d2 ? d1 : d2));
+    const double h1 = d1 <= 1e-15 && d2 <= 1e-15 ? (h0*1e-3 > 1e-6 ? h0*1e-3 : 1e-6) : pendulum_dop853_root(0.01/(d1 > d2 ? d1 : d2));
     return h1 < 100.0*h0 ? h1 : 100.0*h0;
 }
 
 // Go on from (t, x), projected, as at a start. h_first: length of the first step, 0: chosen. Returns 0 or a failure.
-static int pendulum_dop853_restart(pendulum_dop853 *run, const pendulum_problem *problem, double t, const double *x, double h_first) {
-    run->t = run->t_old = t;
-    run->t_low = 0.0, run->root_old = 0.316;
+static int pendulum_dop853_restart(pendulum_dop853 *run, double t, const double *x, double h_first) {
+    run->t = run->t_old = t, run->t_low = 0.0, run->root_old = 0.316;
     run->unstored = 1, run->dense_ready = run->rejected = 0;
-    for (int i = 0; i < 2; i++) run->x[i] = run->x_old[i] = x[i];
+    for (int i = 0; i < 2; i++) run->x[i] = x[i];
+    for (int i = 0; i < 2; i++) run->x_old[i] = run->x[i];
     if (t == run->t_end) return run->status = pendulum_dop853_DONE;
-    if ((run->status = pendulum_dop853_eval(run, problem, t, run->x, run->xd))) return run->status;
-    run->h = h_first > 0.0 ? h_first : pendulum_dop853_first_step(run, problem);
-    if ((run->status = pendulum_dop853_begin(run, problem))) return run->status;
+    if ((run->status = pendulum_dop853_eval(run, t, run->x, run->xd))) return run->status;
+    run->h = h_first > 0.0 ? h_first : pendulum_dop853_first_step(run);
     run->status = pendulum_dop853_STEP_LIMIT;
     return 0;
 }
 
-// See simulation_start.
-static int pendulum_dop853_start(pendulum_dop853 *run, const pendulum_problem *problem, const double *told, const double *x0, const double *atol) {
+// Prepare a run, backward where t_end < t0. told: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
+// atol: 2. Returns 0 or a failure.
+SYMDYN_EXPORT int pendulum_simulation_start(pendulum_dop853 *run, const pendulum_problem *problem, const double *told, const double *x0, const double *atol);
+SYMDYN_EXPORT int pendulum_simulation_start(pendulum_dop853 *run, const pendulum_problem *problem, const double *told, const double *x0, const double *atol) {
     const double t0 = told[0], t_end = told[1], rtol = told[2], h_first = told[3], h_max = told[4];
     const double span = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const pendulum_dop853 empty;
     int bad = !(span <= pendulum_dop853_huge) | !(rtol >= 0.0) | !(h_first >= 0.0) | !(h_max >= 0.0);
-    *run = empty;
-    run->t = run->t_old = t0;
-    run->t_end = t_end;
-    run->direction = t_end > t0 ? 1.0 : t_end < t0 ? -1.0 : 0.0;
-    run->t_slack = 8.0*pendulum_dop853_eps*far;
-    run->h_floor = pendulum_dop853_eps*pendulum_dop853_eps*span;
+    *run = empty, run->problem = *problem;
+    run->t = run->t_old = t0, run->t_end = t_end, run->direction = t_end > t0 ? 1.0 : t_end < t0 ? -1.0 : 0.0;
+    run->t_slack = 8.0*pendulum_dop853_eps*far, run->h_floor = pendulum_dop853_eps*pendulum_dop853_eps*span;
     run->h_max = h_max > 0.0 ? h_max : span;
     run->rtol = rtol, run->unstored = 1, run->bad_index = -1;
     for (int i = 0; i < 2; i++) {
-        run->atol[i] = atol[i];
-        run->x[i] = run->x_old[i] = x0[i];
+        run->atol[i] = atol[i], run->x[i] = run->x_old[i] = x0[i];
         bad |= !(fabs(x0[i]) <= pendulum_dop853_huge) | !(atol[i] >= 0.0) | !(atol[i] + rtol > 0.0);
     }
-    return bad ? (run->status = pendulum_dop853_BAD_ARGUMENT) : pendulum_dop853_restart(run, problem, t0, x0, h_first);
+    return bad ? (run->status = pendulum_dop853_BAD_ARGUMENT) : pendulum_dop853_restart(run, t0, x0, h_first);
 }
 
 // A step that is tried: its length with sign, the shortest one, its end, roots of its error and of the one before.
@@ -638,9 +603,8 @@ typedef struct {
 // The step to be tried next.
 static void pendulum_dop853_propose(const pendulum_dop853 *run, pendulum_dop853_step *step) {
     const double rest = fabs((run->t_end - run->t) - run->t_low);
-    double h_min = 16.0*pendulum_dop853_eps*fabs(run->t), h = run->h;
-    h_min = h_min > run->h_floor ? h_min : run->h_floor;
-    h = h < run->h_max ? h : run->h_max;
+    const double least = 16.0*pendulum_dop853_eps*fabs(run->t), h_min = least > run->h_floor ? least : run->h_floor;
+    double h = run->h < run->h_max ? run->h : run->h_max;
     h = h > h_min ? h : h_min;
     step->t_low = 0.0, step->crossing = 0;
     if (1.01*h >= rest) {
@@ -651,8 +615,7 @@ static void pendulum_dop853_propose(const pendulum_dop853 *run, pendulum_dop853_
         h *= run->direction;
         const double way = h + run->t_low, t_new = run->t + way;  // two-sum: the rounding error of t does not build up
         const double back = t_new - run->t;
-        step->t_low = (run->t - (t_new - back)) + (way - back);
-        step->t_new = t_new;
+        step->t_low = (run->t - (t_new - back)) + (way - back), step->t_new = t_new;
     }
     step->h = h, step->h_min = h_min;
 }
@@ -662,8 +625,7 @@ static void pendulum_dop853_judge(pendulum_dop853 *run, const pendulum_dop853_st
     const double h = fabs(step->h);
     double grow;
     if (failure || !(err <= 1.0)) {
-        run->n_rejected++;
-        run->rejected = 1;
+        run->n_rejected++, run->rejected = 1;
         if (h <= step->h_min) run->status = failure ? failure : pendulum_dop853_STEP_TOO_SMALL;
         grow = failure || !(err <= pendulum_dop853_huge) ? 0.25 : 0.85/step->root;
         run->h = h*(grow > 0.2 ? grow : 0.2);
@@ -682,25 +644,34 @@ static void pendulum_dop853_judge(pendulum_dop853 *run, const pendulum_dop853_st
         run->x_old[i] = run->x[i];
         run->x[i] = x_new[i], run->xd[i] = xd_new[i];
     }
-    run->n_steps++;
-    run->rejected = run->dense_ready = 0, run->unstored = 1;
+    run->n_steps++, run->unstored = 1, run->rejected = run->dense_ready = 0;
+    run->crossed = step->crossing, run->n_crossing = 0;
     if (run->t == run->t_end) run->status = pendulum_dop853_DONE;
 }
 
-// Try one step. Sets run->status if t_end is reached or if there is no shorter step.
-static void pendulum_dop853_attempt(pendulum_dop853 *run, const pendulum_problem *problem) {
+// Try one step. Sets run->status if t_end is reached or if there is no shorter step. (On its own it keeps more in registers.)
+__attribute__((noinline)) static void pendulum_dop853_attempt(pendulum_dop853 *run) {
     double x_new[2], xd_new[2], err = 0.0;
     pendulum_dop853_step step;
     pendulum_dop853_propose(run, &step);
-    int failure = pendulum_dop853_try(run, problem, step.h, step.t_new, x_new, xd_new, &err);
-    if (failure == 0 && err <= 1.0) failure = pendulum_dop853_eval(run, problem, step.t_new, x_new, xd_new);
-    step.root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8);
-    step.pull = sqrt(sqrt(run->root_old));
+    int failure = pendulum_dop853_try(run, step.h, step.t_new, x_new, xd_new, &err);
+    if (!failure && err <= 1.0) failure = pendulum_dop853_eval(run, step.t_new, x_new, xd_new);
+    step.root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8), step.pull = sqrt(sqrt(run->root_old));
     pendulum_dop853_judge(run, &step, failure, err, x_new, xd_new);
 }
 
+// Write the end of the latest step unless that is done; returns 0 or STORE_FULL.
+static int pendulum_dop853_store(pendulum_dop853 *run, double *t, long n, double *x, long *n_written) {
+    if (!run->unstored) return 0;
+    if (*n_written >= n) return pendulum_dop853_STORE_FULL;
+    t[*n_written] = run->t;
+    for (int i = 0; i < 2; i++) x[*n_written*2 + i] = run->x[i];
+    ++*n_written, run->unstored = 0;
+    return 0;
+}
+
 // Write the requested times that are passed by now; returns 0 or a failure.
-static int pendulum_dop853_serve(pendulum_dop853 *run, const pendulum_problem *problem, const double *t_out, long n_out, double *x_out, long *n_written) {
+static int pendulum_dop853_serve(pendulum_dop853 *run, const double *t_out, long n_out, double *x_out, long *n_written) {
     for (; *n_written < n_out; ++*n_written) {
         const double s = t_out[*n_written];
         const double ahead = (s - run->t)*run->direction, behind = (run->t_old - s)*run->direction;
@@ -712,67 +683,48 @@ static int pendulum_dop853_serve(pendulum_dop853 *run, const pendulum_problem *p
             for (int i = 0; i < 2; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
             continue;
         }
-        const int failure = pendulum_dop853_state_at(run, problem, s, x);
+        const int failure = pendulum_dop853_state_at(run, s, x);
         if (failure) return failure == pendulum_dop853_BAD_OUTPUT_TIME ? failure : (run->status = failure);
     }
     return 0;
 }
 
-// A run as one block of memory, so that a caller in another language needs only its size.
-typedef struct {
-    pendulum_problem problem;
-    pendulum_dop853 run;
-} pendulum_simulation;
-
+// A run is one block of memory, so that a caller in another language needs only its size.
 SYMDYN_EXPORT long pendulum_simulation_size(void);
-SYMDYN_EXPORT long pendulum_simulation_size(void) { return (long)sizeof(pendulum_simulation); }
+SYMDYN_EXPORT long pendulum_simulation_size(void) { return (long)sizeof(pendulum_dop853); }
 
-// Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); atol:
-// 2. Returns 0 or a failure.
-SYMDYN_EXPORT int pendulum_simulation_start(pendulum_simulation *s, const pendulum_problem *problem, const double *span, const double *x0, const double *atol);
-SYMDYN_EXPORT int pendulum_simulation_start(pendulum_simulation *s, const pendulum_problem *problem, const double *span, const double *x0, const double *atol) {
-    s->problem = *problem;
-    return pendulum_dop853_start(&s->run, &s->problem, span, x0, atol);
-}
-
-// Continue by at most max_steps attempted steps and write the states at the requested times t[*written .. n), sorted in the direction
-// of integration, as they are passed, to the rows of x[n][2]; times beyond t_end are never served. Returns a status.
-SYMDYN_EXPORT int pendulum_simulation_at(pendulum_simulation *s, long max_steps, const double *t, long n, double *x, long *written);
-SYMDYN_EXPORT int pendulum_simulation_at(pendulum_simulation *s, long max_steps, const double *t, long n, double *x, long *written) {
+// Continue by at most max_steps attempted steps and write the states at the requested times t[*written .. n), sorted in the
+// direction of integration, as they are passed, to the rows of x[n][2]; times beyond t_end are never served. With `every`,
+// append to t and x the start and the end of every accepted step instead; one for which STORE_FULL left no room is stored first
+// by the next call. Returns a status.
+SYMDYN_EXPORT int pendulum_simulation_go(pendulum_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written);
+SYMDYN_EXPORT int pendulum_simulation_go(pendulum_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written) {
     for (;; max_steps--) {
-        const int failure = pendulum_dop853_serve(&s->run, &s->problem, t, n, x, written);
+        const int failure = every ? pendulum_dop853_store(run, t, n, x, written) : pendulum_dop853_serve(run, t, n, x, written);
         if (failure) return failure;
-        if (s->run.status != pendulum_dop853_STEP_LIMIT || max_steps <= 0) return s->run.status;
-        pendulum_dop853_attempt(&s->run, &s->problem);
+        if (run->status != pendulum_dop853_STEP_LIMIT || max_steps <= 0) return run->status;
+        pendulum_dop853_attempt(run);
     }
 }
 
-// The same, but append the start and the end of every accepted step to t[n] and x[n][2]. A step for which STORE_FULL left no room is
-// stored first by the next call.
-SYMDYN_EXPORT int pendulum_simulation_steps(pendulum_simulation *s, long max_steps, double *t, double *x, long n, long *written);
-SYMDYN_EXPORT int pendulum_simulation_steps(pendulum_simulation *s, long max_steps, double *t, double *x, long n, long *written) {
-    for (;; max_steps--) {
-        if (s->run.unstored) {
-            if (*written >= n) return pendulum_dop853_STORE_FULL;
-            t[*written] = s->run.t;
-            for (int i = 0; i < 2; i++) x[*written*2 + i] = s->run.x[i];
-            ++*written;
-            s->run.unstored = 0;
-        }
-        if (s->run.status != pendulum_dop853_STEP_LIMIT || max_steps <= 0) return s->run.status;
-        pendulum_dop853_attempt(&s->run, &s->problem);
-    }
-}
-
-// out: t, next step, accepted steps, rejected steps, evaluations, reason, bad index, time of failure, x, state at failure.
-SYMDYN_EXPORT void pendulum_simulation_report(const pendulum_simulation *s, double *out);
-SYMDYN_EXPORT void pendulum_simulation_report(const pendulum_simulation *s, double *out) {
-    const pendulum_dop853 *run = &s->run;
-    const double told[] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations, run->reason,
-        (double)run->bad_index, run->t_fail};
-    for (int i = 0; i < 8; i++) out[i] = told[i];
-    for (int i = 0; i < 2; i++) {
-        out[8 + i] = run->x[i];
-        out[10 + i] = run->x_fail[i];
-    }
+// See the members of the run.
+SYMDYN_EXPORT void pendulum_simulation_report(const pendulum_dop853 *run, double *out);
+SYMDYN_EXPORT void pendulum_simulation_report(const pendulum_dop853 *run, double *out) {
+    out[0] = (double)run->t;
+    out[1] = (double)run->h;
+    out[2] = (double)run->n_steps;
+    out[3] = (double)run->n_rejected;
+    out[4] = (double)run->n_evaluations;
+    out[5] = (double)run->reason;
+    out[6] = (double)run->bad_index;
+    out[7] = (double)run->t_fail;
+    out[12] = (double)run->largest_dq;
+    out[13] = (double)run->largest_du;
+    out[14] = (double)run->n_corrected;
+    out[15] = (double)run->n_corrections;
+    out[16] = (double)run->residual;
+    out[17] = (double)run->of_speeds;
+    out[18] = (double)run->n_jacobians;
+    out[19] = (double)run->n_factorizations;
+    for (int i = 0; i < 2; i++) out[8 + i] = run->x[i], out[10 + i] = run->x_fail[i];
 }

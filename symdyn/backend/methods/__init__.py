@@ -3,12 +3,12 @@
 from symdyn.backend.methods.bs54 import BS54
 from symdyn.backend.methods.dop853 import DOP853
 from symdyn.backend.methods.gauss import GAUSS
-from symdyn.backend.methods.radau import RADAU
+from symdyn.backend.methods.radau import RADAU, RADAU5
 from symdyn.backend.methods.record import Method, Tableau
 from symdyn.backend.methods.taylor import TAYLOR
 from symdyn.errors import SymdynError
 
-METHODS = {method.name: method for method in (DOP853, BS54, RADAU, GAUSS, TAYLOR)}
+METHODS = {method.name: method for method in (DOP853, BS54, RADAU, RADAU5, GAUSS, TAYLOR)}
 
 __all__ = ["METHODS", "Method", "Tableau", "method_of"]
 

@@ -41,6 +41,13 @@ class Gauss:
         s = range(len(self.nodes))
         return tuple(tuple(0.5 if i == j else self.below[i][j] if j < i else 1.0 - self.below[j][i] for j in s) for i in s)
 
+    @property
+    def lower(self) -> tuple[Vector, Vector, Vector]:
+        """Values of the orthonormal Legendre polynomials of degrees 3, 4 and 5 at the nodes."""
+        x = [2*c - 1 for c in self.nodes]
+        return (tuple(7**0.5 * (5*v**2 - 3) * v / 2 for v in x), tuple(3 * (35*v**4 - 30*v**2 + 3) / 8 for v in x),
+                tuple(11**0.5 * (63*v**4 - 70*v**2 + 15) * v / 8 for v in x))
+
 
 COEFFICIENTS = Gauss(
     nodes=(0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825,

@@ -1,4 +1,4 @@
-"""Radau IIA of 5 stages: order 9, stiffly accurate, L-stable."""
+"""Radau IIA of 5 and of 3 stages: orders 9 and 5, stiffly accurate, L-stable."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Collocation:
     tail: Vector
 
 
-COLLOCATION = Collocation(
+FIVE_STAGES = Collocation(
     nodes=(0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
     inverse=((8.755923977938362, 2.8919426153801173, -0.8751863962002651, 0.3997052079399655, -0.13370616384921583),
              (-7.161380720145387, 1.8060777240836443, 2.3637971760686085, -0.8659007802831346, 0.2743380777751942),
@@ -55,10 +55,28 @@ COLLOCATION = Collocation(
     tail=(0.0, 6.2867047517292765, -78.58380939661596, 314.33523758646385, -550.0866657763117, 440.06933262104934,
           -132.0207997863148))
 
+THREE_STAGES = Collocation(
+    nodes=(0.1550510257216822, 0.6449489742783178, 1.0),
+    inverse=((3.224744871391589, 1.1678400846904056, -0.25319726474218085),
+             (-3.5678400846904057, 0.775255128608411, 1.0531972647421808), (5.531972647421808, -7.531972647421808, 5.0)),
+    roots=((3.637834252744496, 0.0), (2.6810828736277523, 3.0504301992474105)),
+    join=((0.09443876248897524, 0.0, -0.1412552950209542, -0.030029194105147424),
+          (0.2502131229653333, 0.0, 0.20412935229379994, 0.3829421127572619), (1.0, 0.0, 1.0, 0.0)),
+    part=((4.178718591551905, 0.32768282076106237, 0.5233764454994495), (0.0, 0.0, 0.0),
+          (-4.178718591551905, -0.32768282076106237, 0.47662355450055044),
+          (-0.5028726349457868, 2.571926949855605, -0.5960392048282249)),
+    estimate=(-10.048809399827416, 1.382142733160749, -0.3333333333333333),
+    tail=(0.0, 3.637834252744496, -16.37025413735023, 21.827005516466976, -9.09458563186124))
+
+SOURCE = (
+    "E. Hairer, G. Wanner, Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems, 2nd ed.,",
+    "Springer 1996, section IV.8 (Newton's method, error estimate; 3 stages); the same, Stiff differential equations solved by",
+    "Radau methods, J. Comput. Appl. Math. 111 (1999) 93-111 (5 stages).")
+
 RADAU = Method(
     "radau", "Radau IIA of 5 stages with the exact Jacobian: order 9, error estimate of order 5, dense output of order 6",
-    6, "radau",
-    ("E. Hairer, G. Wanner, Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems, 2nd ed.,",
-     "Springer 1996, section IV.8 (Newton's method, error estimate; 3 stages); the same, Stiff differential equations solved by",
-     "Radau methods, J. Comput. Appl. Math. 111 (1999) 93-111 (5 stages)."),
-    needs=("jacobian_x",), gather=lambda *_: {"collocation": COLLOCATION})
+    6, "radau", SOURCE, needs=("jacobian_x",), gather=lambda *_: {"collocation": FIVE_STAGES})
+
+RADAU5 = Method(
+    "radau5", "Radau IIA of 3 stages with the exact Jacobian: order 5, error estimate of order 3, dense output of order 4",
+    4, "radau", SOURCE, needs=("jacobian_x",), gather=lambda *_: {"collocation": THREE_STAGES})

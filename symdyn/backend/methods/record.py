@@ -18,7 +18,8 @@ class Tableau:
 
     e       difference to the embedded solution, or a multiple of it. If it has an entry for k[n_stages], the derivative at the
             end is evaluated before a step is judged, else after
-    second  None, or b + second: the solution of a second estimate e2; then the error is |h| e^2 / sqrt(e^2 + 0.01 e2^2)
+    second  b + second: the solution of a second estimate e2; then the error is |h| e^2 / sqrt(e^2 + 0.01 e2^2). None if, and only
+            if, e has an entry for k[n_stages]
     d       dense output at t + theta h, r = 1 - theta: x + theta (dx + r ((h k[0] - dx) + theta ((2 dx - h k[0] - h k[n]) +
             r (h d[0] k + theta (h d[1] k + ...))))), dx the change over the step
     """
