@@ -8,6 +8,7 @@ Source: Benzi, Golub and Liesen, Numerical solution of saddle point problems, Ac
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ from symdyn.formulation.composite import factorize
 from symdyn.spatial.vectors import congruence, inner, vector, zeros
 from symdyn.tape.node import Node, is_zero
 
-# A pivot below this part of the size of its row leaves too few digits: the kernel takes over.
-SMALLEST_PIVOT = 1e-3
+# Below this part of the size of its row, a pair of pivots below its square, a pivot takes too many digits away, from multipliers
+# those of its square: the kernel takes over.
+SMALLEST_PIVOT = Fraction(1, 10)
 # Pivots at the sample state are at least this part of the largest that there is.
 ADMITTED = 0.2
 # So few independent speeds are no reason to wait for their accelerations.
@@ -97,7 +99,7 @@ class NullSpaceSolver:
         a = self.algebra
         determinant = A[0, 0] if len(A) == 1 else A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
         if isinstance(determinant, Node):
-            least: Any = SMALLEST_PIVOT**2
+            least: Any = SMALLEST_PIVOT ** (2 * len(A))
             for size in sizes:
                 least = least * size
             scaled = determinant

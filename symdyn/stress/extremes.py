@@ -99,13 +99,13 @@ def masses(subject: Subject, short: bool) -> Iterator[Row]:
         except SymdynError as error:
             yield Row("mass ratios", subject.name, done, None, None, "", DEGRADE, str(error))
             continue
-        digits, refused = measured.excess(values)
-        finite = measured.solved[np.isfinite(measured.solved)]
+        found = measured.compared(values)
+        finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("mass ratios", subject.name, f"{done}: accelerations at {FEW} states, condition up to {finite.max():.2g}, "
-                     f"{refused} refused", digits, measured, values)
-        if refused and measured.least_refused < 1e8:
-            yield Row("mass ratios", subject.name, f"{done}: {refused} states refused, condition from "
-                      f"{measured.least_refused:.2g}", None, None, "", FAIL, "well-conditioned states are refused")
+                     f"{found.refused} refused", [found])
+        if found.refused and found.least_refused < 1e8:
+            yield Row("mass ratios", subject.name, f"{done}: {found.refused} states refused, condition from "
+                      f"{found.least_refused:.2g}", None, None, "", FAIL, "well-conditioned states are refused")
 
 
 def inputs(subject: Subject, short: bool) -> Iterator[Row]:

@@ -14,6 +14,12 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.paths import as_path
 
 PASS, DEGRADE, FAIL = "pass", "degrade", "fail"
+LEGEND = {
+    PASS: "the figure is within its bound, or what must happen happens",
+    DEGRADE: "the run stops early and names why, or digits are lost where the problem itself or a known limit takes them; the "
+             "row tells which, and what to do",
+    FAIL: "anything else",
+}
 _WIDTH = 118
 
 
@@ -72,7 +78,8 @@ class StressReport:
         """The rows as text, the numbers at the left; below each what was done, where the bound comes from, and why."""
         lines = [HEAD, *[told(row) for row in self.rows]]
         lines += [f"left out: {text}" for text in self.left_out]
-        return "\n".join([*lines, self.summary()])
+        wrapped = textwrap.TextWrapper(_WIDTH, subsequent_indent=" " * 10)
+        return "\n".join([*lines, *[wrapped.fill(f"{verdict}: {text}") for verdict, text in LEGEND.items()], self.summary()])
 
     def summary(self) -> str:
         """One line."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,14 @@ import numpy as np
 from symdyn.errors import ArgumentError, CompileError, SymdynError
 from symdyn.pipeline import function_tape
 from symdyn.runtime.compiler import Compiler, _installed, _probe, find_compiler
-from symdyn.stress.record import DEGRADE, FAIL, NotApplicable, Row, within
+from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
 from symdyn.stress.subject import EPS, Subject, evaluated
-from symdyn.stress.yardstick import conditions, exact, terms
+from symdyn.stress.yardstick import CORRECTIONS, conditions, exact, largest, redundant, smoothed, solved, terms, together, weights
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
-# What is solved for: its errors go with the condition of the system that is solved.
-SOLVED = ("rhs", "lam", "reactions", "power", "position_correction", "velocity_correction")
+# What is zero on the constraints is looked at beside them, too: this far, of the usual size.
+BESIDE, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
 # States, fewer of long equations (so many operations at 32 digits altogether) and in the short form.
 STATES, WORK, FEW = 1000, 1.5e6, 24
 # Relative changes that conditions are estimated by, and how many.
@@ -49,8 +49,7 @@ def states(subject: Subject, n: int, seed: int = 1) -> States:
     groups = (symbols.coordinates, symbols.speeds, symbols.states)
     reach = np.array([float(symbols.reach.get(s, 1)) for group in groups for s in group])
     x = x0 + rng.uniform(-1, 1, (n, len(x0))) * reach
-    units = subject.module.metadata["units"]
-    angles = [k for k, s in enumerate(symbols.coordinates) if units.get(s.name) == "rad" and s not in symbols.reach]
+    angles = _angles(subject)
     for k in range(n // 2):
         kind = k % 6
         if kind == 0 and angles:
@@ -90,6 +89,15 @@ def _consistent(subject: Subject, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     return rows
 
 
+def beside(subject: Subject, where: States) -> States:
+    """The same states, every other one off the constraints by a thousandth of what coordinates and speeds usually are."""
+    symbols, x = subject.symbols, where.x.copy()
+    reach = np.array([float(symbols.reach.get(s, 1)) for group in (symbols.coordinates, symbols.speeds, symbols.states)
+                      for s in group])
+    x[1::2] += ASIDE * np.random.default_rng(2).uniform(-1, 1, x[1::2].shape) * reach
+    return replace(where, x=x)
+
+
 def functions(subject: Subject) -> list[str]:
     """The functions that are looked at, those of the user's outputs included."""
     return [name for name in subject.everything if name not in LEFT_OUT
@@ -97,113 +105,185 @@ def functions(subject: Subject) -> list[str]:
 
 
 def rounding(subject: Subject, short: bool) -> Iterator[Row]:
-    """Every function at random and adversarial states, by every compiler and backend, against 30 digits."""
+    """Every function at random and adversarial states, by every compiler and backend, against 32 digits."""
     names = functions(subject)
     if not names:
         raise NotApplicable("nothing depends on the state")
     operations = sum(function_tape(subject.equations, name).operations for name in names)
     n = FEW if short else int(np.clip(WORK / max(operations, 1), FEW, STATES))
     where = states(subject, n)
-    found = {name: Measured(subject, name, where) for name in names}
+    # Constraints that depend on others contradict them beside.
+    near = beside(subject, where) if subject.constrained and not redundant(subject, where.t, where.x) else where
+    measured = [Measured(subject, name, near if name in BESIDE else where) for name in names]
     reference: dict[str, np.ndarray] = {}
+    every: list[Finding] = []
     for label, unit in _builds(subject, names, short):
         if isinstance(unit, str):
             yield Row("rounding", subject.name, label, None, None, "", FAIL, unit)
             continue
-        same, worst, name_of, refused = bool(reference), -np.inf, "", 0
-        for name in names:
-            values = evaluated(unit.evaluator(name), where.t, where.x, subject.params, where.inputs, where.ud)
-            if name in reference:
-                same &= bool(np.array_equal(values, reference[name], equal_nan=True))
-            reference.setdefault(name, values)
-            digits, n_refused = found[name].excess(values)
-            refused += n_refused
-            if digits > worst:
-                worst, name_of = digits, name
-        if worst == -np.inf:
+        same, found = bool(reference), []
+        for one in measured:
+            values = evaluated(unit.evaluator(one.name), one.where.t, one.where.x, subject.params, one.where.inputs, one.where.ud)
+            if one.name in reference:
+                same &= bool(np.array_equal(values, reference[one.name], equal_nan=True))
+            reference.setdefault(one.name, values)
+            found.append(one.compared(values))
+        if all(f.digits == -np.inf for f in found):
             raise NotApplicable("no state at which the functions are defined")
+        refused = sum(f.refused for f in found)
         yield judged("rounding", subject.name, f"{label}: {len(names)} functions at {n} states, half of them adversarial, "
-                     f"{refused} "
-                     f"values refused where 32 digits have one; worst {name_of}" + ("; the same bits as the first" if same else
-                                                                                    ""),
-                     worst, found[name_of], evaluated(unit.evaluator(name_of), where.t, where.x, subject.params, where.inputs,
-                                                      where.ud))
+                     f"{refused} values refused where 32 digits have one" + ("; the same bits as the first" if same else ""),
+                     found)
         if refused:
             yield _refusals(subject, label, found, refused)
+        every += found
+    yield from _set_aside(subject, every)
 
 
-def judged(check: str, system: str, done: str, worst: float, measured: Measured, values: np.ndarray) -> Row:
-    """The row of digits that are lost beyond what the condition costs; within that of plain numbers it is said so."""
+@dataclass(frozen=True)
+class Finding:
+    """What came of a function's values: the most decimal digits lost beyond what is due (plain: with a system that is solved in
+    plain numbers), how many states were refused and the least condition there; of states that are set aside, next to lost rank
+    or singular to the last digit, how many have lost more than that, the most digits, and the least condition."""
+
+    name: str
+    digits: float
+    plain: float
+    refused: int
+    least_refused: float
+    smoothed: int
+    most_smoothed: float
+    singular: int
+    least_singular: float
+
+    @property
+    def verdict(self) -> str:
+        return PASS if self.digits <= 0 else DEGRADE if self.plain <= 0 else FAIL
+
+
+def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
+    """The row of digits that functions lose beyond what the condition costs: every function is judged by itself, and the worst
+    verdict counts. Within the condition of plain numbers it is said so."""
     origin = ("decimal digits lost beyond log10(condition of inputs and of what is solved, scaled) + log10(longest chain of "
               "operations), each of which may round once")
-    if worst > 0 and measured.excess(values, False)[0] <= 0:
-        return Row(check, system, done, worst, 0.0, origin, DEGRADE, "more digits are lost than the scaled condition costs, but "
-                   "no more than that of the matrix in plain numbers: it is near a position of lost rank, or entries of very "
-                   "different size meet in one joint")
-    return within(check, system, done, worst, 0.0, origin, "no more digits are lost than the problem itself costs",
-                  "digits are lost that the problem does not cost")
+    verdict = max((f.verdict for f in found), key=(PASS, DEGRADE, FAIL).index)
+    alike = [f for f in found if f.verdict == verdict]
+    worst = max(alike, key=lambda f: f.digits)
+    named = ", ".join(f.name for f in alike) if verdict != PASS else worst.name
+    if verdict == DEGRADE:
+        return Row(check, system, f"{done}; beyond it {named}", worst.digits, 0.0, origin, DEGRADE, "more digits are lost than "
+                   "the scaled condition costs, but no more than that of the matrix in plain numbers: inertias of very different "
+                   "size meet in one body or joint, and the small ones are what is left of sums")
+    place = "nearest to it" if verdict == PASS else "beyond it"
+    return within(check, system, f"{done}; {place} {named}", worst.digits, 0.0, origin,
+                  "no more digits are lost than the problem itself costs", "digits are lost that the problem does not cost")
 
 
-def _refusals(subject: Subject, label: str, found: dict[str, Any], refused: int) -> Row:
+def _refusals(subject: Subject, label: str, found: Sequence[Finding], refused: int) -> Row:
     """Values that were refused: right where the system that is solved has no digits left."""
-    least = min(m.least_refused for m in found.values())
+    least = min(f.least_refused for f in found)
     return Row("refused states", subject.name, f"{label}: {refused} values refused; condition there from {least:.2g}", 1 / least
                if least > 0 else np.inf, 1e-8, "a pivot that vanishes to half of the digits", DEGRADE if least > 1e8 else FAIL,
                "only states are refused whose equations are singular to half of the digits" if least > 1e8 else
                "states are refused whose equations are well-conditioned")
 
 
+def _set_aside(subject: Subject, found: Sequence[Finding]) -> Iterator[Row]:
+    """Rows of states that no bound is known for: what is computed there, and why."""
+    near = [f for f in found if f.smoothed]
+    if near:
+        names = ", ".join(dict.fromkeys(f.name for f in near))
+        yield Row("lost rank", subject.name, f"{names} at {max(f.smoothed for f in near)} of the states, which lie next to a "
+                  "position where constraints lose rank: decimal digits lost beyond what is due",
+                  max(f.most_smoothed for f in near), None, "", DEGRADE, "the exact multipliers and accelerations grow without "
+                  "bound towards such a position; they are smoothed there, so that motions pass it, and only the motion's energy "
+                  "and branch tell whether it passes rightly")
+    singular = [f for f in found if f.singular]
+    if singular:
+        names = ", ".join(dict.fromkeys(f.name for f in singular))
+        yield Row("singular states", subject.name, f"{names} at {max(f.singular for f in singular)} of the states: condition of "
+                  "what is solved, from", min(f.least_singular for f in singular), None, "", DEGRADE, "the mass matrix is "
+                  "singular to the last digit, as at gimbal lock: accelerations have no digits there, and a motion that comes "
+                  "there stops and names it")
+
+
+def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
+    """What entries of states are known relative to, (n, n_x): themselves, but angles of many turns the largest of them, because
+    angles are added along a mechanism."""
+    angles, sizes = _angles(subject), x.copy()
+    if angles:
+        most = np.abs(x[:, angles]).max(axis=1, keepdims=True)
+        sizes[:, angles] = np.where(most > 2 * np.pi, most, x[:, angles])
+    return sizes
+
+
+def _angles(subject: Subject) -> list[int]:
+    """Places of the coordinates that are angles."""
+    units, symbols = subject.module.metadata["units"], subject.symbols
+    return [k for k, s in enumerate(symbols.coordinates) if units.get(s.name) == "rad" and s not in symbols.reach]
+
+
 class Measured:
-    """A function's values with 32 digits at states, and how far rounding may carry values away from them."""
+    """A function's values with 32 digits at states, and how far rounding may carry values away from them.
+
+    one, plain   (n, size), what one rounding of every input and of every entry of what is solved does to each entry; plain: with
+                 a system that is solved without scales of its own
+    condition    (n,), of what is solved, scaled; 1 where nothing is
+    """
 
     def __init__(self, subject: Subject, name: str, where: States, params: np.ndarray | None = None) -> None:
-        rows = exact(subject, name, where.t, where.x, where.inputs, where.ud, params)
+        self.name, self.where = name, where
+        self.exact = exact(subject, name, where.t, where.x, where.inputs, where.ud, params)
         p = subject.params if params is None else params
-        self.known = np.array([row is not None for row in rows])
-        self.exact = rows
         self.chain = max(1, function_tape(subject.equations, name).longest_chain())
         rng = np.random.default_rng(3)
         base = subject.evaluate(name, where.t, where.x, p, where.inputs, where.ud)
 
-        def changed(values: np.ndarray) -> np.ndarray:
-            return values * (1 + CHANGE * rng.choice([-1, 1], values.shape))
+        def changed(values: np.ndarray, sizes: np.ndarray | None = None) -> np.ndarray:
+            return values + CHANGE * rng.choice([-1, 1], values.shape) * (values if sizes is None else sizes)
 
-        moved = np.zeros(len(base))
+        moved, known = np.zeros(base.shape), _resolved(subject, where.x)
         for _ in range(TRIALS):
-            other = subject.evaluate(name, changed(where.t), changed(where.x), changed(p), changed(where.inputs),
+            other = subject.evaluate(name, changed(where.t), changed(where.x, known), changed(p), changed(where.inputs),
                                      changed(where.ud))
-            difference = np.abs(other - base).max(axis=1, initial=0.0) / CHANGE
-            moved = np.fmax(moved, difference)
-        self.size = np.array([max((abs(float(v)) for v in row), default=0.0) if row is not None else np.nan for row in rows])
-        self.solved = conditions(subject, where.t, where.x, params) if name in SOLVED else np.ones(len(base))
-        # What one rounding error of every input, and of every entry of what is solved, does to the result.
-        self.one = EPS * (moved + np.fmax(self.size, terms(subject, name, where.t, where.x, where.inputs, params))
-                          * np.fmax(self.solved, 1.0))
-        # The same where the system is solved in plain numbers, without scales of its own.
-        self.plain = self.one if name not in SOLVED else self.one * np.fmax(1.0, conditions(
-            subject, where.t, where.x, params, False) / np.fmax(self.solved, 1.0))
-        self.least_refused = np.inf
+            moved = np.fmax(moved, np.abs(other - base) / CHANGE)
+        self.values = np.array([[float(v) for v in row] if row is not None else [np.nan] * base.shape[1] for row in self.exact])
+        self.condition = (conditions(subject, where.t, where.x, params, gradients=False) if solved(subject, name)
+                          else np.ones(len(base)))
+        labels = together(subject, name, base.shape[1])
+        factors = weights(subject, name, where.t, where.x, base.shape[1], params)
+        sizes = np.fmax(np.abs(self.values), terms(subject, name, where.t, where.x, where.inputs, params))
+        amplified = np.fmax(self.condition, 1.0)[:, None]
+        with np.errstate(invalid="ignore"):  # of conditions that are infinite: set aside
+            self.one = EPS * (largest(moved, labels, factors) + largest(sizes, labels, factors) * amplified)
+            self.plain = self.one if not solved(subject, name) else self.one * np.fmax(1.0, conditions(
+                subject, where.t, where.x, params, False, False)[:, None] / amplified)
+        # No bound holds where a relative change by rounding makes the matrix singular.
+        self.singular = ~(self.condition * EPS * self.chain < 1)
+        self.smoothed = smoothed(subject, name, where.t, where.x, params) & ~self.singular
 
-    def excess(self, values: np.ndarray, scaled: bool = True) -> tuple[float, int]:
-        """The most digits lost beyond what is due, and how many states were refused that have a value."""
-        worst, refused, one = -np.inf, 0, self.one if scaled else self.plain
-        for k in np.flatnonzero(self.known):
-            row = self.exact[k]
-            assert row is not None
-            if not np.isfinite(self.size[k]) or self.size[k] > 1e290 or not row:
-                continue
-            if not np.isfinite(values[k]).all():
-                refused += 1
-                self.least_refused = min(self.least_refused, float(self.solved[k]))
-                continue
-            error = max(abs(float(e - float(v))) for e, v in zip(row, values[k], strict=True))
-            if error > SMALLEST and one[k] > 0:
-                worst = max(worst, float(np.log10(error / (one[k] * self.chain))))
-            elif error > SMALLEST:
-                worst = np.inf
-            else:
-                worst = max(worst, -16.0)
-        return worst, refused
+    def compared(self, values: np.ndarray) -> Finding:
+        """Values of generated code (n, size) against these."""
+        errors = np.zeros(values.shape)
+        usable = np.array([row is not None and len(row) > 0 for row in self.exact]) & np.isfinite(self.values).all(axis=1)
+        usable &= np.abs(self.values).max(axis=1, initial=0.0) <= 1 / SMALLEST
+        refused = usable & ~np.isfinite(values).all(axis=1)
+        usable &= ~refused
+        for k in np.flatnonzero(usable):
+            errors[k] = [abs(float(e - float(v))) for e, v in zip(self.exact[k] or (), values[k], strict=True)]
+
+        def excess(one: np.ndarray) -> np.ndarray:
+            with np.errstate(all="ignore"):
+                digits = np.log10(errors / (one * self.chain))
+            return np.where(errors > SMALLEST, digits, -16.0).max(axis=1, initial=-16.0)
+
+        scaled = excess(self.one)
+        aside = usable & (self.singular | self.smoothed) & (scaled > 0)
+        usable &= ~(self.singular | self.smoothed)
+        near, lost = aside & self.smoothed, aside & self.singular
+        return Finding(self.name, scaled[usable].max(initial=-np.inf), excess(self.plain)[usable].max(initial=-np.inf),
+                       int(refused.sum()), self.condition[refused].min(initial=np.inf), int(near.sum()),
+                       scaled[near].max(initial=-np.inf), int(lost.sum()), self.condition[lost].min(initial=np.inf))
 
 
 def compilers() -> list[Compiler]:

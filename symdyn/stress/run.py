@@ -16,7 +16,7 @@ from symdyn.errors import ArgumentError, MissingExtra
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
-from symdyn.stress.record import FAIL, NotApplicable, Row, StressReport
+from symdyn.stress.record import DEGRADE, FAIL, NotApplicable, Row, StressReport
 from symdyn.stress.subject import Subject
 from symdyn.systems import get
 from symdyn.systems import names as catalogue
@@ -132,6 +132,9 @@ def _in_turn(tasks: Sequence[Task]) -> Iterator[Result]:
         for name in names:
             rows, left_out, subject = _one(subject, name, short)
             yield rows, left_out, 1
+        if isinstance(subject, Subject) and subject.lacking:
+            yield [Row("numbers", subject.name, f"nothing was run: {', '.join(subject.lacking)} without a number", None, None, "",
+                       DEGRADE, "give every parameter a number in the system's `defaults`")], [], 0
 
 
 def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any]:
@@ -142,6 +145,8 @@ def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any
         if check.of_system and not isinstance(system, Subject):
             system = Subject(system)
         label = system.name if isinstance(system, Subject) else "-"
+        if check.of_system and system.lacking:
+            raise NotApplicable(f"{', '.join(system.lacking)} without a number")
         for row in check.run(system, short) if check.of_system else check.run(short):
             rows.append(row)
     except NotApplicable as reason:
@@ -156,15 +161,12 @@ def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any
 
 def _whole(task: Task) -> Result:
     """All checks of one task, in a process of its own."""
-    system, names, short = task
     rows: list[Row] = []
     left_out: list[str] = []
-    subject: Any = system
-    for name in names:
-        found, reasons, subject = _one(subject, name, short)
+    for found, reasons, _ in _in_turn([task]):
         rows += found
         left_out += reasons
-    return rows, left_out, len(names)
+    return rows, left_out, len(task[1])
 
 
 def _spread(tasks: Sequence[Task], jobs: int) -> Iterator[Result]:

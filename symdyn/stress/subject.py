@@ -59,6 +59,11 @@ class Subject:
     def constrained(self) -> bool:
         return bool(self.equations.constraints)
 
+    @property
+    def lacking(self) -> list[str]:
+        """Parameters without a number."""
+        return [p.name for p in self.symbols.parameters if p not in self.symbols.defaults]
+
     @cached_property
     def params(self) -> np.ndarray:
         return self.module.parameters()

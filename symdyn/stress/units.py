@@ -122,8 +122,15 @@ def _bits(subject: Subject, system: Units, p: np.ndarray, x: np.ndarray, short: 
             grown = growth_to(phi, len(phi) - 1)
     bound = (one.n_steps + two.n_steps) * 2 * np.sqrt(len(x)) * RTOL * grown
     gentle = figure <= bound
-    why = ("not the same bits, but the same motion within the tolerances: a power of a quantity, or a threshold with a unit (a "
-           "mechanism that has no lengths counts in metres)" if gentle else "another motion in other units")
+    cause = "a power of a quantity, or a threshold with a unit"
+    if subject.constrained:
+        lengths = [float(subject.evaluate("length", 0.0, subject.start * of_x, subject.params * of_p)[0, 0])
+                   for of_x, of_p in ((1.0, 1.0), (x, p))]
+        if lengths[0] == lengths[1]:
+            cause = (f"no parameter is a length, so that residuals of the constraints are compared with {lengths[0]:g} m "
+                     "whatever the size of the mechanism; give a length as a parameter")
+    why = (f"not the same bits, but the same motion within the tolerances: {cause}" if gentle else
+           "another motion in other units")
     yield Row("units", subject.name, done, figure, float(bound) if gentle else 0.0,
               origin + "; else the tolerances, magnified", DEGRADE if gentle else FAIL, why)
 

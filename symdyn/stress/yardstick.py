@@ -1,21 +1,28 @@
-"""What rounding errors are measured by: values at 30 digits, condition numbers."""
+"""What rounding errors are measured by: values at 32 digits, condition numbers, the sizes of what is added up."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mpmath
 import numpy as np
 
 from symdyn.bench.precise import Lost, program
-from symdyn.pipeline import function_tape
-from symdyn.stress.subject import Subject
+from symdyn.pipeline import _quantities, function_tape
+from symdyn.stress.subject import EPS, Subject
+from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
+from symdyn.tape.node import Node
+from symdyn.tape.tape import unsigned
 from symdyn.verification.identities import _equilibrated
 
 DIGITS = 32
 # Singular values of the scaled Jacobian below this part of the usual belong to constraints that depend on others but for
 # rounding errors.
 DEPENDENT = 1e-12
+CORRECTIONS = ("position_correction", "velocity_correction")
+FORCES = ("k_tilde", "F_tilde", "inverse_dynamics")
+# What may depend on accelerations and multipliers; whether it does is seen on its tape.
+MAY_DEPEND = ("outputs", "reactions", "power")
 
 
 def exact(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray,
@@ -53,10 +60,30 @@ def _otherwise(subject: Subject, name: str, context: object, fixed: dict[str, fl
         return None
 
 
-def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None,
-               scaled: bool = True) -> np.ndarray:
+# -- what is solved for
+
+
+def solved(subject: Subject, name: str) -> bool:
+    """Whether a function's values come from solving for accelerations, multipliers or corrections."""
+    if name in ("rhs", "lam", *CORRECTIONS):
+        return True
+    if name not in MAY_DEPEND:
+        return False
+    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+    found = list(subject.equations.quantity("rhs").ravel())[n_q:n_q + n_u]
+    if subject.has("lam"):
+        found += list(subject.equations.quantity("lam").ravel())
+    unknown = {unsigned(e) for e in found if isinstance(unsigned(e), Node) and unsigned(e).op != "leaf"}
+    return not unknown.isdisjoint(_quantities(subject.equations, name).steps)
+
+
+def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None, scaled: bool = True,
+               gradients: bool = True) -> np.ndarray:
     """Condition of the mass matrix, or of the mass matrix bordered by the constraints, with rows and columns scaled or in plain
-    numbers, (n,); of constraints that depend on others without those."""
+    numbers, (n,); of constraints that depend on others without those.
+
+    gradients   count small gradients of constraints, too, which scaling takes away: they make multipliers large
+    """
     if not subject.has("mass_matrix"):
         return np.ones(len(x))
     n = len(subject.symbols.speeds)
@@ -66,15 +93,40 @@ def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarra
     C = subject.evaluate("C_r", t, x, params).reshape(len(M), -1, n)
     whole = np.zeros((len(M), n + C.shape[1], n + C.shape[1]))
     whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = M, C, C.transpose(0, 2, 1)
-    J = C * subject.evaluate("C_scale", t, x, params)[:, :, None]
+    values = _singular_values(subject, t, x, params)
+    found = np.array([_condition(w, int((v <= DEPENDENT).sum()), scaled) for w, v in zip(whole, values, strict=True)])
+    if not gradients:
+        return found
+    return found * [max(1.0, 1 / v[v > DEPENDENT][-1]) if (v > DEPENDENT).any() else np.inf for v in values]
+
+
+def _singular_values(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None) -> np.ndarray:
+    """Of the constraints' Jacobian with rows as lengths, over the usual largest, (n, m)."""
+    n = len(subject.symbols.speeds)
+    J = subject.evaluate("C_r", t, x, params).reshape(len(x), -1, n)
+    J = J * subject.evaluate("C_scale", t, x, params)[:, :, None]
     sizes = np.array([np.linalg.svd(j, compute_uv=False) if np.isfinite(j).all() else np.zeros(min(j.shape)) for j in J])
     # Relative to the usual: a row whose gradient nearly vanishes costs digits, one that depends on others does not count.
-    sizes = np.pad(sizes / max(float(np.median(sizes[:, 0])), 1e-300), ((0, 0), (0, C.shape[1] - sizes.shape[1])))
-    found = []
-    for w, values in zip(whole, sizes, strict=True):
-        kept = values[values > DEPENDENT]
-        found.append(_condition(w, len(values) - len(kept), scaled) * max(1.0, 1 / kept[-1] if len(kept) else np.inf))
-    return np.array(found)
+    return np.pad(sizes / max(float(np.median(sizes[:, 0])), 1e-300), ((0, 0), (0, J.shape[1] - sizes.shape[1])))
+
+
+def redundant(subject: Subject, t: np.ndarray, x: np.ndarray) -> bool:
+    """Whether some constraints depend on others at states on them, (n, n_x)."""
+    return bool((_singular_values(subject, t, x, None) <= DEPENDENT).any())
+
+
+def smoothed(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None) -> np.ndarray:
+    """Whether states are at positions of lost rank, or so near that the smoothing there is larger than rounding errors, (n,).
+
+    Regularized with e and iterated, a singular value s keeps the part (1 + s^2 / e^2)^-ROUNDS of its error; see
+    symdyn.tape.kernels.
+    """
+    if not subject.constrained or not solved(subject, name):
+        return np.zeros(len(x), dtype=bool)
+    below = (DAMPED if name in CORRECTIONS else SMOOTHED) * EPS ** (-0.5 / ROUNDS)
+    values = _singular_values(subject, t, x, params)
+    rank = (values > DEPENDENT).sum(axis=1)
+    return np.any((values > DEPENDENT) & (values < below), axis=1) | (rank < rank.max())  # type: ignore[no-any-return]
 
 
 def _condition(matrix: np.ndarray, without: int, scaled: bool) -> float:
@@ -96,44 +148,108 @@ def _condition(matrix: np.ndarray, without: int, scaled: bool) -> float:
     return float(values[0] / last) if last > 0 else float("inf")
 
 
+# -- sizes
+
+
+def together(subject: Subject, name: str, size: int) -> np.ndarray:
+    """Which entries of a function are computed and compared together, (size,) of numbers from 0: those of one unit, one output,
+    origins and rotations apart; the whole function where its entries have no units of their own."""
+    metadata = subject.module.metadata
+    units = [metadata["units"].get(x, x) for x in metadata["x"]]
+    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+    of_speeds = units[n_q:n_q + n_u]
+    labels: list = [0] * size
+    if name == "rhs":
+        labels = [*units[:n_q], *["accelerations"] * n_u, *[f"state {unit}" for unit in units[n_q + n_u:]]]
+    elif name == "mass_matrix":
+        labels = [(a, b) for a in of_speeds for b in of_speeds]
+    elif name == "outputs":
+        labels = [k for k, q in enumerate(q for q in subject.equations.quantities if q.startswith("output_"))
+                  for _ in subject.equations.quantity(q).ravel()]
+    elif name == "frames":
+        labels = [k % 12 < 3 for k in range(size)]
+    elif name == "reactions":
+        labels = [k % 6 < 3 for k in range(size)]
+    known = {label: k for k, label in enumerate(dict.fromkeys(labels))}
+    return np.array([known[label] for label in labels], dtype=int)
+
+
+def weights(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, size: int, params: np.ndarray | None = None) -> np.ndarray:
+    """Factors that make a function's entries comparable, (n, size): constraints as lengths, multipliers as forces, accelerations
+    and forces by the roots of their inertias, with which the mass matrix is scaled."""
+    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+    if subject.has("mass_matrix") and (name == "rhs" or (name in FORCES and size == n_u)):
+        inertias = np.abs(np.diagonal(subject.evaluate("mass_matrix", t, x, params).reshape(-1, n_u, n_u), axis1=1, axis2=2))
+        roots = np.where((inertias > 0) & np.isfinite(inertias), np.sqrt(inertias), 1.0)
+        if name in FORCES:
+            return 1 / roots  # type: ignore[no-any-return]
+        factors = np.ones((len(x), size))
+        factors[:, n_q:n_q + n_u] = roots
+        return factors
+    if name not in ("C", "C_dot", "F_d", "lam"):
+        return np.ones((len(x), size))
+    scale = np.abs(subject.evaluate("C_scale", t, x, params))
+    scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
+    return 1 / scale if name == "lam" else scale
+
+
+def largest(values: np.ndarray, labels: np.ndarray, factors: np.ndarray) -> np.ndarray:
+    """For every entry the largest of those that are compared with it, in its own scale, (n, size)."""
+    found = np.zeros(values.shape)
+    scaled = np.nan_to_num(np.abs(values) * factors, nan=0.0, posinf=0.0)
+    for label in np.unique(labels):
+        found[:, labels == label] = scaled[:, labels == label].max(axis=1, keepdims=True)
+    return found / factors
+
+
 def terms(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray,
           params: np.ndarray | None = None) -> np.ndarray:
-    """How large the terms are that make up a function whose value may vanish for every parameter, (n,): rounding errors are in
-    proportion to them. Zero for the others."""
+    """How large the terms are that make up entries whose sum may vanish for every parameter, (n, 1) or (n, size): rounding
+    errors are in proportion to them. Zero for the others."""
     def values(of: str) -> np.ndarray:
-        return np.abs(subject.evaluate(of, t, x, params, inputs))  # type: ignore[no-any-return]
+        return np.nan_to_num(np.abs(subject.evaluate(of, t, x, params, inputs)), nan=0.0, posinf=0.0)
 
     def size(of: str) -> np.ndarray:
         return values(of).max(axis=1, initial=0.0)  # type: ignore[no-any-return]
 
-    if name == "C":  # closed loops: sums of lengths
-        return np.nan_to_num(size("length") / values("C_scale").max(axis=1))
     n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
     speed = np.abs(x[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
+    none = np.zeros((len(x), 1))
+    loads = sum((size(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(len(x)))
+    if name == "C":  # closed loops: sums of lengths
+        return (size("length") / np.fmax(values("C_scale").max(axis=1), 1e-300))[:, None]
     if name == "position_correction":  # of residuals as lengths, and what they are divided by
-        return np.nan_to_num(size("length")) * (1 + 1 / np.fmax(size("C_r"), 1e-300))
+        return (size("length") * (1 + 1 / np.fmax(size("C_r"), 1e-300)))[:, None]
     if name == "velocity_correction":
-        return np.nan_to_num(size("length")) * speed * (1 + 1 / np.fmax(size("C_r"), 1e-300)) + speed
+        return (size("length") * speed * (1 + 1 / np.fmax(size("C_r"), 1e-300)) + speed)[:, None]
     if name in ("C_dot", "F_d"):
-        return np.nan_to_num(size("C_r")) * speed ** (2 if name == "F_d" else 1)
-    if name == "rhs" and subject.has("mass_matrix"):  # accelerations that each force would cause alone
-        diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
-        forces = sum((values(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros((len(x), n_u)))
-        if subject.constrained:
-            C = values("C_r").reshape(len(x), -1, n_u)
-            forces = forces + (C.transpose(0, 2, 1) * values("lam")[:, None, :]).sum(axis=2)
-        alone = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
-        return np.nan_to_num(alone.max(axis=1, initial=0.0))
+        return (size("C_r") * speed ** (2 if name == "F_d" else 1))[:, None]
+    if name == "rhs" and subject.has("mass_matrix"):
+        return _alone(subject, values, n_q, n_u)
     if name == "k_tilde" and subject.has("mass_matrix"):
-        return np.nan_to_num(size("mass_matrix")) * speed**2
-    if name == "lam":  # what balances loads and inertial forces
-        found = sum((size(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(len(x)))
-        return np.nan_to_num(found / np.fmax(size("C_r"), 1e-300))
+        return (size("mass_matrix") * speed**2)[:, None]
+    if name == "lam":  # what balances loads and inertial forces, also those of accelerations that constraints ask for
+        gradient = np.fmax(size("C_r"), 1e-300)
+        return ((loads + size("mass_matrix") * size("F_d") / gradient) / gradient)[:, None]
     if name == "outputs" and subject.has("positions"):  # often differences of places
-        return np.nan_to_num(size("positions"))
+        return size("positions")[:, None]
     if name == "reactions":  # sums of weights, inertial forces, loads
-        found = sum((size(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(len(x)))
-        if subject.constrained:
-            found = found + size("lam") * size("C_r")
-        return np.nan_to_num(found) + np.zeros(len(x))
-    return np.zeros(len(x))
+        found = loads + (size("lam") * size("C_r") if subject.constrained else 0.0)
+        if subject.has("mass_matrix"):
+            found = found + size("mass_matrix") * speed**2
+            diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
+            found = found + (diagonal * values("rhs")[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
+        return found[:, None]
+    return none
+
+
+def _alone(subject: Subject, values: Callable[[str], np.ndarray], n_q: int, n_u: int) -> np.ndarray:
+    """Accelerations that each force would cause alone, (n, n_x)."""
+    diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
+    forces = sum((values(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(diagonal.shape))
+    if subject.constrained:
+        C = values("C_r").reshape(len(forces), -1, n_u)
+        forces = forces + (C.transpose(0, 2, 1) * values("lam")[:, None, :]).sum(axis=2)
+    found = np.zeros((len(forces), len(subject.module.metadata["x"])))
+    found[:, n_q:n_q + n_u] = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
+    return found

@@ -52,6 +52,32 @@ def test_the_tolerance_decides(angles: Any, body: Any) -> None:
     assert said(angles, [0.3, 0.2, 0.1], rtol=1e-9) == []
 
 
+def test_the_stabilized_index_2_form_tells_it() -> None:
+    """Beside the body a cart that is held at its place, so that there is a constraint."""
+    pytest.importorskip("solve_dae")
+    system = free_body("angles")
+    x = sd.coordinates("x")
+    system.add_joint(sd.Prismatic("rail", system.ground, system.add_body("cart", mass=1), x, axis=[1, 0, 0]))
+    system.add_constraint(x - sd.t**2 / 10, "held")
+    module = system.augmented().compile()
+    for u, n in (({"x_dot": 0.0}, 0), (dict(zip(module.metadata["u"], [0.0, 2.0, 1e-5, 0.0], strict=True)), 1)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            run = module.simulate(t=np.array([0.0, 0.9]), u=u, rtol=1e-6, method="ggl")
+        assert run.success and sum("ZYX angles of joint ball came within" in str(w.message) for w in caught) == n
+
+
+def test_many_motions_tell_it_at_the_states_that_are_kept(angles: Any) -> None:
+    """A quarter turn at 2 rad/s ends 1e-4/2 rad beside gimbal lock: the second motion of three is kept there."""
+    options = {"u": [[0.3, 0.2, 0.1], [0.0, 2.0, 1e-4], [0.0, 1.0, 0.1]], "rtol": 1e-9}
+    with pytest.warns(sd.SimulationWarning, match=r"in 1 of 3 motions, the first of them 1, the ZYX angles of joint ball came "
+                                                  r"too near to gimbal lock, in motion 1 at t = 0\.785\d* within .* take EulerP"):
+        angles.simulate_batch(t=np.array([0.0, 0.5, np.pi / 4]), **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        angles.simulate_batch(t=np.array([0.0, 0.5, 1.0]), **options)
+
+
 def test_a_stop_names_the_angles(angles: Any) -> None:
     (text, *_) = said(angles, [0.0, 2.0, 1e-8], rtol=1e-9)
     assert "stopped at t = 0.785" in text and "the ZYX angles of joint ball are within" in text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.runtime.compiler import find_compiler
-from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
+from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units, yardstick
 from symdyn.stress.record import FAIL, PASS, NotApplicable, Row
 from symdyn.stress.run import CHECKS
 from symdyn.stress.subject import Subject
@@ -66,6 +67,70 @@ def test_rounding_finds_noise_and_a_wrong_sign(double: Subject, monkeypatch: pyt
     original = rounding.evaluated
     monkeypatch.setattr(rounding, "evaluated", lambda *given: wrong(original(*given)))
     assert FAIL in verdicts(rounding.rounding(double, True))
+
+
+@needs_c
+def test_noise_in_one_entry_of_one_function_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    original, names = rounding.evaluated, []
+
+    def wrong(evaluator: Any, *given: Any) -> np.ndarray:
+        values = original(evaluator, *given)
+        if evaluator.name == "frames":
+            values[:, 3] *= 1 + 1e-12  # of a rotation
+            names.append(evaluator.name)
+        return values
+
+    monkeypatch.setattr(rounding, "evaluated", wrong)
+    rows = list(rounding.rounding(double, True))
+    assert names and set(verdicts(rows)) == {FAIL} and all("beyond it frames" in row.done for row in rows)
+
+
+def finding(name: str, digits: float, plain: float, **others: Any) -> rounding.Finding:
+    usual = {"refused": 0, "least_refused": math.inf, "smoothed": 0, "most_smoothed": -math.inf, "singular": 0,
+             "least_singular": math.inf}
+    return rounding.Finding(name, digits, plain, **{**usual, **others})
+
+
+def test_every_function_is_judged_and_the_worst_verdict_counts() -> None:
+    gentle, wrong, fine = finding("rhs", 3.0, -1.0), finding("J", 0.5, 0.5), finding("C", -2.0, -2.0)
+    row = rounding.judged("rounding", "arm", "C", [gentle, wrong, fine])
+    assert row.verdict == FAIL and row.figure == 0.5 and row.done == "C; beyond it J"
+    row = rounding.judged("rounding", "arm", "C", [gentle, fine])
+    assert row.verdict == "degrade" and row.done == "C; beyond it rhs" and "plain numbers" in row.why
+    assert rounding.judged("rounding", "arm", "C", [fine, finding("J", -0.5, -0.5)]).done == "C; nearest to it J"
+
+
+def test_states_that_are_set_aside_are_told() -> None:
+    arm = type("Named", (), {"name": "arm"})
+    near, lost = rounding._set_aside(arm, [finding("lam", -1.0, -1.0, smoothed=3, most_smoothed=4.5),
+                                           finding("rhs", -1.0, -1.0, singular=2, least_singular=1e17)])
+    assert (near.verdict, near.figure) == ("degrade", 4.5) and near.done.startswith("lam at 3 of the states")
+    assert (lost.verdict, lost.figure) == ("degrade", 1e17) and lost.done.startswith("rhs at 2 of the states")
+    assert list(rounding._set_aside(arm, [finding("rhs", 1.0, 1.0)])) == []
+
+
+@needs_c
+def test_only_states_next_to_lost_rank_or_singular_ones_are_set_aside() -> None:
+    crank = Subject("slider_crank")
+    theta = math.pi / 2 + np.array([1e-9, 1e-5, 1e-2, 0.5, 0.8, 1.1, 1.4])
+    x = np.column_stack([theta, -2 * theta, *np.zeros((2, 7))])  # its second branch, which meets the first where theta = pi / 2
+    assert yardstick.smoothed(crank, "lam", np.zeros(7), x).tolist() == [True, True, *[False] * 5]
+    assert not yardstick.smoothed(crank, "J", np.zeros(7), x).any()
+    turning = Subject(attitude.free_body("angles"))
+    x = np.zeros((2, 6))
+    x[:, 1] = [math.pi / 2, math.pi / 2 - 1e-3]
+    where = rounding.States(np.zeros(2), x, np.zeros((2, 0)), np.zeros((2, 3)))
+    assert rounding.Measured(turning, "rhs", where).singular.tolist() == [True, False]
+
+
+def test_corrections_are_looked_at_beside_the_constraints(tied: Subject) -> None:
+    where = rounding.states(tied, 40)
+    off = rounding.beside(tied, where)
+    sizes = [np.abs(tied.evaluate("C", w.t, w.x)[:, 0]) for w in (where, off)]
+    assert sizes[0].max() < 1e-12 and np.median(sizes[1][1::2]) > 1e-5 and (sizes[1][::2] == sizes[0][::2]).all()
+    measured = rounding.Measured(tied, "position_correction", off)
+    values = tied.evaluate("position_correction", off.t, off.x)
+    assert measured.compared(values).verdict == PASS and measured.compared(values * (1 + 1e-9)).verdict == FAIL
 
 
 @needs_c
@@ -188,6 +253,12 @@ def test_end_that_depends_on_the_first_step_is_found(double: Subject, monkeypatc
     assert verdicts(rows)[:2] == [FAIL, FAIL]
 
 
+@pytest.mark.parametrize("first", [1e-300, 5e-324, 1e9])
+def test_first_steps_that_cannot_be_are_mended_without_c_too(double: Subject, first: float) -> None:
+    usual, odd = (double.module.simulate((0, 1), method="DOP853", rtol=1e-8, **given) for given in ({}, {"first_step": first}))
+    assert odd.success and odd.n_steps < usual.n_steps + 60 and np.allclose(odd.x[-1], usual.x[-1], rtol=0, atol=1e-6)
+
+
 @needs_c
 def test_denormals_that_matter_are_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
     def jump(sol: Any, arguments: tuple, options: dict) -> None:
@@ -265,6 +336,90 @@ def test_wrong_motions_are_found(home: Any, name: str, monkeypatch: pytest.Monke
     if hasattr(home, "local_error"):  # that errors of steps are measured rightly leaves the end wrong
         monkeypatch.setattr(home, "local_error", lambda *given: 1e-15)
     assert FAIL in verdicts(getattr(home, name)(True))
+
+
+class Branching(Subject):
+    """A mechanism whose second coordinate goes another way at the end."""
+
+    def run(self, *arguments: Any, **options: Any) -> Any:
+        sol = super().run(*arguments, **options)
+        sol.x[-1, 1] += 1e-3
+        return sol
+
+
+@pytest.mark.parametrize("wrong", [Leaky, Branching])
+@needs_c
+def test_wrong_motions_past_singular_positions_are_found(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(singular, "Subject", wrong)
+    energy, branch = islice(singular.configurations(True), 2)
+    assert energy.verdict == FAIL and "energy" in energy.done
+    # All of a motion larger by the same factor stays on the branch phi = -2 theta.
+    assert branch.verdict == (FAIL if wrong is Branching else PASS) and "branch" in branch.done
+    others = islice(singular._stretched(), 1) if wrong is Branching else singular._four_bar(True)
+    assert verdicts(others) == [FAIL]
+
+
+def test_stops_and_refusals_at_singular_positions_must_name_the_culprit() -> None:
+    class Lost(Stopped):
+        message = "arm: stopped at t = 0.5: the rank falls to 1; the state there: q1 = 0"
+
+    assert singular._named("singular positions", "arm", "", Lost, ("rank",)).verdict == "degrade"
+    for message in ("the rank falls to 1; the state there: q1 = 0", "stopped at t = 0.5: the rank falls to 1",
+                    "stopped at t = 0.5: it went wrong; the state there: q1 = 0"):
+        Lost.message = message
+        assert singular._named("singular positions", "arm", "", Lost, ("rank",)).verdict == FAIL
+
+    def refuses(message: str) -> Any:
+        raise sd.SymdynError(message)
+
+    assert singular._refused("massless", "tip", lambda: refuses("joint wrist has no mass"), ("wrist",)).verdict == "degrade"
+    assert singular._refused("massless", "tip", lambda: refuses("it went wrong"), ("wrist",)).verdict == FAIL
+    moves = type("Sol", (Stopped,), {"success": True, "module": type("Module", (), {"name": "arm"})})
+    assert "as if nothing were wrong" in singular._refused("massless", "tip", lambda: moves, ("wrist",)).why
+
+
+@needs_c
+def test_redundant_constraints_that_change_something_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Off(Leaky):
+        def evaluate(self, name: str, *given: Any, **options: Any) -> np.ndarray:
+            values = super().evaluate(name, *given, **options)
+            return values * (1 + 1e-11) if name == "rhs" else values
+
+    monkeypatch.setattr(singular, "Subject", Off)
+    accelerations, energy = islice(singular.redundant(True), 2)
+    assert (accelerations.verdict, energy.verdict) == (FAIL, FAIL) and accelerations.figure < 1e-10
+
+
+@pytest.mark.parametrize(("change", "told"), [({"success": True}, "it does not stop"), ({"message": "stopped at t = 0.5: a value "
+                                              "is not finite; the state there: x = 1, x_dot = 0"}, "does not name gust")])
+@needs_c
+def test_failing_forces_that_are_not_told_are_found(change: dict[str, Any], told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Silent(Subject):
+        def run(self, *arguments: Any, **options: Any) -> Any:
+            sol = super().run(*arguments, **options)
+            for name, value in change.items():
+                setattr(sol, name, value)
+            return sol
+
+    monkeypatch.setattr(singular, "Subject", Silent)
+    rows = list(islice(singular.user_forces(True), 2))
+    assert [row.verdict for row in rows] == [FAIL, FAIL] and all(told in row.why for row in rows)
+
+
+@needs_c
+def test_long_chains_find_noise_and_leaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Noisy(Leaky):
+        calls = 0
+
+        def evaluate(self, name: str, *given: Any, **options: Any) -> np.ndarray:
+            values = super().evaluate(name, *given, **options)
+            Noisy.calls += name == "rhs"
+            # After what the bound is made of: the last values are those that are judged.
+            return values * (1 + 1e-6) if name == "rhs" and Noisy.calls > 1 + rounding.TRIALS else values
+
+    monkeypatch.setattr(chains, "Subject", Noisy)
+    accelerations, energy = chains.long_chains(True)
+    assert accelerations.verdict == FAIL and energy.verdict == FAIL
 
 
 def test_lost_digits_at_gimbal_lock_must_be_told() -> None:

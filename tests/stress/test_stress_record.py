@@ -12,7 +12,7 @@ import pytest
 import symdyn as sd
 from symdyn.cli import main
 from symdyn.stress import run as stress_run
-from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, StressReport, within
+from symdyn.stress.record import DEGRADE, FAIL, LEGEND, PASS, NotApplicable, Row, StressReport, within
 
 
 def row(verdict: str = PASS, check: str = "energy") -> Row:
@@ -51,6 +51,25 @@ def test_numbers_that_json_lacks_are_text(tmp_path: Path) -> None:
     endless = Row("a", "b", "c", float("inf"), 1.0, "", FAIL, "d")
     text = StressReport([endless]).save(tmp_path / "s.json").read_text(encoding="utf-8")
     assert json.loads(text, parse_constant=lambda name: pytest.fail(name))["rows"][0]["figure"] == "inf"
+
+
+def test_page_folds_what_passes_and_tells_what_verdicts_mean(tmp_path: Path) -> None:
+    report = StressReport([row(), row(check="units"), row(DEGRADE), row(FAIL)])
+    page = report.save(tmp_path / "s.html").read_text(encoding="utf-8")
+    assert page.index("fail: 1</h2>") < page.index("degrade: 1</h2>") < page.index("pass: 2</h2>")
+    assert page.count("<details>") == 2 and "<summary>units: 1</summary>" in page
+    for verdict, meaning in LEGEND.items():
+        assert meaning in page and f"{verdict}: " in report.table()
+
+
+def test_parameters_without_numbers_are_told() -> None:
+    bare = sd.System("bare", gravity=[0, -9.81])
+    q, m = sd.coordinates("q"), sd.parameters("m")
+    bare.add_joint(sd.Revolute("hinge", bare.ground, bare.add_body("rod", mass=m, com=[1, 0]), q))
+    report = sd.stress(bare, short=True, checks=["rounding", "energy"])
+    (told,) = report.rows
+    assert told.verdict == DEGRADE and "m without a number" in told.done and "`defaults`" in told.why
+    assert report.left_out == ["rounding, bare: m without a number", "energy, bare: m without a number"]
 
 
 def test_unknown_check_is_told_with_near_ones() -> None:
