@@ -1,4 +1,5 @@
-"""Measurements, as commands: `python -m symdyn.bench`. They are not tests; times depend on the machine.
+"""Measurements, as commands: `symdyn bench`, and its words such as `symdyn bench figures` (see symdyn.cli.measurements). They are
+not tests; times depend on the machine.
 
 `symdyn.bench` is a package and, called, the function `symdyn.bench.work.bench`.
 """

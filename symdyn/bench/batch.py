@@ -1,4 +1,4 @@
-"""Many states at once beside one after the other, and beside Pinocchio: `python -m symdyn.bench.batch` prints the table.
+"""Many states at once beside one after the other, and beside Pinocchio: `symdyn bench batch`.
 
 All figures of one line come from one run; the contestants take turns, and of each the best timing counts.
 """
@@ -113,10 +113,9 @@ def pendulums() -> Iterator[Figure]:
     yield "double_pendulum: the bits of one motion", float(same), "", ">= 1"
 
 
-def main(groups: Sequence[Callable[[], Iterator[Figure]]] = (chain, pendulums)) -> int:
-    """Print every figure; returns the number of those that miss their bound."""
-    return print_figures(groups)
+GROUPS = (chain, pendulums)
 
 
-if __name__ == "__main__":
-    main()
+def run(only: Sequence[str] | None = None) -> int:
+    """Print the figures, or those of some groups; returns the number of those that miss their bound."""
+    return print_figures(GROUPS, only)

@@ -1,4 +1,4 @@
-"""`python -m symdyn.bench.cost_model`: measures the candidates of many systems and fits the constants of symdyn.choice.
+"""`symdyn bench costs`: measures the candidates of many systems and fits the constants of symdyn.choice.
 
 Several cost models are compared by what they lose where they were not fitted: each family of systems (all lengths of a
 chain, all random trees, ...) is predicted with constants from the others. A loss is the measured time of the candidate that
@@ -7,7 +7,6 @@ is predicted to be the fastest, over that of the fastest, minus 1.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,7 +17,16 @@ from scipy.optimize import nnls
 from symdyn.bench.peers.models import turbine_tree
 from symdyn.bench.random_tree import random_tree
 from symdyn.bench.side_by_side import times_side_by_side
-from symdyn.choice import COSTS, HEADING, Candidate, Derived, derived_in_frames, terms
+from symdyn.choice import (
+    COSTS,
+    HEADING,
+    Candidate,
+    Derived,
+    derived_in_frames,
+    factorizing_instructions,
+    solving_instructions,
+    terms,
+)
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.recursion import recursive
 from symdyn.model.system import System
@@ -110,8 +118,17 @@ def measure(name: str, system: System, repeats: int) -> list[Sample]:
     model = system.check()
     derived = [*derived_in_frames(embed, model), *derived_in_frames(recursive, model)]
     times = times_side_by_side([d.equations for d in derived], repeats)
-    return [Sample(name, d.candidate(t), {**terms(d.tape, d.run), **further_terms(d)}, t * 1e9)
+    solved = {"speeds": len(model.speeds), "solving": factorizing_instructions(model) + solving_instructions(model)}
+    return [Sample(name, d.candidate(t), {**terms(d.tape, d.run), **further_terms(d), **solved}, t * 1e9)
             for d, t in zip(derived, times, strict=True)]
+
+
+def forming(samples: Sequence[Sample]) -> list[float]:
+    """Instructions of forces and mass matrix, without factorizing and solving, over those of the recursion in the same frames,
+    of systems with more than two speeds."""
+    by = {(s.system, s.candidate.formulation, s.candidate.frames): s.terms for s in samples if s.terms["speeds"] > 2}
+    return [(found["instructions"] - found["solving"]) / by[system, "recursive", frames]["instructions"]
+            for (system, formulation, frames), found in by.items() if formulation == "embedding"]
 
 
 def further_terms(derived: Derived) -> dict[str, float]:
@@ -148,14 +165,16 @@ def print_system(samples: Sequence[Sample]) -> None:
         print(f"  {replace(sample.candidate, chosen=sample is chosen)}", flush=True)
 
 
-def run(repeats: int) -> int:
-    """Measure, print every system, what each model loses, its constants, and what the constants in use lose."""
+def run(repeats: int = 40) -> int:
+    """Measure, print every system, what each model loses, its constants, and what the constants in use lose; returns 0."""
     samples: list[Sample] = []
     print(f"  {HEADING}")
     for name, make in systems().items():
         found = measure(name, make(), repeats)
         print_system(found)
         samples += found
+    ratios = forming(samples)
+    print(f"\nforces and mass matrix take {min(ratios):.2f} to {max(ratios):.2f} of the instructions of the recursion")
     print("\nlosses where not fitted, and constants fitted to all systems, ns:")
     for title, names in MODELS.items():
         constants = ", ".join(f"{name} {cost:.3g}" for name, cost in fit(samples, names).items())
@@ -163,15 +182,3 @@ def run(repeats: int) -> int:
     print(f"\nwith the constants in symdyn.choice, {', '.join(f'{name} {cost:.3g}' for name, cost in COSTS.items())}:\n"
           f"  {Regret.of(samples, [predict(s, COSTS) for s in samples])}")
     return 0
-
-
-def main() -> int:
-    """`python -m symdyn.bench.cost_model`."""
-    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.cost_model", description=__doc__)
-    parser.add_argument("--repeats", metavar="N", type=int, default=40, help="timings of each candidate, of which the best "
-                        "counts (default: 40)")
-    return run(parser.parse_args().repeats)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,15 +1,13 @@
 """Motions at more digits than floats have, from the same tape as the generated code: yardsticks for `symdyn bench loops`.
 
-`python -m symdyn.bench.extended andrews_squeezer` makes the end of a motion anew, at two tolerances, and stores the digits in
+`symdyn bench extended andrews_squeezer` makes the end of a motion anew, at two tolerances, and stores the digits in
 extended.json beside this module.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
-import sys
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ SPARE = 12
 _ROUNDS = 8
 HOW = ("Gragg-Bulirsch-Stoer extrapolation of the accelerations on the tape with mpmath, projected onto the constraints after "
        "every step; parameters and start are the catalogue's decimal numbers, the start projected; made by "
-       "python -m symdyn.bench.extended")
+       "symdyn bench extended")
 
 
 @dataclass(frozen=True)
@@ -178,28 +176,21 @@ def store(name: str, made: Mapping[str, Any]) -> None:
     STORE.write_text(text + "\n", encoding="utf-8")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command."""
-    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.extended", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("systems", metavar="NAME", nargs="+",
-                        help="of the catalogue, or a variant such as 'flyball_governor(rods)'")
-    parser.add_argument("--t", metavar="END", type=float, help="s (default: the system's duration, which is the published one)")
-    parser.add_argument("--digits", type=int, default=DIGITS, help=f"of the local errors (default: {DIGITS})")
-    parser.add_argument("--print", action="store_true", help="print only, store nothing")
-    given = parser.parse_args(arguments)
-    for name in given.systems:
+def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, print_only: bool = False) -> int:
+    """Make the ends of motions anew, print them and, unless `print_only`, store them; returns 0.
+
+    names   of the catalogue, or variants such as "flyball_governor(rods)"
+    end     s (default: the system's duration, which is the published one)
+    digits  of the local errors
+    """
+    for name, system in [(name, CASES[name].system() if name in CASES else get(name)) for name in names]:
         begun = clock.perf_counter()
-        system = CASES[name].system() if name in CASES else get(name)
-        made = record(system.equations(), given.t or system.duration, given.digits)
+        made = record(system.equations(), end or system.duration, digits)
         print(f"{name} at t = {made['t']:g} s: {made['digits']} digits, runs of tolerance {' and '.join(made['tolerances'])} "
               f"differ by {made['runs_differ_by']:.2g}; {made['steps']} steps, {made['evaluations']} evaluations, "
               f"{clock.perf_counter() - begun:.0f} s")
         for what in ("q", "q_dot", "q_ddot", "lambda"):
             print(f"  {what}: {', '.join(made[what])}")
-        if not given.print:
+        if not print_only:
             store(name, made)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -12,6 +12,7 @@ import numpy as np
 
 from symdyn.bench.kernel import evaluation_times
 from symdyn.bench.random_tree import random_tree
+from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.pipeline import emit, function_tape
@@ -129,8 +130,14 @@ def picture(rows: Sequence[Growth], path: Path) -> None:
     figure.savefig(path, dpi=120)
 
 
-def run(sizes: Sequence[int], folder: Path) -> int:
-    """Print the table, write growth.json and growth.png into the folder."""
+def run(sizes: Sequence[int] | None = None, folder: Path | None = None) -> int:
+    """Print the table, write growth.json and growth.png into the folder (default: generated/growth); returns 0.
+
+    Raises ArgumentError unless sizes are numbers of bodies.
+    """
+    sizes, folder = sizes or SIZES, folder or Path("generated") / "growth"
+    if any(n < 1 for n in sizes):
+        raise ArgumentError(f"--sizes takes numbers of bodies, 1 or more; found {' '.join(map(str, sizes))}")
     rows: list[Growth] = []
     print(HEADING)
     for row in grow(sizes=sizes):

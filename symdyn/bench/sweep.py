@@ -1,8 +1,7 @@
-"""`python -m symdyn.bench.sweep`: a sweep of a million short motions: rate, memory, and a run that is killed and goes on."""
+"""`symdyn bench sweep`: a sweep of a million short motions: rate, memory, and a run that is killed and goes on."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import signal
@@ -11,6 +10,8 @@ import sys
 import tempfile
 import time as clock
 from pathlib import Path
+
+from symdyn.errors import ArgumentError, SymdynError
 
 SWEEP = """
 system = "double_pendulum"
@@ -42,17 +43,19 @@ def measured(folder: Path, count: int, out: str) -> tuple[float, float, float]:
     run = start(folder, count, out)
     _, status, used = os.wait4(run.pid, 0)
     if status:
-        raise SystemExit(f"the sweep ended with status {status}")
+        raise SymdynError(f"the sweep of {count} motions ended with status {status}; what it said is above")
     return clock.perf_counter() - begun, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
-def main() -> int:
-    """Measure and print; returns 0 if the killed run ended with the same file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, help="of the moment of the kill (default: another one every time)")
-    arguments = parser.parse_args()
-    count = arguments.count
+def run(count: int = 1_000_000, seed: int | None = None) -> int:
+    """Measure and print; returns 0 if the killed run ended with the same file.
+
+    count   of motions, besides a tenth as many
+    seed    of the moment of the kill (default: another one every time)
+    Raises ArgumentError for less than 10 motions, SymdynError if a sweep fails.
+    """
+    if count < 10:
+        raise ArgumentError(f"{count} motions were asked for; pass 10 or more")
     with tempfile.TemporaryDirectory(prefix="symdyn-bench-") as name:
         folder = Path(name)
         start(folder, 2000, "first").communicate()  # derives and compiles
@@ -61,18 +64,14 @@ def main() -> int:
             size = (folder / f"whole{n}" / "ensemble.npz").stat().st_size / 2**20
             print(f"{n} motions of 1 s: {seconds:.1f} s, {n / seconds:.0f} a second, processor {used:.1f} s, "
                   f"memory {memory:.0f} MB, file {size:.1f} MB", flush=True)
-        moment = random.Random(arguments.seed).uniform(0.1, 0.9) * seconds
-        run = start(folder, count, "killed")
+        moment = random.Random(seed).uniform(0.1, 0.9) * seconds
+        killed = start(folder, count, "killed")
         clock.sleep(moment)
-        run.send_signal(signal.SIGKILL)
-        run.wait()
+        killed.send_signal(signal.SIGKILL)
+        killed.wait()
         kept = len(list((folder / "killed" / "chunks").glob("0*.npz")))
         told, _ = start(folder, count, "killed", "--resume").communicate()
         same = (folder / "killed" / "ensemble.npz").read_bytes() == (folder / f"whole{count}" / "ensemble.npz").read_bytes()
         print(f"killed after {moment:.1f} s with {kept} chunks done; gone on: {told.splitlines()[0]}")
         print("the file is the same, to the byte" if same else "THE FILE DIFFERS")
     return 0 if same else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

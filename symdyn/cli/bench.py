@@ -1,12 +1,14 @@
-"""`symdyn bench`: measures symdyn."""
+"""`symdyn bench` with mechanisms: work against error."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from symdyn.cli.measurements import MEASUREMENTS
 from symdyn.cli.messages import FAILED, Stop
 
 if TYPE_CHECKING:
@@ -17,7 +19,23 @@ def work(arguments: argparse.Namespace) -> int:
     """Measure what motions cost at every accuracy."""
     from symdyn.bench.work.command import run
 
+    _look_for_words(arguments.systems)
     return FAILED if run(arguments, from_file) else 0
+
+
+def _look_for_words(names: Sequence[str]) -> None:
+    """Raises Stop for a name that was meant for a measurement of its own."""
+    import difflib
+
+    from symdyn.bench.work.cases import known
+
+    for name in names:
+        if name in MEASUREMENTS:
+            raise Stop(f"{name} is a measurement of its own, which comes first and alone: symdyn bench {name}")
+        near = [] if name in known() else difflib.get_close_matches(name, [*known(), *MEASUREMENTS], 3)
+        if any(word in MEASUREMENTS for word in near):
+            raise Stop(f"there is no mechanism and no measurement {name!r}; did you mean symdyn bench {' or '.join(near)}? "
+                       "symdyn bench --help lists measurements, symdyn list mechanisms")
 
 
 def from_file(path: Path, end: float | None) -> Subject:
@@ -30,26 +48,3 @@ def from_file(path: Path, end: float | None) -> Subject:
     with contextlib.suppress(Stop):  # it has no such option
         systems["parameters"] = userfile.from_file(path, {"orientation": "parameters"})
     return Subject(file_name(path.stem), systems, float(end or systems[""].duration))
-
-
-def peers(arguments: argparse.Namespace) -> int:
-    """Measure symdyn beside its peers; a missed bound is a failure."""
-    from symdyn.bench.peers.command import run
-
-    return FAILED if run(arguments.models, arguments.repeats, arguments.json) else 0
-
-
-def growth(arguments: argparse.Namespace) -> int:
-    """Measure how everything grows with the number of bodies."""
-    from symdyn.bench import growth as measured
-
-    if any(n < 1 for n in arguments.sizes or ()):
-        raise Stop(f"--sizes takes numbers of bodies, 1 or more; found {' '.join(map(str, arguments.sizes))}")
-    return measured.run(arguments.sizes or measured.SIZES, arguments.output or Path("generated") / "growth")
-
-
-def loops(arguments: argparse.Namespace) -> int:
-    """Measure mechanisms with loops beside what is known of them; a missed bound is a failure."""
-    from symdyn.bench.loops import run
-
-    return FAILED if run(arguments.systems, arguments.repeats, arguments.json) else 0

@@ -15,14 +15,12 @@ from symdyn.cli.derive import READABLE, derive
 from symdyn.cli.diagnose import diagnose
 from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
+from symdyn.cli.measurements import MEASUREMENTS, overview
 from symdyn.cli.report import report
 from symdyn.cli.simulate import simulate
 from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
 from symdyn.cli.values import stabilization
-
-# What `symdyn bench` measures under a word of its own.
-_MEASUREMENTS = ("peers", "loops", "growth")
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -165,15 +163,15 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
 def joined(argv: Sequence[str]) -> list[str]:
     """The arguments with `bench peers` and the like as one word: a command of its own beside `bench`, which takes names."""
     words = list(argv)
-    return [" ".join(words[:2]), *words[2:]] if words[:1] == ["bench"] and words[1:2] and words[1] in _MEASUREMENTS else words
+    return [" ".join(words[:2]), *words[2:]] if words[:1] == ["bench"] and words[1:2] and words[1] in MEASUREMENTS else words
 
 
 def _add_bench(commands: Any) -> None:
     text = "what motions cost at every accuracy: time, evaluations and operations against the error"
-    work = commands.add_parser("bench", help=f"{text}; also {', '.join(_MEASUREMENTS)}", description=(
-        f"Measure {text}, for formulations, methods and tolerances, against references of more digits. `symdyn bench peers` "
-        "(accelerations beside Pinocchio and CasADi), `loops` (constraints beside published motions) and `growth` (what more "
-        "bodies cost) are measurements of their own."))
+    work = commands.add_parser("bench", help=f"{text}; also {', '.join(MEASUREMENTS)}",
+                               formatter_class=argparse.RawDescriptionHelpFormatter,
+                               description=f"Measure {text},\nfor formulations, methods and tolerances, against references of "
+                               f"more digits. Measurements of their own:\n\n{overview()}")
     work.set_defaults(run=bench.work)
     work.add_argument("systems", metavar="NAME", nargs="*", help="a system of the catalogue, with its first option such as "
                       "'n_link_pendulum(5)', one of lagrange_top, heavy_top, torque_free_body, or a Python file that defines "
@@ -186,33 +184,21 @@ def _add_bench(commands: Any) -> None:
         work.add_argument(flag, metavar="NAME", nargs="+", help=what)
     for flag, metavar, what in (("--rtol", "TOLERANCE", "tolerances, relative and absolute (default: 1e-3 to 1e-15)"),
                                 ("--steps", "STEP", "s, for gauss, whose steps have one length, besides the tolerances"),
-                                ("--at", "TIME", "s, times besides the end at which errors are told")):
+                                ("--at", "TIME", "s, times besides the end at which errors are told; runs that end there are "
+                                 "timed alone")):
         work.add_argument(flag, metavar=metavar, nargs="+", type=float, help=what)
+    work.add_argument("--per-decade", metavar="N", type=int, default=1, help="tolerances to a decade (default: 1); with more "
+                      "the least time below an error is told more sharply")
     work.add_argument("--end", metavar="TIME", type=float, help="s (default: the system's duration)")
     work.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the median counts (default: 5)")
     work.add_argument("--budget", metavar="SECONDS", type=float, help="begin no run after this time; the same command goes on")
     work.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(work, "generated/bench; what an unfinished run left there is gone on with")
-    text = "accelerations of the same mechanisms beside Pinocchio and CasADi's C code, in one run"
-    peers = commands.add_parser("bench peers", prog="symdyn bench peers", description=text)
-    peers.set_defaults(run=bench.peers)
-    peers.add_argument("--models", metavar="NAME", nargs="+", help="some of the mechanisms, such as spatial_chain or "
-                        "'spatial_chain(7)' (default: all)")
-    peers.add_argument("--repeats", metavar="N", type=int, default=40, help="timings of each contestant, of which the best "
-                        "counts (default: 40)")
-    peers.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
-    text = "how operations, derivation, compilation and run time grow with the number of bodies: table and picture"
-    growth = commands.add_parser("bench growth", prog="symdyn bench growth", description=text)
-    growth.set_defaults(run=bench.growth)
-    growth.add_argument("--sizes", metavar="N", nargs="+", type=int, help="numbers of bodies (default: 2 to 100)")
-    _add_output(growth)
-    text = "mechanisms with loops beside published motions and closed forms: errors, energy, constraints, run time"
-    loops = commands.add_parser("bench loops", prog="symdyn bench loops", description=text)
-    loops.set_defaults(run=bench.loops)
-    loops.add_argument("--systems", metavar="NAME", nargs="+", help="some of the mechanisms, such as andrews_squeezer or "
-                       "'n_four_bar(2)' (default: all)")
-    loops.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the median counts (default: 5)")
-    loops.add_argument("--json", metavar="FILE", type=Path, help="write everything that was measured into a file")
+    for word, measurement in MEASUREMENTS.items():
+        sub = commands.add_parser(f"bench {word}", prog=f"symdyn bench {word}", description=measurement.text)
+        sub.set_defaults(run=measurement.run)
+        for option in measurement.options:
+            option.add(sub)
 
 
 def _add_stress(parser: argparse.ArgumentParser) -> None:

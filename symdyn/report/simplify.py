@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time as clock
 from typing import Any
 
@@ -98,8 +99,11 @@ def _collected(e: sp.Expr) -> dict[sp.Expr, sp.Expr]:
     return {factor: sp.Add(*parts) for factor, parts in terms.items()}
 
 
+@functools.lru_cache(maxsize=1000)
 def _general(e: sp.Expr) -> sp.Expr:
-    """SymPy's own search, in which sums of angles take nearly all of the time; without products of sines there are none."""
+    """SymPy's own search, in which sums of angles take nearly all of the time; without products of sines there are none.
+
+    Equations of one mechanism repeat each other's parts: forms, links, quantities. What was found is kept, as SymPy does."""
     if sp.count_ops(e) > _SHORT:
         return e
     if _degree(e) > 1:

@@ -39,6 +39,14 @@ def test_a_family_is_predicted_from_the_others() -> None:
     assert cross_validated(samples, ["work"]).error == pytest.approx(((2 * 1 + 2 * 0.25) / 4) ** 0.5)
 
 
+def test_what_the_mass_matrix_takes_besides_its_factors() -> None:
+    forms = [(formulation, frames) for formulation in ("embedding", "recursive") for frames in ("body", "parallel")]
+    counts = dict(zip(forms, (40, 30, 20, 10), strict=True))
+    samples = [Sample(system, Candidate(*form, 0, 0, 0, 0.0), {"instructions": n, "solving": 10, "speeds": speeds}, 1.0)
+               for system, speeds in (("long", 3), ("short", 2)) for form, n in counts.items()]
+    assert cost_model.forming(samples) == [(40 - 10) / 20, (30 - 10) / 10]
+
+
 def test_systems_have_names_of_their_own_and_models_are_nested() -> None:
     assert len(cost_model.systems()) == 40
     assert cost_model.MODELS["cycles, decoding"] == tuple(COSTS)

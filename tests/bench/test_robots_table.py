@@ -1,10 +1,11 @@
-"""`python -m symdyn.bench.robots`: a table, and what is told where there is none."""
+"""`symdyn bench robots`: a table, and what is told where there is none."""
 
 from __future__ import annotations
 
 import pytest
 
-from symdyn.bench.robots import collection, command
+from symdyn.bench.robots import collection
+from symdyn.cli import main
 from symdyn.errors import MissingExtra
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
@@ -16,7 +17,7 @@ def test_a_row(capsys: pytest.CaptureFixture[str]) -> None:
         collection.folder()
     except MissingExtra as error:
         pytest.skip(str(error))
-    assert command.main(["double_pend*_simple", "--no-times", "--states", "2"]) == 0
+    assert main(["bench", "robots", "--only", "double_pend*_simple", "--no-times", "--states", "2"]) == 0
     heading, row, *rest = capsys.readouterr().out.splitlines()
     found = dict(zip(heading.split()[:3], row.split(), strict=False))
     assert found == {"robot": "double_pendulum_simple", "n_u": "2", "links": "4"}
@@ -26,8 +27,10 @@ def test_a_row(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_what_is_not_there(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    assert command.main(["nobody"]) == 2
+    assert main(["bench", "robots", "--only", "nobody"]) == 2
     assert "no robot is named nobody; there are double_pendulum, " in capsys.readouterr().err
+    assert main(["bench", "robots", "--states", "0"]) == 2
+    assert "0 states were asked for; pass 1 or more" in capsys.readouterr().err
     monkeypatch.setattr(collection, "_SHARED", collection._SHARED / "none")
-    assert command.main(["panda"]) == 2
+    assert main(["bench", "robots", "--only", "panda"]) == 1
     assert "the robots are not installed; run: pip install example-robot-data" in capsys.readouterr().err

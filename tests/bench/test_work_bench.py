@@ -9,12 +9,13 @@ import pytest
 import symdyn as sd
 from symdyn.bench.work import against, benchmark, picture
 from symdyn.bench.work.against.peer import Unfit
-from symdyn.bench.work.asked import checked
+from symdyn.bench.work.asked import checked, grid
 from symdyn.bench.work.benchmark import Benchmark, _spread, run
 from symdyn.bench.work.cases import CASES, from_maker, subject
 from symdyn.bench.work.picture import COLORS, styles_of
 from symdyn.bench.work.record import Reference, Row
 from symdyn.bench.work.subject import Subject
+from symdyn.bench.work.timing import Timing
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
 
@@ -63,6 +64,43 @@ def test_the_best_below_an_error(measured):
     assert result.best(1.0, at=0.4).error_at(result.index(0.4)) <= 1.0
     with pytest.raises(ArgumentError, match=r"errors are known at t = 0.2, 0.4, .*, not at 0.3"):
         result.index(0.3)
+
+
+def test_runs_until_an_earlier_time_are_timed_alone(measured):
+    result, _ = measured
+    early = result.index(0.4)
+    for row in result.rows:
+        assert 0 < row.evaluations_at(early) < row.evaluations == row.evaluations_at(None)
+        assert row.time_at(early) > 0 and row.time_at(None) == row.time == row.time_at(len(row.errors) - 1)
+        assert math.isnan(row.time_at(early - 1)) and math.isnan(row.time_at(99)) and row.evaluations_at(99) == 0
+    good = [r for r in result.rows if r.error_at(early) <= 1e-6]
+    assert result.best(1e-6, at=0.4) is min(good, key=lambda r: r.time_at(early))
+
+
+def test_repeats_are_spread_over_passes_and_the_least_time_counts_where_they_differ():
+    took = iter([3.0, 1.0, 1.1, 1.2, 9.0, 9.0])
+    timing, row = Timing(), Row("a", "b", 1e-6, errors=(0.1, 0.2))
+    timing.add(1, lambda: (next(took), 7), 3)
+    assert timing.told(row, 2).repeats == 1 and timing.told(row, 2).time == 3.0
+    assert timing.again(row, 3).repeats == 1  # a run of over ENOUGH seconds is not made again
+    quick = iter([0.5, 0.1, 0.11, 0.12, 0.1])
+    timing = Timing()
+    timing.add(1, lambda: (next(quick), 7), 3)
+    twice = timing.again(timing.again(row, 3), 3)
+    assert (twice.seconds, twice.least, twice.time, twice.repeats, twice.evaluations) == (0.11, 0.1, 0.11, 3, 7)
+    assert twice.time_at(1) == 0.11 and math.isnan(twice.time_at(0))
+
+
+def test_more_tolerances_to_a_decade_begin_looser():
+    assert [f"{v:.0e}" for v in grid(1)] == [f"{10.0**-k:.0e}" for k in range(3, 16)]
+    dense = grid(4)
+    assert len(dense) == 57 and dense[0] == 0.1 and math.isclose(dense[1] / dense[2], 10**0.25) and math.isclose(dense[-1], 1e-15)
+    about = subject("pendulum", end=2.0)
+    assert len(checked([about], per_decade=4).tolerances) == 57
+    with pytest.raises(ArgumentError, match="0 tolerances to a decade were asked for; pass a number from 1 to 10"):
+        checked([about], per_decade=0)
+    with pytest.raises(ArgumentError, match="tolerances are named and 4 to a decade are asked for; pass one of both"):
+        checked([about], tolerances=[1e-4], per_decade=4)
 
 
 def test_table_tells_all(measured):
@@ -133,7 +171,7 @@ def test_other_work_on_the_machine_is_told():
     quiet, busy = Row("a", "b", 1e-6, seconds=1.2, least=1.0, repeats=5), Row("a", "b", 1e-6, seconds=3.0, least=1.0, repeats=5)
     assert (quiet.disturbed, quiet.time) == (False, 1.2) and (busy.disturbed, busy.time) == (True, 1.0)
     text = Benchmark("a", 1.0, [quiet, busy], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).table()
-    assert "of 1 of 2 rows the median is over 1.5 times the least time" in text and "1000*" in text
+    assert "of 1 of 2 rows the median is over 1.25 times the least time" in text and "1000*" in text
 
 
 def test_a_coarse_grid_comes_first():

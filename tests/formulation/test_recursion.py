@@ -24,6 +24,15 @@ def derived(seed: int, formulation: str, frames: str) -> MotionEquations:
     return equations
 
 
+@lru_cache
+def expected(seed: int, state: int, *names: str) -> tuple[dict[str, Any], list[Any]]:
+    """A state of a random tree, and what the embedding in body frames gives there; all forms are compared with it."""
+    reference = derived(seed, "embedding", "body")
+    values = helpers.state(reference, state)
+    values |= {f"{u.name}_dot": 0.1 * k for k, u in enumerate(reference.symbols.speeds)}
+    return values, helpers.quantities(reference, values, *names)
+
+
 def same(a: Any, b: Any) -> bool:
     return helpers.close(a, b, 1e-22)
 
@@ -31,23 +40,18 @@ def same(a: Any, b: Any) -> bool:
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_trees(seed: int, form: tuple[str, str]) -> None:
-    reference, equations = derived(seed, "embedding", "body"), derived(seed, *form)
-    values = helpers.state(reference, 3)
-    values |= {f"{u.name}_dot": 0.1 * k for k, u in enumerate(reference.symbols.speeds)}
     names = ("accelerations", "inverse_dynamics", "M_tilde", "k_tilde", "F_tilde", "energy", "positions")
-    for name, a, b in zip(names, helpers.quantities(equations, values, *names), helpers.quantities(reference, values, *names),
-                          strict=True):
+    values, wanted = expected(seed, 3, *names)
+    for name, a, b in zip(names, helpers.quantities(derived(seed, *form), values, *names), wanted, strict=True):
         assert same(a, b), name
 
 
 @pytest.mark.parametrize("form", FORMS, ids="-".join)
 @pytest.mark.parametrize("seed", [*SEEDS][:6])
 def test_jacobians_and_power(seed: int, form: tuple[str, str]) -> None:
-    reference, equations = derived(seed, "embedding", "body"), derived(seed, *form)
-    values = helpers.state(reference, 4)
     for name in ("jacobian_x", "jacobian_inputs", "power"):
-        a, b = (helpers.quantities(e, values, name)[0] for e in (equations, reference))
-        assert same(a, b), name
+        values, wanted = expected(seed, 4, name)
+        assert same(helpers.quantities(derived(seed, *form), values, name)[0], wanted[0]), name
 
 
 def test_joints_that_share_a_speed_keep_the_mass_matrix() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time as clock
 import warnings
@@ -19,7 +18,7 @@ from symdyn.bench.robots.agreement import NAMES, differences, random_states
 from symdyn.bench.robots.collection import ROBOTS, Listed, folder
 from symdyn.bench.robots.pinocchio_aba import PinocchioAba
 from symdyn.bench.robots.pinocchio_robot import PinocchioRobot
-from symdyn.errors import ModelWarning, SymdynError
+from symdyn.errors import ArgumentError, ModelWarning, SymdynError
 from symdyn.pipeline import function_tape
 from symdyn.urdf.read import read_urdf
 
@@ -97,24 +96,21 @@ def measure(robot: Listed, states: int = STATES, aba: PinocchioAba | None = None
                f"{equations.formulation}, {equations.frames}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; 1 if a robot could not be compared or differs by more than AGREEMENT, 2 if there is none."""
-    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.robots", description=__doc__)
-    parser.add_argument("robots", nargs="*", default=["*"], help="names, with * and ?; default: all")
-    parser.add_argument("--states", type=int, default=STATES, help=f"random states of each robot (default {STATES})")
-    parser.add_argument("--no-times", action="store_true", help="compile nothing")
-    options = parser.parse_args(arguments)
-    chosen = [r for r in ROBOTS if any(fnmatchcase(r.name, p) for p in options.robots)]
+def run(only: Sequence[str] | None = None, states: int = STATES, no_times: bool = False) -> int:
+    """Print the table; returns the number of robots that could not be compared or differ by more than AGREEMENT.
+
+    only       names, with * and ? (default: all)
+    states     random states of each robot;  no_times: compile nothing
+    Raises ArgumentError if no robot has such a name, MissingExtra if there are no robots.
+    """
+    chosen = [r for r in ROBOTS if any(fnmatchcase(r.name, p) for p in only or "*")]
     if not chosen:
-        print(f"no robot is named {', '.join(options.robots)}; there are {', '.join(r.name for r in ROBOTS)}", file=sys.stderr)
-        return 2
-    try:
-        folder()
-    except SymdynError as error:
-        print(error, file=sys.stderr)
-        return 2
+        raise ArgumentError(f"no robot is named {', '.join(only or ())}; there are {', '.join(r.name for r in ROBOTS)}")
+    if states < 1:
+        raise ArgumentError(f"{states} states were asked for; pass 1 or more")
+    folder()
     aba, failed = None, 0
-    if not options.no_times:
+    if not no_times:
         try:
             aba = PinocchioAba()
         except SymdynError as error:
@@ -122,15 +118,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(HEADING, flush=True)
     for robot in chosen:
         try:
-            row = measure(robot, options.states, aba, not options.no_times)
+            row = measure(robot, states, aba, not no_times)
         except SymdynError as error:
             failed += 1
             print(f"{robot.name:26}{error}", flush=True)
             continue
         print(row, flush=True)
         failed += not max(row.worst.values()) <= AGREEMENT
-    print(f"{len(chosen)} robots, {options.states} random states each; {failed} differ by more than {AGREEMENT:.0e} or failed.\n"
+    print(f"{len(chosen)} robots, {states} random states each; {failed} differ by more than {AGREEMENT:.0e} or failed.\n"
           "ops: + - * / sqrt sin cos, one each; ABA: Pinocchio's articulated bodies in C++, as it does them (it has none with\n"
           "joints that mimic). ratio: its time over symdyn's. tau M ud J com energy: norm of the difference over the norm, the\n"
           "worst state; ud divided by the condition number of M.")
-    return int(failed > 0)
+    return failed

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def bench(system: Any, formulations: Sequence[str] | None = None, methods: Sequence[str] | None = None,
           tolerances: Sequence[float] | None = None, steps: Sequence[float] | None = None, end: float | None = None,
           repeats: int = 5, against: Sequence[str] = (), budget: float | None = None, folder: Any = None,
-          progress: bool = False, at: Sequence[float] = ()) -> Benchmark:
+          progress: bool = False, at: Sequence[float] = (), per_decade: int = 1) -> Benchmark:
     """Measure what the motion of a mechanism costs at every accuracy.
 
     system         a System, equations such as those of sd.embedding, or a name of the catalogue, such as "double_pendulum" or
@@ -41,7 +41,9 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     budget         s after which no further run is begun; two thirds of it are for the runs, however long the reference takes
     folder         where results are written, after every run; what an unfinished run left there is gone on with
     progress       show a bar (needs tqdm)
-    at             times besides the end at which errors are of interest, s
+    at             times besides the end at which errors are of interest, s; runs that end there are timed alone
+    per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and tell the least time below an error more
+                   sharply
 
     Raises ArgumentError that lists everything that is wrong with what is asked for; SymdynError if nothing can be measured.
     """
@@ -52,7 +54,8 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     if end is not None and (isinstance(end, bool) or not isinstance(end, (int, float))):
         raise ArgumentError(f"the end is {end!r}; pass a time, s")
     subject = taken(system, end)
-    asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at)
+    asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at,
+                    per_decade)
     result = run(subject, asked, None if folder is None else as_path(folder, "of the folder", "generated/bench/arm"), progress)
     if folder is not None:
         result.save(folder)

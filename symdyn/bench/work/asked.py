@@ -12,8 +12,8 @@ from symdyn.bench.work import against, methods
 from symdyn.bench.work.subject import Subject
 from symdyn.errors import ArgumentError
 
-TOLERANCES = tuple(10.0**-k for k in range(3, 16))
-TIGHTEST = 1e-15
+# Of the usual grid, and the most to a decade.
+LOOSEST, TIGHTEST, DENSEST = 1e-3, 1e-15, 10
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class Asked:
 
 
 def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
-              steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = ()) -> list[str]:
+              steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (),
+              per_decade: Any = 1) -> list[str]:
     """Everything that is wrong with what is asked for, a sentence each."""
     known = list(dict.fromkeys(name for subject in subjects for name in subject.names))
     faults = [*_unknown(formulations, known, "formulation"), *_unknown(method_names, methods.names(), "method"),
@@ -50,8 +51,12 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
     for value in at or ():
         if not (_is_number(value) and 0 < value <= shortest):
             faults.append(f"the time {value!r} at which errors are asked for must lie within the motion, 0 to {shortest:g} s")
-    if not (isinstance(repeats, int) and not isinstance(repeats, bool) and repeats >= 1):
+    if not (_is_whole(repeats) and repeats >= 1):
         faults.append(f"{repeats!r} repeats were asked for; pass a number from 1 on")
+    if not (_is_whole(per_decade) and 1 <= per_decade <= DENSEST):
+        faults.append(f"{per_decade!r} tolerances to a decade were asked for; pass a number from 1 to {DENSEST}")
+    elif per_decade != 1 and tolerances:
+        faults.append(f"tolerances are named and {per_decade} to a decade are asked for; pass one of both")
     if budget is not None and not (_is_number(budget) and budget > 0):
         faults.append(f"the budget {budget!r} must be a positive number of seconds")
     for subject in subjects:
@@ -61,24 +66,35 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
 
 
 def checked(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
-            steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = ()) -> Asked:
+            steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (), per_decade: Any = 1) -> Asked:
     """What is asked for. Raises ArgumentError that lists everything that is wrong with it."""
     formulations, method_names, peers = _listed(formulations), _listed(method_names), _listed(peers)
     tolerances, steps, at = _listed(tolerances), _listed(steps), _listed(at)
-    faults = faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at)
+    faults = faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at, per_decade)
     if faults:
         raise ArgumentError("the bench cannot run: " + (faults[0] if len(faults) == 1 else
                                                         f"{len(faults)} faults:\n  - " + "\n  - ".join(faults)))
     once = lambda values: tuple(dict.fromkeys(values))
     return Asked(once(formulations) if formulations else None, once(method_names or methods.usual()),
-                 tuple(sorted({float(v) for v in tolerances or TOLERANCES}, reverse=True)),
+                 tuple(sorted({float(v) for v in tolerances or grid(per_decade)}, reverse=True)),
                  tuple(sorted({float(v) for v in steps}, reverse=True)) if steps else None, repeats, once(peers or ()),
                  budget, tuple(sorted({float(v) for v in at or ()})))
+
+
+def grid(per_decade: int) -> list[float]:
+    """The usual tolerances, so many to a decade; the denser ones begin looser, where the least time below a large error is."""
+    decades = -round(math.log10(LOOSEST)), -round(math.log10(TIGHTEST))
+    first = decades[0] if per_decade == 1 else decades[0] - 2
+    return [10.0**(-k / per_decade) for k in range(first * per_decade, decades[1] * per_decade + 1)]
 
 
 def _listed(values: Any) -> Any:
     """A single value as a list of one."""
     return [values] if isinstance(values, (str, int, float)) else None if values is None else list(values)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _is_number(value: Any) -> bool:

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
         faults.append(f"nothing is named; name mechanisms such as {', '.join(list(CASES)[:3])}, a Python file, or pass --all")
     options = {"formulations": arguments.formulations, "method_names": arguments.methods, "tolerances": arguments.rtol,
                "steps": arguments.steps, "repeats": arguments.repeats, "peers": arguments.against or (),
-               "budget": arguments.budget, "at": arguments.at or ()}
+               "budget": arguments.budget, "at": arguments.at or (), "per_decade": arguments.per_decade}
     try:
         asked = checked(subjects, **options)
     except ArgumentError as error:

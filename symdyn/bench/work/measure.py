@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import statistics
+import math
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,9 @@ import numpy as np
 from symdyn.bench.work.against.peer import Peer, Runner
 from symdyn.bench.work.record import NAN, Row
 from symdyn.bench.work.subject import Formulation, Yardstick
+from symdyn.bench.work.timing import Timing
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 
-# Seconds after which a run is not repeated any more; short runs are repeated for as long as MUCH s, but MOST times as often as
-# asked at most: on a machine with other work a median of few of them tells nothing.
-ENOUGH, MUCH, MOST = 2.0, 0.03, 8
 # Output times, besides those of the reference, at which energy and constraints are looked at.
 N_LOOKS = 100
 # Tolerance of methods with steps of one length: of what they iterate to.
@@ -24,24 +23,32 @@ _ITERATED = 1e-13
 
 
 def own(formulation: Formulation, method: str, tolerance: float | None, step: float | None, yardstick: Yardstick,
-        repeats: int) -> Row:
+        repeats: int, at: Sequence[float] = (), timing: Timing | None = None) -> Row:
     """A row of one of our methods or SciPy's; where a run stops, its message says why.
 
+    at   times of the reference, s, until which the motion is run and timed alone, too;  timing: filled, to go on with
     Raises ArgumentError where the method does not take the mechanism.
     """
     row = Row(formulation.name, method, tolerance, step)
     given: dict[str, Any] = {"method": method, "rtol": tolerance or _ITERATED}
     if step is not None:
         given |= {"first_step": step, "max_step": step}
-    end = yardstick.times[-1]
+    end = float(yardstick.times[-1])
+    timing = timing or Timing()
+
+    def run(until: float) -> tuple[float, int]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SimulationWarning)
+            timed = formulation.module.simulate(np.array([0.0, until]), **given)
+        return timed.seconds if timed.integrator_seconds is None else timed.integrator_seconds, timed.nfev
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # it is in the row
         try:
             sol = formulation.module.simulate(_looks(yardstick.times), **given)
-            seconds: list[float] = []
-            while sol.success and _again(seconds, repeats):
-                timed = formulation.module.simulate(np.array([0.0, end]), **given)
-                seconds.append(timed.seconds if timed.integrator_seconds is None else timed.integrator_seconds)
+            if sol.success:
+                for t in dict.fromkeys((*at, end)):
+                    timing.add(_index(yardstick, t), lambda t=t: run(t), repeats)  # type: ignore[misc]
             energy = _energy_error(formulation, sol, given)
         except ArgumentError:
             raise
@@ -50,44 +57,48 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
     places = np.searchsorted(sol.t, yardstick.times[yardstick.times <= sol.t[-1]]) if sol.success else np.zeros(0, dtype=int)
     q, u = yardstick.errors(formulation, sol.x[places])
     worse = np.fmax(q, u)
-    return Row(*row.key, statistics.median(seconds) if seconds else NAN, min(seconds, default=NAN), len(seconds),
-               sol.nfev, sol.n_steps, sol.nfev * formulation.operations, float(worse[-1]), float(q[-1]), float(u[-1]),
-               tuple(worse.tolist()), energy, _constraint_error(formulation, sol), message="" if sol.success else sol.message)
+    row = Row(*row.key, evaluations=sol.nfev, steps=sol.n_steps, error=float(worse[-1]), error_q=float(q[-1]),
+              error_u=float(u[-1]), errors=tuple(worse.tolist()), energy_error=energy,
+              constraint_error=_constraint_error(formulation, sol), message="" if sol.success else sol.message)
+    row = timing.told(row, len(yardstick.times)) if sol.success else row
+    return replace(row, operations=row.evaluations * formulation.operations)
 
 
 def peer_row(peer: Peer, formulation: Formulation, runners: Sequence[tuple[float, Runner]], tolerance: float,
-             yardstick: Yardstick, repeats: int) -> Row:
+             yardstick: Yardstick, repeats: int, timing: Timing | None = None) -> Row:
     """A row of another program.
 
-    runners   time and what runs the motion until then; the last one runs it to the end, and is timed
+    runners   time and what runs the motion until then; the last one runs it to the end;  timing: filled, to go on with
     """
     row = Row(formulation.name, peer.name, tolerance, None)
-    run = runners[-1][1]
     errors = np.full((2, len(yardstick.times)), NAN)
+    timing = timing or Timing()
     try:
-        seconds: list[float] = []
-        while _again(seconds, repeats):
-            took, evaluations, x = run(tolerance)
-            seconds.append(took)
-        for t, shorter in runners:
-            index = int(np.flatnonzero(np.isclose(yardstick.times, t, rtol=1e-12, atol=0.0))[0])
-            state = x if shorter is run else shorter(tolerance)[2]
-            alone = np.full((index + 1, len(state)), NAN)
-            alone[index] = state
+        for t, run in runners:
+            states: list[np.ndarray] = []
+
+            def one(run: Runner = run, states: list[np.ndarray] = states) -> tuple[float, int]:
+                took, evaluations, x = run(tolerance)
+                states[:] = [x]
+                return took, evaluations
+
+            index = _index(yardstick, t)
+            timing.add(index, one, repeats)
+            alone = np.full((index + 1, len(states[0])), NAN)
+            alone[index] = states[0]
             for k, part in enumerate(yardstick.errors(formulation, alone)):
                 errors[k, index] = part[index]
     except Exception as error:  # whatever another program raises is told as its own
         return Row(*row.key, peer=True, message=str(error) or type(error).__name__)
     worse = np.fmax(*errors)
-    return Row(*row.key, statistics.median(seconds), min(seconds), len(seconds), evaluations, 0, 0, float(worse[-1]),
-               float(errors[0, -1]), float(errors[1, -1]), tuple(worse.tolist()), peer=True,
-               message="" if np.isfinite(worse[-1]) else "the state at the end is not finite")
+    row = Row(*row.key, error=float(worse[-1]), error_q=float(errors[0, -1]), error_u=float(errors[1, -1]),
+              errors=tuple(worse.tolist()), peer=True,
+              message="" if np.isfinite(worse[-1]) else "the state at the end is not finite")
+    return timing.told(row, len(yardstick.times))
 
 
-def _again(seconds: Sequence[float], repeats: int) -> bool:
-    """Whether one more timed run is due."""
-    n = len(seconds)
-    return not seconds or (sum(seconds) < ENOUGH and (n < repeats or (n * min(seconds) < MUCH and n < MOST * repeats)))
+def _index(yardstick: Yardstick, t: float) -> int:
+    return next(k for k, known in enumerate(yardstick.times) if math.isclose(known, t, rel_tol=1e-12))
 
 
 def _looks(times: np.ndarray) -> np.ndarray:

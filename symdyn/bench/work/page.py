@@ -50,19 +50,19 @@ def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
 
 
 def _best(benchmark: Benchmark, at: float | None, peers: bool) -> list[dict[str, str]]:
-    rows = []
+    rows, index = [], None if at is None else benchmark.index(at)
     for error in LEVELS:
         ours, theirs = benchmark.best(error, at, False), benchmark.best(error, at, True) if peers else None
         if ours is None and theirs is None:
             continue
-        ratio = f"{theirs.time / ours.time:.2g}" if ours and theirs else ""
-        rows.append({"level": f"{error:.0e}", "ours": _time(ours), "which": _which(ours), "theirs": _time(theirs),
+        ratio = f"{theirs.time_at(index) / ours.time_at(index):.2g}" if ours and theirs else ""
+        rows.append({"level": f"{error:.0e}", "ours": _time(ours, index), "which": _which(ours), "theirs": _time(theirs, index),
                      "their": _which(theirs), "ratio": ratio})
     return rows
 
 
-def _time(row: Row | None) -> str:
-    return "" if row is None else milliseconds(row.time)
+def _time(row: Row | None, index: int | None) -> str:
+    return "" if row is None else milliseconds(row.time_at(index))
 
 
 def _which(row: Row | None) -> str:

@@ -47,9 +47,9 @@ def picture(benchmark: Benchmark) -> Any:
     height = max(4.6 * len(times), 0.26 * entries + 1.5) + 0.5
     figure = Picture(figsize=(13.5, height), layout="constrained")
     panels = figure.subplots(len(times), 2, squeeze=False)
-    work: tuple[tuple[str, Callable[[Row], float]], ...] = (
-        ("time inside the integrator [ms]", lambda r: r.time * 1e3),
-        ("evaluations of the right-hand side", lambda r: r.evaluations))
+    work: tuple[tuple[str, Callable[[Row, int | None], float]], ...] = (
+        ("time inside the integrator [ms]", lambda row, index: row.time_at(index) * 1e3),
+        ("evaluations of the right-hand side", Row.evaluations_at))
     for axes, t in zip(panels, times, strict=True):
         index = None if t is None else benchmark.index(t)
         for panel, (title, value) in zip(axes, work, strict=True):
@@ -80,11 +80,12 @@ def styles_of(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
     return styles
 
 
-def _draw(panel: Any, rows: Sequence[Row], index: int | None, value: Callable[[Row], float], styles: dict[str, Any]) -> None:
+def _draw(panel: Any, rows: Sequence[Row], index: int | None, value: Callable[[Row, int | None], float],
+          styles: dict[str, Any]) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for line, style in styles.items():
-        points = [(max(r.error_at(index), LEAST), value(r)) for r in rows if r.line == line and _drawn(r, index, value)]
+        points = [(max(r.error_at(index), LEAST), value(r, index)) for r in rows if r.line == line and _drawn(r, index, value)]
         if points:
             panel.plot(*zip(*points, strict=True), **style)
     panel.set_xscale("log")
@@ -97,8 +98,8 @@ def _draw(panel: Any, rows: Sequence[Row], index: int | None, value: Callable[[R
     panel.grid(True, which="minor", axis="y", alpha=0.12)
 
 
-def _drawn(row: Row, index: int | None, value: Callable[[Row], float]) -> bool:
-    return not row.message and row.error_at(index) <= MOST and value(row) > 0
+def _drawn(row: Row, index: int | None, value: Callable[[Row, int | None], float]) -> bool:
+    return not row.message and row.error_at(index) <= MOST and value(row, index) > 0
 
 
 def _legend(figure: Any, rows: Sequence[Row], styles: dict[str, Any]) -> None:

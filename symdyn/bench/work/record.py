@@ -8,8 +8,13 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 NAN = math.nan
-# A median this many times the least time tells of other work on the machine.
-DISTURBED = 1.5
+# A median this many times the least time tells of other work on the machine: the runs are the same, bit by bit.
+DISTURBED = 1.25
+
+
+def compared(median: float, least: float) -> float:
+    """The time that is compared: the median, or the least time where other work disturbed the runs."""
+    return least if median > DISTURBED * least else median
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,8 @@ class Row:
     error                 at the end, norm-wise relative: the larger of error_q and error_u (see `subject.Yardstick`)
     error_q, error_u      of coordinates and of speeds, or of poses and velocities of all bodies
     errors                of the state at each time of the reference; worst: the largest of them
+    until                 time inside the integrator, s, and evaluations of runs that end at each time of the reference; not
+                          numbers and zeros where that is of no interest
     energy_error          see Solution.energy_error; not a number where the energy is not known
     constraint_error      largest residual relative to the mechanism's length, and of the norms of Euler parameters
     message               empty, or why the run stopped early
@@ -43,6 +50,7 @@ class Row:
     error_q: float = NAN
     error_u: float = NAN
     errors: tuple[float, ...] = ()
+    until: tuple[tuple[float, int], ...] = ()
     energy_error: float = NAN
     constraint_error: float = NAN
     peer: bool = False
@@ -61,7 +69,7 @@ class Row:
     @property
     def time(self) -> float:
         """What is compared, s: the median, or the least time where other work disturbed the runs."""
-        return self.least if self.disturbed else self.seconds
+        return compared(self.seconds, self.least)
 
     @property
     def worst(self) -> float:
@@ -83,6 +91,19 @@ class Row:
         """The error at one of the reference's times; None: at the end."""
         return self.error if index is None else self.errors[index] if index < len(self.errors) else NAN
 
+    def time_at(self, index: int | None) -> float:
+        """What is compared of runs until one of the reference's times, s; None: the end."""
+        return self._until(index)[0]
+
+    def evaluations_at(self, index: int | None) -> int:
+        """Of runs until one of the reference's times; None: the end."""
+        return self._until(index)[1]
+
+    def _until(self, index: int | None) -> tuple[float, int]:
+        if index is None:
+            return self.time, self.evaluations
+        return self.until[index] if index < len(self.until) else (NAN, 0)
+
     def record(self) -> dict[str, Any]:
         """As plain data; figures that are not known are None."""
         return {k: _plain(v) for k, v in asdict(self).items()}
@@ -94,6 +115,7 @@ class Row:
         may_be_none = ("tolerance", "step")
         values: dict[str, Any] = {k: NAN if v is None and k not in may_be_none else v for k, v in data.items() if k in known}
         values["errors"] = tuple(NAN if e is None else float(e) for e in data.get("errors", ()))
+        values["until"] = tuple((NAN if s is None else float(s), int(n)) for s, n in data.get("until", ()))
         return cls(**values)
 
 

@@ -88,8 +88,8 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
             continue
         yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 0.0, ""), formulation)
         for other, other_method, other_rtol, y in runs:
-            if (other.name, other_method) == (formulation.name, method):
-                continue
+            if (other.coordinates, other_method) == (formulation.coordinates, method):
+                continue  # the same errors of the same steps, however near they are
             differ = float(np.max(yardstick.errors(other, y)))
             if math.isfinite(differ) and (best is None or differ < best[0]):
                 best = differ, (f"{formulation.name} with {method} at {rtol:g} and {other.name} with {other_method} at "

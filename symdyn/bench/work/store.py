@@ -1,16 +1,14 @@
 """References that were made before: those of the package, made by a command, and those of this user, in the cache folder.
 
-`python -m symdyn.bench.work.store NAME ...` makes references for the package anew.
+`symdyn bench references NAME ...` makes references for the package anew.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import os
 import re
-import sys
 import time as clock
 from collections.abc import Sequence
 from pathlib import Path
@@ -118,29 +116,26 @@ def _write(path: Path, data: Any) -> None:
     os.replace(partial, path)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command: makes references and puts them into the package."""
+def run(names: Sequence[str] = (), digits: int | None = None) -> int:
+    """Make references anew and put them into the package; returns how many could not be made.
+
+    names   of the list of `symdyn bench --all` (default: all); digits: of the local errors (default: as many as usual)
+    """
     from symdyn.bench.work.cases import CASES, subject
     from symdyn.bench.work.converged import DIGITS, converged
     from symdyn.bench.work.reference import default_times
 
-    parser = argparse.ArgumentParser(prog="python -m symdyn.bench.work.store", description="Make references of the bench anew.")
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(CASES)} (default: all)")
-    parser.add_argument("--digits", type=int, default=DIGITS, help=f"of the local errors (default: {DIGITS})")
-    given = parser.parse_args(arguments)
-    for name in given.names or CASES:
-        about, begun = subject(name), clock.perf_counter()
+    failed = 0
+    for about in [subject(name) for name in names or CASES]:
+        begun = clock.perf_counter()
         first = about.first()
         try:
-            reference, text = converged(first, default_times(about), given.digits)
+            reference, text = converged(first, default_times(about), digits or DIGITS)
         except SymdynError as error:
-            print(f"{name}: {error}", flush=True)
+            failed += 1
+            print(f"{about.name}: {error}", flush=True)
             continue
         made = record(first, reference, text)
         _write(STORE, dict(sorted({**stored(), about.name: made}.items())))
-        print(f"{name}: {reference}; {clock.perf_counter() - begun:.0f} s", flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        print(f"{about.name}: {reference}; {clock.perf_counter() - begun:.0f} s", flush=True)
+    return failed

@@ -159,12 +159,23 @@ class Yardstick:
         n_q, n_u = sizes["q"], sizes["u"]
         if not self.bodies and (beside or formulation).coordinates == self.first.coordinates:
             return np.hstack((x[:, :n_q], x[:, n_q + n_u:])), x[:, n_q:n_q + n_u]
-        module, t = formulation.module, self.times[:len(x)]
+        module, there = formulation.module, np.isfinite(x).all(axis=1)
+        unknown = np.full((len(x), 1), NAN)
+        if not there.any():
+            return unknown, unknown
+        t, x = self.times[:len(x)][there], x[there]
         given = np.array([float(module.metadata["initial"].get(n, 0.0)) for n in module.metadata["inputs"]])
         p = module.default_parameters
         try:
             frames = module.evaluate("frames", t, x, p, given).reshape(len(x), -1)
             J = module.evaluate("J", t, x, p, given).reshape(len(x), -1, n_u)
         except EvaluationError:
-            return np.full((len(x), 1), NAN), np.full((len(x), 1), NAN)
-        return frames, np.einsum("kij,kj->ki", J, x[:, n_q:n_q + n_u])
+            return unknown, unknown
+        return _spread(frames, there), _spread(np.einsum("kij,kj->ki", J, x[:, n_q:n_q + n_u]), there)
+
+
+def _spread(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Rows (m, ...) at the m places (n,) that are true; others are not numbers."""
+    found = np.full((len(places), rows.shape[1]), NAN)
+    found[places] = rows
+    return found

@@ -55,20 +55,21 @@ def best(benchmark: Benchmark, at: float | None) -> Iterator[str]:
     """The least time below every level of error, ours and of other programs."""
     peers = any(row.peer for row in benchmark.rows)
     yield f"least time below an error, at {f't = {at:g} s' if at is not None else 'the end'}:"
+    index = None if at is None else benchmark.index(at)
     for error in LEVELS:
         ours, theirs = benchmark.best(error, at, False), benchmark.best(error, at, True) if peers else None
         if ours is None and theirs is None:
             continue
-        line = f"  {error:.0e}  " + _told(ours)
+        line = f"  {error:.0e}  " + _told(ours, index)
         if peers:
-            line = f"{line:72}" + _told(theirs)
+            line = f"{line:72}" + _told(theirs, index)
             if ours is not None and theirs is not None:
-                line += f"   ({theirs.time / ours.time:.2g} times ours)"
+                line += f"   ({theirs.time_at(index) / ours.time_at(index):.2g} times ours)"
         yield line
 
 
-def _told(row: Row | None) -> str:
-    return "none" if row is None else f"{milliseconds(row.time)} ms  {row.line} at {row.setting}"
+def _told(row: Row | None, index: int | None) -> str:
+    return "none" if row is None else f"{milliseconds(row.time_at(index))} ms  {row.line} at {row.setting}"
 
 
 def milliseconds(seconds: float) -> str:

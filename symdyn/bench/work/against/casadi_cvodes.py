@@ -6,19 +6,19 @@ import contextlib
 import importlib.util
 import tempfile
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from symdyn.bench.peers.toolchain import c_compiler, version
-from symdyn.bench.work.against.peer import Failed, Runner
+from symdyn.bench.work.against.peer import Failed, Ran, Runner
 from symdyn.bench.work.against.walk import ARITHMETIC, ELEMENTARY, right_hand_side
 from symdyn.errors import CompilerNotFound
 
 INSTALL = "casadi is not installed; run: pip install 'symdyn[peers]'"
-_MANY_STEPS = 10**8
+_MANY_STEPS = 10**6
 
 
 @dataclass(frozen=True)
@@ -77,19 +77,26 @@ def runner(ca: Any, problem: Mapping[str, Any], x0: np.ndarray, end: float, adam
     made: dict[float, Any] = {}
     folder = tempfile.TemporaryDirectory(prefix="symdyn-casadi-")  # of what is compiled; gone with the runner
 
-    def run(tolerance: float) -> tuple[float, int, np.ndarray]:
+    def integrator(tolerance: float, times: Sequence[float], **others: Any) -> Any:
+        with contextlib.chdir(folder.name):  # CasADi writes where it is, and is not to clean up there later
+            return ca.integrator("motion", "cvodes", dict(problem), 0.0, times, {
+                **options, "reltol": tolerance, "abstol": tolerance, **others})
+
+    def run(tolerance: float, times: np.ndarray | None = None) -> Ran:
         if tolerance not in made:
-            with contextlib.chdir(folder.name):  # CasADi writes where it is, and is not to clean up there later
-                made[tolerance] = ca.integrator("motion", "cvodes", dict(problem), 0.0, end,
-                                                {**options, "reltol": tolerance, "abstol": tolerance})
+            made[tolerance] = integrator(tolerance, [end])
         motion = made[tolerance]
+        if times is not None:  # the same first step, which would depend on the first output; not compiled, as it is not timed
+            motion(x0=x0)
+            motion = integrator(tolerance, times.tolist(), step0=motion.stats()["hinused"], jit=False)
         start = ca.DM(x0)
         begun = clock.perf_counter()
         try:
             result = motion(x0=start)
         except RuntimeError as error:
             raise Failed(f"casadi at {tolerance:g}: {str(error).strip().splitlines()[-1]}") from None
-        return clock.perf_counter() - begun, int(motion.stats()["nfevals"]), np.array(result["xf"]).ravel()
+        seconds, states = clock.perf_counter() - begun, np.array(result["xf"]).T
+        return seconds, int(motion.stats()["nfevals"]), states[-1] if times is None else states
 
     return run
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.work.against import sundials
-from symdyn.bench.work.against.peer import Runner
+from symdyn.bench.work.against.peer import Ran, Runner
 
-_ADAMS, _BDF, _NORMAL = 1, 2, 1
+_ADAMS, _BDF, _NORMAL, _ONE_STEP = 1, 2, 1, 2
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Cvode:
 
     def prepare(self, equations: Any, params: np.ndarray, x0: np.ndarray, end: float, system: Any = None) -> Runner:
         library = sundials.Sundials(equations, ("rhs",) if self.adams else ("rhs", "jacobian_x"), params)
-        return lambda tolerance: self._run(library, x0, end, tolerance)
+        return lambda tolerance, times=None: self._run(library, x0, end, tolerance, times)
 
-    def _run(self, library: sundials.Sundials, x0: np.ndarray, end: float, tolerance: float) -> tuple[float, int, np.ndarray]:
+    def _run(self, library: sundials.Sundials, x0: np.ndarray, end: float, tolerance: float, times: np.ndarray | None) -> Ran:
         x, t = np.array(x0, dtype=float), ctypes.c_double()
         y = library.vector(x)
         memory = library("cvode", "CVodeCreate", _ADAMS if self.adams else _BDF, library.context, made=True)
@@ -47,6 +47,7 @@ class Cvode:
             library("cvode", "CVodeSStolerances", memory, tolerance, tolerance)
             library("cvode", "CVodeSetUserData", memory, ctypes.byref(library.given))
             library("cvode", "CVodeSetMaxNumSteps", memory, sundials.MANY_STEPS)
+            library("cvode", "CVodeSetMaxHnilWarns", memory, ctypes.c_int(-1))  # which it would print
             library("cvode", "CVodeSetStopTime", memory, float(end))
             if self.adams:
                 iteration = library("cvode", "SUNNonlinSol_FixedPoint", y, 0, library.context, made=True)
@@ -56,9 +57,12 @@ class Cvode:
                 used = library.solve_linear("cvode", "CVodeSetLinearSolver", memory, y, len(x))
                 library("cvode", "CVodeSetJacFn", memory, library.callback("jacobian"))
             begun = clock.perf_counter()
-            library("cvode", "CVode", memory, float(end), y, ctypes.byref(t), _NORMAL)
-            seconds = clock.perf_counter() - begun
-            return seconds, library.count("cvode", "CVodeGetNumRhsEvals", memory), x
+            if times is None:
+                library("cvode", "CVode", memory, float(end), y, ctypes.byref(t), _NORMAL)
+            else:
+                step = lambda: library("cvode", "CVode", memory, float(end), y, ctypes.byref(t), _ONE_STEP)
+                x = library.between("cvode", "CVodeGetDky", memory, (x, t), step, times)
+            return clock.perf_counter() - begun, library.count("cvode", "CVodeGetNumRhsEvals", memory), x
         finally:
             library.free("cvode", "CVodeFree", memory, [*used, ("core", "N_VDestroy", y)])
 

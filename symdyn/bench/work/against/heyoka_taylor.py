@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.peers.toolchain import version
-from symdyn.bench.work.against.peer import Failed, Runner
+from symdyn.bench.work.against.peer import Failed, Ran, Runner
 from symdyn.bench.work.against.walk import ARITHMETIC, ELEMENTARY, right_hand_side
 
 # Operations of a right-hand side times the order: up to here a step is compiled as one piece of straight-line code, which is two
@@ -60,20 +60,27 @@ class Heyoka:
 
         limits: list[tuple[float, float]] = []
 
-        def run(tolerance: float) -> tuple[float, int, np.ndarray]:
+        def run(tolerance: float, times: np.ndarray | None = None) -> Ran:
             if not limits:
                 limits.append(_limits(integrator(_FINEST), x0, end))
             first, longest = limits[0]
             chosen = integrator(max(tolerance, _FINEST))
             chosen.time, chosen.state[:] = 0.0, x0
+            parts = []
             begun = clock.perf_counter()
-            outcome = chosen.propagate_until(_FIRST * first, max_delta_t=first)[0]
-            if outcome == hy.taylor_outcome.time_limit:
-                outcome = chosen.propagate_until(end, max_delta_t=longest)[0]
+            for until, step in ((_FIRST * first, first), (end, longest)):
+                outcome, *_, part, _ = chosen.propagate_until(until, max_delta_t=step, c_output=times is not None)
+                parts.append((until, part))
+                if outcome != hy.taylor_outcome.time_limit:
+                    break
             seconds = clock.perf_counter() - begun
             if outcome != hy.taylor_outcome.time_limit:
                 raise Failed(f"heyoka at {tolerance:g}: {str(outcome).rpartition('.')[2]} at t = {chosen.time:.6g} s")
-            return seconds, 0, chosen.state.copy()
+            if times is None:
+                return seconds, 0, chosen.state.copy()
+            split = parts[0][0]
+            return seconds, 0, np.vstack([part(times[(times <= split) == early]) for early, (_, part) in zip(
+                (True, False), parts, strict=True) if np.any((times <= split) == early)])
 
         return run
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.work.against import sundials
-from symdyn.bench.work.against.peer import Runner, Unfit
+from symdyn.bench.work.against.peer import Ran, Runner, Unfit
 from symdyn.formulation.constrained import residual_names
 from symdyn.tape.differentiate import jacobian
 
-_NORMAL = 1
+_NORMAL, _ONE_STEP = 1, 2
 # The integrals of the multipliers have no meaning of their own: their errors are not controlled.
 _UNCONTROLLED = 1e8
 
@@ -44,10 +44,10 @@ class Ida:
         y0 = np.concatenate([x0, np.zeros(2 * n_c)])
         rates = np.concatenate([module.evaluate("rhs", 0.0, x0, params, inputs), lam, np.zeros(n_c)])
         library = sundials.Sundials(with_slopes(equations), ("residual", "residual_x", "residual_rates"), params)
-        return lambda tolerance: self._run(library, (y0, rates, len(x0)), end, tolerance)
+        return lambda tolerance, times=None: self._run(library, (y0, rates, len(x0)), end, tolerance, times)
 
     def _run(self, library: sundials.Sundials, start: tuple[np.ndarray, np.ndarray, int], end: float,
-             tolerance: float) -> tuple[float, int, np.ndarray]:
+             tolerance: float, times: np.ndarray | None) -> Ran:
         (x, rates), n_x, t = (a.copy() for a in start[:2]), start[2], ctypes.c_double()
         absolute = np.full(len(x), tolerance)
         absolute[n_x:] = _UNCONTROLLED
@@ -63,9 +63,12 @@ class Ida:
             used = library.solve_linear("ida", "IDASetLinearSolver", memory, y, len(x))
             library("ida", "IDASetJacFn", memory, library.callback("slopes"))
             begun = clock.perf_counter()
-            library("ida", "IDASolve", memory, float(end), ctypes.byref(t), y, yd, _NORMAL)
-            seconds = clock.perf_counter() - begun
-            return seconds, library.count("ida", "IDAGetNumResEvals", memory), x[:n_x]
+            if times is None:
+                library("ida", "IDASolve", memory, float(end), ctypes.byref(t), y, yd, _NORMAL)
+            else:
+                step = lambda: library("ida", "IDASolve", memory, float(end), ctypes.byref(t), y, yd, _ONE_STEP)
+                x = library.between("ida", "IDAGetDky", memory, (x, t), step, times)
+            return clock.perf_counter() - begun, library.count("ida", "IDAGetNumResEvals", memory), x[..., :n_x]
         finally:
             library.free("ida", "IDAFree", memory, [*used, *[("core", "N_VDestroy", v) for v in (y, yd, allowed)]])
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import sympy as sp
+from scipy.interpolate import BPoly
 
 from symdyn.bench.work.against.peer import LONGEST, Failed, Unfit
 from symdyn.bench.work.against.walk import constant_inputs
@@ -200,27 +201,44 @@ def check_accelerations(tree: Tree, accelerations: Callable[[np.ndarray, np.ndar
             raise Unfit(f"accelerations of {program} differ from ours by {error:.1e}, relative; it is not compared")
 
 
+def between(t: Sequence[float] | np.ndarray, x: Sequence[np.ndarray], equations: Any, params: np.ndarray,
+            times: np.ndarray) -> np.ndarray:
+    """States (n_t, n_x) at times from those [q; u] with q_dot = u at the ends of steps: polynomials of degree five with our
+    accelerations, for programs that give nothing between their steps."""
+    at, states = np.array(t), np.array(x)
+    n = states.shape[1] // 2
+    rates = equations.compile().evaluate("rhs", at, states, params, list(constant_inputs(equations).values()))
+    path = BPoly.from_derivatives(at, np.stack([states[:, :n], states[:, n:], rates[:, n:]], axis=1))
+    return np.hstack([path(times), path.derivative()(times)])
+
+
 def calibrated(motion: Callable[[int], tuple[float, np.ndarray]], order: int) -> Callable[[float], int]:
     """How many fixed steps a program needs for a tolerance: found by halving steps until the end is known to 1e-3.
 
     motion   number of steps -> seconds, the state at the end
     The function given raises Failed for so many steps that they take longer than LONGEST.
     """
-    n = 128
-    coarse = motion(n)[1]
+    n, coarse, error = 128, None, np.nan
     while True:
-        seconds, fine = motion(2 * n)
-        with np.errstate(all="ignore"):  # steps that are too long may end anywhere
-            error = float(np.linalg.norm(fine - coarse) / np.linalg.norm(fine))
-        if error < 1e-3 or 2 * n >= _MOST_TRIED:
+        try:
+            seconds, fine = motion(n)
+        except Failed:  # such long steps are too much for it
+            if n >= _MOST_TRIED:
+                raise
+            n, coarse = 2 * n, None
+            continue
+        if coarse is not None:
+            with np.errstate(all="ignore"):  # steps that are too long may end anywhere
+                error = float(np.linalg.norm(fine - coarse) / np.linalg.norm(fine))
+        if error < 1e-3 or n >= _MOST_TRIED:
             break
         n, coarse = 2 * n, fine
     error = max(error, 1e-12) if np.isfinite(error) else 1.0
 
     def steps(tolerance: float) -> int:
-        wanted = max(1, int(np.ceil(n * (error / tolerance) ** (1 / order))))
-        if wanted * seconds / (2 * n) > LONGEST:
-            raise Failed(f"{wanted} steps for {tolerance:g} would take about {wanted * seconds / (2 * n):.0f} s")
+        wanted = max(1, int(np.ceil(n / 2 * (error / tolerance) ** (1 / order))))
+        if wanted * seconds / n > LONGEST:
+            raise Failed(f"{wanted} steps for {tolerance:g} would take about {wanted * seconds / n:.0f} s")
         return wanted
 
     return steps

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from symdyn.bench.peers.toolchain import version
-from symdyn.bench.work.against.mechanism import Link, Tree, calibrated, check_accelerations, tree_of
-from symdyn.bench.work.against.peer import Failed, Runner, fitting
+from symdyn.bench.work.against.mechanism import Link, Tree, between, calibrated, check_accelerations, tree_of
+from symdyn.bench.work.against.peer import Failed, Ran, Runner, fitting
 
 _STAGES, _ORDER = 4, 4
 # Inertia that MuJoCo wants of every body, kg m^2.
@@ -58,13 +58,18 @@ class Mujoco:
             mujoco.mj_forward(model, data)
             return np.array(data.qacc)[back]
 
-        def motion(n: int) -> tuple[float, np.ndarray]:
+        def motion(n: int, every: list[np.ndarray] | None = None) -> tuple[float, np.ndarray]:
+            """n steps, and where it is asked for, the state after every one of them."""
             model.opt.timestep = end / n
             begin(q0, u0)
             mujoco.set_mju_user_warning(lambda told: None)  # which it would write into a file; the state at the end tells it
             begun = clock.perf_counter()
             try:
-                mujoco.mj_step(model, data, nstep=n)
+                if every is None:
+                    mujoco.mj_step(model, data, nstep=n)
+                for _ in range(0 if every is None else n):
+                    mujoco.mj_step(model, data)
+                    every.append(tree.join(data.qpos[back], data.qvel[back]))  # type: ignore[union-attr]
             finally:
                 seconds = clock.perf_counter() - begun
                 mujoco.set_mju_user_warning(None)
@@ -73,11 +78,13 @@ class Mujoco:
         check_accelerations(tree, accelerations, equations, params, "MuJoCo")
         steps = calibrated(motion, _ORDER)
 
-        def run(tolerance: float) -> tuple[float, int, np.ndarray]:
-            n = steps(tolerance)
-            seconds, x = motion(n)
+        def run(tolerance: float, times: np.ndarray | None = None) -> Ran:
+            n, every = steps(tolerance), None if times is None else [np.asarray(x0, dtype=float)]
+            seconds, x = motion(n, every)
             if not np.isfinite(x).all():
                 raise Failed(f"MuJoCo with {n} steps: the state is not finite")
+            if times is not None and every is not None:
+                x = between(np.linspace(0.0, end, n + 1), every, equations, params, times)
             return seconds, _STAGES * n, x
 
         return run

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -12,9 +12,20 @@ from symdyn.errors import SymdynError
 
 # A run that would take longer is not made, s.
 LONGEST = 15.0
-# tolerance -> seconds inside its integrator, evaluations of the right-hand side (0: it does not tell), state at the end in
-# symdyn's order, (n_x,)
-Runner = Callable[[float], tuple[float, int, np.ndarray]]
+# Seconds inside the integrator, evaluations of the right-hand side (0: it does not tell), state at the end in symdyn's order,
+# (n_x,), or states (n_t, n_x).
+Ran = tuple[float, int, np.ndarray]
+
+
+class Runner(Protocol):
+    """What runs a motion with a tolerance."""
+
+    def __call__(self, tolerance: float, times: np.ndarray | None = None) -> Ran:
+        """Run it to the end; or, with times (n_t,), increasing, s, of which the last is the end, give the states there.
+
+        Such a run takes the same steps, but what it takes is no measure: it may also look at every step. Raises Failed.
+        """
+        ...
 
 
 class Unfit(SymdynError):
@@ -55,6 +66,6 @@ class Peer(Protocol):
         equations   of one formulation, symdyn.formulation.equations.Equations; its symbols give the order of params and x
         params      (n_p,);  x0: (n_x,) consistent start [q; u; z] at t = 0;  end: s
         system      the System they were derived from, for peers that take bodies and joints; None if there is none
-        Raises Unfit if the peer has no way to run this mechanism. The runner raises Failed.
+        Raises Unfit if the peer has no way to run this mechanism.
         """
         ...

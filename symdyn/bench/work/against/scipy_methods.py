@@ -12,7 +12,7 @@ import scipy
 from scipy import integrate
 from scipy.integrate import odeint
 
-from symdyn.bench.work.against.peer import LONGEST, Failed, Runner, fitting
+from symdyn.bench.work.against.peer import LONGEST, Failed, Ran, Runner, fitting
 from symdyn.bench.work.against.walk import constant_inputs
 from symdyn.errors import EvaluationError
 
@@ -45,39 +45,45 @@ class Scipy:
             with fitting("SciPy"):
                 slope(0.0, x0)  # which compiles it
 
-        def run(tolerance: float) -> tuple[float, int, np.ndarray]:
+        def run(tolerance: float, times: np.ndarray | None = None) -> Ran:
             begun = clock.perf_counter()
             try:
-                x, evaluations = self._odeint(f, slope, x0, end, tolerance) if self.method == "LSODA" else self._solver(
-                    f, slope, x0, end, tolerance)
+                x, evaluations = self._odeint(f, slope, x0, end, tolerance, times) if self.method == "LSODA" else self._solver(
+                    f, slope, x0, end, tolerance, times)
             except (EvaluationError, ValueError) as error:
                 raise Failed(f"{self.name} at {tolerance:g}: {error}") from None
             return clock.perf_counter() - begun, evaluations, x
 
         return run
 
-    def _solver(self, f: Any, slope: Any, x0: np.ndarray, end: float, tolerance: float) -> tuple[np.ndarray, int]:
+    def _solver(self, f: Any, slope: Any, x0: np.ndarray, end: float, tolerance: float, times: np.ndarray | None
+                ) -> tuple[np.ndarray, int]:
         exact = {"jac": slope} if self.method == "Radau" else {}
         last = clock.perf_counter() + LONGEST
+        states: list[np.ndarray] = []
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a tolerance below what it takes is raised to that
             solver = getattr(integrate, self.method)(f, 0.0, x0, end, rtol=tolerance, atol=tolerance, **exact)
             while solver.status == "running":
                 told = solver.step()
+                if times is not None and solver.status != "failed":
+                    states += [solver.dense_output()(t) for t in times[len(states):np.searchsorted(times, solver.t, "right")]]
                 if clock.perf_counter() > last:
                     raise Failed(f"{self.name} at {tolerance:g} takes longer than {LONGEST:g} s")
         if solver.status == "failed":
             raise Failed(f"{self.name} at {tolerance:g}: {told}")
-        return solver.y, solver.nfev
+        return solver.y if times is None else np.array(states), solver.nfev
 
-    def _odeint(self, f: Any, slope: Any, x0: np.ndarray, end: float, tolerance: float) -> tuple[np.ndarray, int]:
+    def _odeint(self, f: Any, slope: Any, x0: np.ndarray, end: float, tolerance: float, times: np.ndarray | None
+                ) -> tuple[np.ndarray, int]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it says is looked at
-            rows, told = odeint(f, x0, (0.0, end), Dfun=slope, tfirst=True, rtol=tolerance, atol=tolerance, full_output=True,
-                                mxstep=_MANY_STEPS, tcrit=(end,))
+            # With times its first step is another one, which it chooses by the first of them.
+            rows, told = odeint(f, x0, np.r_[0.0, end if times is None else times], Dfun=slope, tfirst=True, rtol=tolerance,
+                                atol=tolerance, full_output=True, mxstep=_MANY_STEPS, tcrit=(end,))
         if told["message"] != "Integration successful.":
             raise Failed(f"{self.name} at {tolerance:g}: {told['message']}")
-        return rows[-1], int(told["nfe"][-1])
+        return rows[-1] if times is None else rows[1:], int(told["nfe"][-1])
 
 
 PEERS = (Scipy("DOP853"), Scipy("LSODA"), Scipy("Radau"))

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
-from collections.abc import Sequence
+import time as clock
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from symdyn.bench.peers import toolchain
-from symdyn.bench.work.against.peer import Failed, Unfit
+from symdyn.bench.work.against.peer import LONGEST, Failed, Unfit
 from symdyn.bench.work.against.walk import constant_inputs
 from symdyn.errors import CompilerNotFound
 from symdyn.pipeline import emit
@@ -24,7 +25,7 @@ from symdyn.runtime.unit import CUnit, Frame
 
 INSTALL = "scikit-sundae is not installed; run: pip install 'symdyn[peers]'"
 _PARTS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode", "ida")
-MANY_STEPS = 10**8
+MANY_STEPS = 10**6
 
 # What SUNDIALS calls: its vectors and matrices are opaque, and what opens them is given along. A positive result asks for a
 # smaller step.
@@ -190,6 +191,27 @@ class Sundials:
         solver = self("sunlinsoldense", "SUNLinSol_Dense", y, matrix, self.context, made=True)
         self(part, name, memory, solver, matrix)
         return [("core", "SUNLinSolFree", solver), ("core", "SUNMatDestroy", matrix)]
+
+    def between(self, part: str, name: str, memory: Any, at: tuple[np.ndarray, Any], step: Callable[[], Any],
+                times: np.ndarray) -> np.ndarray:
+        """States (n_t, n) at times, from what an integrator gives between its steps.
+
+        at   state and time, changed by step, which makes one step
+        """
+        (x, t), found = at, np.zeros((len(times), len(at[0])))
+        row, k = np.zeros(len(x)), 0
+        y, last = self.vector(row), clock.perf_counter() + LONGEST
+        try:
+            while k < len(times):
+                if clock.perf_counter() > last:
+                    raise Failed(f"it is at t = {t.value:.6g} s after {LONGEST:g} s")
+                step()
+                while k < len(times) and times[k] <= t.value:
+                    self(part, name, memory, float(times[k]), 0, y)
+                    found[k], k = row, k + 1
+        finally:
+            self("core", "N_VDestroy", y)
+        return found
 
     def count(self, part: str, name: str, memory: Any) -> int:
         """One of an integrator's counters."""

@@ -1,0 +1,167 @@
+"""Programs on a published mechanism, one line each: the tolerances that keep its bounds, and what runs with them take."""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from symdyn.bench.work import against
+from symdyn.bench.work.published_cases import Case
+from symdyn.bench.work.subject import Formulation
+from symdyn.errors import SymdynError
+
+# Tolerances, from loose to tight; between the last that is off by too much and the first that is not, there are _HALVINGS more.
+TOLERANCES = tuple(10.0**-k for k in range(2, 15, 2))
+_HALVINGS = 3
+# Passes over all runs that the repeats are spread over; s after which a run is not repeated, and for which short ones are.
+_PASSES, _ENOUGH, _MUCH = 3, 1.0, 0.02
+# A line whose runs take longer than _SLOW, s, or whose search with all that it compiles takes longer than _PATIENCE, s, is not
+# asked for tighter tolerances.
+_SLOW, _PATIENCE = 10.0, 300.0
+
+
+@dataclass
+class Run:
+    """A program with one tolerance: its error, and what it took, s."""
+
+    tolerance: float
+    error: float
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the machine had other work."""
+        return statistics.median(self.seconds) > 1.5 * min(self.seconds)
+
+    @property
+    def time(self) -> float:
+        """s"""
+        return min(self.seconds) if self.disturbed else statistics.median(self.seconds)
+
+
+@dataclass
+class Line:
+    """A program, or a method of ours, on one formulation.
+
+    look   tolerance -> s inside the integrator, states at the case's times;  timed: tolerance -> s inside the integrator
+    """
+
+    program: str
+    formulation: Formulation
+    peer: bool
+    look: Callable[[float], tuple[float, np.ndarray]]
+    timed: Callable[[float], float]
+    runs: list[Run] = field(default_factory=list)
+    why: str = ""
+
+    def within(self, bound: float) -> Run | None:
+        """The fastest run within a bound."""
+        return min((r for r in self.runs if r.error <= bound and r.seconds), key=lambda r: r.time, default=None)
+
+    def nearest(self) -> str:
+        """Why it is not within the bounds."""
+        errors = [r.error for r in self.runs if math.isfinite(r.error)]
+        told = f"not within the bounds, its least error is {min(errors):.1e}" if errors else "no run reached the end"
+        return f"{told}; {self.why}" if self.why else told
+
+
+def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[str], left_out: dict[str, str],
+           deadline: float) -> Iterator[Line]:
+    """Ours, then other programs, each on the first formulation that it takes; the others into left_out."""
+    for f in formulations:
+        for method in case.methods:
+            yield _own(case, f, method)
+    for name in peers:
+        for peer in against.peers(name):
+            there, taken, why = peer.available(), False, dict[str, str]()
+            for f in formulations if there is True else ():
+                if f.name == "absolute":
+                    continue
+                if clock.perf_counter() > deadline:
+                    why[f.name] = "not tried within the budget"
+                    continue
+                try:
+                    run = peer.prepare(f.equations, f.module.default_parameters, f.x0, case.end, f.system)
+                except Exception as error:  # Unfit, or whatever another program raises
+                    why[f.name] = str(error) or type(error).__name__
+                    continue
+                taken = True
+                yield Line(peer.name, f, True, lambda tolerance, run=run: run(tolerance, case.times)[::2],  # type: ignore[misc]
+                           lambda tolerance, run=run: run(tolerance)[0])  # type: ignore[misc]
+                break
+            if not taken:
+                left_out[peer.name] = str(there) if there is not True else "; ".join(dict.fromkeys(why.values()))
+
+
+def seconds_of(sol: Any) -> float:
+    """Inside the integrator."""
+    return float(sol.seconds if sol.integrator_seconds is None else sol.integrator_seconds)
+
+
+def _own(case: Case, f: Formulation, method: str) -> Line:
+    def look(tolerance: float) -> tuple[float, np.ndarray]:
+        sol = f.module.simulate(np.r_[0.0, case.times], method=method, rtol=tolerance)
+        if not sol.success:
+            raise SymdynError(sol.message)
+        return seconds_of(sol), np.asarray(sol.x[1:])
+
+    def timed(tolerance: float) -> float:
+        return seconds_of(f.module.simulate(np.array([0.0, case.end]), method=method, rtol=tolerance))
+
+    return Line(f"symdyn {method}", f, False, look, timed)
+
+
+def search(line: Line, case: Case, exact: np.ndarray, deadline: float) -> None:
+    """Look at looser and tighter tolerances until both bounds are kept."""
+    def look(tolerance: float) -> float:
+        took, error = 0.0, math.nan
+        try:
+            took, states = line.look(tolerance)
+            error = case.error(case.history(line.formulation, case.times, states), exact)
+        except Exception as failed:  # whatever another program raises is told as its own
+            line.why = str(failed) or type(failed).__name__
+        line.runs.append(Run(tolerance, error))
+        return took
+
+    last = min(deadline, clock.perf_counter() + _PATIENCE)
+    for tolerance in TOLERANCES:
+        took = look(tolerance)
+        if line.runs[-1].error <= case.bounds[-1]:
+            break
+        if took > _SLOW or clock.perf_counter() > last:
+            line.why = line.why or (f"a run at {tolerance:g} with outputs took {took:.0f} s" if took > _SLOW else "time was up "
+                                    "before") + "; tighter tolerances were not tried"
+            break
+    for bound in [bound for bound in case.bounds for _ in range(_HALVINGS)]:
+        good = max((r.tolerance for r in line.runs if r.error <= bound), default=math.nan)
+        bad = min((r.tolerance for r in line.runs if r.tolerance > good), default=1.0)
+        if math.isfinite(good) and clock.perf_counter() < last:
+            look(math.sqrt(good * bad))
+
+
+def worth(line: Line, case: Case) -> list[Run]:
+    """The runs that may be the fastest within a bound: of each bound the three loosest that keep it."""
+    loose = sorted(line.runs, key=lambda r: -r.tolerance)
+    return [r for r in loose if any(r in [s for s in loose if s.error <= bound][:3] for bound in case.bounds)]
+
+
+def time_all(runs: Sequence[tuple[Line, Run]], repeats: int) -> None:
+    """Time all runs, one after the other, several times over, so that they see the machine alike."""
+    each = -(-repeats // _PASSES)
+    for _ in range(_PASSES):
+        for line, run in runs:
+            now: list[float] = []
+            while not now or (sum(now) < _ENOUGH and sum(run.seconds) < _PASSES * _ENOUGH and (
+                    len(now) < each or (sum(now) < _MUCH and len(now) < 8 * each))):
+                try:
+                    now.append(line.timed(run.tolerance))
+                except Exception as failed:
+                    line.why = str(failed) or type(failed).__name__
+                    break
+            run.seconds += now

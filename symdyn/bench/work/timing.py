@@ -1,0 +1,61 @@
+"""Repeated runs of one row: some now, some when all rows were measured, so that all of them see the machine alike."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from symdyn.bench.work.record import NAN, Row, compared
+
+# Passes over all rows that the repeats are spread over: the speed of a processor that others use changes within seconds.
+PASSES = 3
+# Seconds after which a run is not repeated any more; short runs are repeated for as long as MUCH s in a pass, but MOST times as
+# often as asked at most: on a machine with other work a median of few of them tells nothing.
+ENOUGH, MUCH, MOST = 2.0, 0.01, 8
+
+# s inside the integrator, evaluations of the right-hand side
+Run = Callable[[], tuple[float, int]]
+
+
+@dataclass
+class Timing:
+    """Runs until the times of a reference, each under its place there, the last to the end, and what they took so far."""
+
+    runs: dict[int, Run] = field(default_factory=dict)
+    seconds: dict[int, list[float]] = field(default_factory=dict)
+    evaluations: dict[int, int] = field(default_factory=dict)
+
+    def add(self, place: int, run: Run, repeats: int) -> None:
+        """Time a run for the first time."""
+        self.runs[place], self.seconds[place] = run, []
+        self._repeat(place, repeats)
+
+    def again(self, row: Row, repeats: int) -> Row:
+        """One more pass; the row with its figures."""
+        for place in self.runs:
+            if sum(self.seconds[place]) < ENOUGH:
+                self._repeat(place, repeats)
+        return self.told(row, len(row.errors))
+
+    def told(self, row: Row, n_times: int) -> Row:
+        """The row with what was measured.
+
+        n_times   of the reference
+        """
+        end = max(self.runs)
+        seconds = self.seconds[end]
+        until = [(NAN, 0)] * n_times
+        for place in self.runs:
+            until[place] = compared(statistics.median(self.seconds[place]), min(self.seconds[place])), self.evaluations[place]
+        return replace(row, seconds=statistics.median(seconds), least=min(seconds), repeats=len(seconds),
+                       evaluations=self.evaluations[end], until=tuple(until))
+
+    def _repeat(self, place: int, repeats: int) -> None:
+        now: list[float] = []
+        each = -(-repeats // PASSES)
+        while not now or (sum(now) < ENOUGH / PASSES and (
+                len(now) < each or (len(now) * min(now) < MUCH and len(now) < MOST * each))):
+            took, self.evaluations[place] = self.runs[place]()
+            now.append(took)
+        self.seconds[place] += now

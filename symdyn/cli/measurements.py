@@ -1,0 +1,120 @@
+"""What `symdyn bench` measures under words of their own: a row of a table for each."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symdyn.cli.messages import FAILED
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a word: the parameter of the function that takes it, its flag ("" for what stands without one), what argparse
+    is told besides."""
+
+    parameter: str
+    flag: str
+    told: dict[str, Any]
+
+    def add(self, parser: argparse.ArgumentParser) -> None:
+        """Add it to a parser."""
+        if self.flag:
+            parser.add_argument(self.flag, dest=self.parameter, **self.told)
+        else:
+            parser.add_argument(self.parameter, **self.told)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A word after `symdyn bench`: where its function is ("module:name", imported when it is called; it returns how many bounds
+    are missed), what it does, its options."""
+
+    where: str
+    text: str
+    options: tuple[Option, ...] = ()
+
+    def function(self) -> Callable[..., int]:
+        """What is called."""
+        module, _, name = self.where.partition(":")
+        return getattr(importlib.import_module(module), name)  # type: ignore[no-any-return]
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Measure; a missed bound is a failure. What is not given takes the function's default."""
+        given = {o.parameter: getattr(arguments, o.parameter) for o in self.options}
+        return FAILED if self.function()(**{name: value for name, value in given.items() if value is not None}) else 0
+
+
+def _names(flag: str, parameter: str, text: str, metavar: str = "NAME") -> Option:
+    return Option(parameter, flag, {"metavar": metavar, "nargs": "+", "help": f"{text} (default: all)"})
+
+
+def _number(flag: str, parameter: str, text: str, kind: type = int, metavar: str = "N") -> Option:
+    return Option(parameter, flag, {"metavar": metavar, "type": kind, "help": text})
+
+
+def _folder(name: str) -> Option:
+    return Option("folder", "--output", {"metavar": "DIR", "type": Path, "help": f"folder for files (default: generated/{name})"})
+
+
+_ONLY = _names("--only", "only", "some of the groups of figures", "GROUP")
+_TIMED = _number("--repeats", "repeats", "timed runs, of which the median counts (default: 5)")
+_BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
+_JSON = Option("to_json", "--json", {"metavar": "FILE", "type": Path, "help": "write everything that was measured into a file"})
+_DIGITS = _number("--digits", "digits", "of the local errors (default: 26)")
+
+MEASUREMENTS: dict[str, Measurement] = {
+    "figures": Measurement(
+        "symdyn.bench.pipeline:run", "the pipeline, from description to motion: times, operations, energy errors", (_ONLY,)),
+    "peers": Measurement(
+        "symdyn.bench.peers.command:run", "accelerations beside Pinocchio and CasADi's C code, in one run", (
+            _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON)),
+    "robots": Measurement(
+        "symdyn.bench.robots.command:run", "robots from URDF files beside Pinocchio: agreement, operations, times", (
+            _names("--only", "only", "some of the robots; names with * and ?", "ROBOT"),
+            _number("--states", "states", "random states of each robot (default: 100)"),
+            Option("no_times", "--no-times", {"action": "store_true", "help": "compile nothing"}))),
+    "loops": Measurement(
+        "symdyn.bench.loops:run", "mechanisms with loops beside published motions and closed forms", (
+            _names("--systems", "names", "some of the mechanisms, such as andrews_squeezer or 'n_four_bar(2)'"), _TIMED, _JSON)),
+    "published": Measurement(
+        "symdyn.bench.work.published:run", "published mechanisms within their bounds, in the least time of all programs", (
+            _names("--only", "names", "some of the mechanisms, such as A03"),
+            _names("--against", "peers", "other programs, as of symdyn bench"), _TIMED,
+            _number("--budget", "budget", "begin nothing new after this time", float, "SECONDS"), _folder("published"))),
+    "growth": Measurement(
+        "symdyn.bench.growth:run", "how everything grows with the number of bodies: table and picture", (
+            Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
+                                        "help": "numbers of bodies (default: 2 to 100)"}),
+            _folder("growth"))),
+    "batch": Measurement(
+        "symdyn.bench.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
+    "sweep": Measurement(
+        "symdyn.bench.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
+            _number("--count", "count", "motions (default: 1000000)"),
+            _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
+    "turbine": Measurement(
+        "symdyn.bench.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
+    "flexible": Measurement(
+        "symdyn.bench.flexible:run", "flexible bodies: published frequencies and motions, energy, limits", (_ONLY,)),
+    "costs": Measurement(
+        "symdyn.bench.cost_model:run", "the constants by which the fastest formulation is predicted, from 40 systems", (_BEST,)),
+    "references": Measurement(
+        "symdyn.bench.work.store:run", "make the references of work against error anew, with more digits than floats", (
+            Option("names", "", {"metavar": "NAME", "nargs": "*", "help": "some of symdyn bench --all (default: all)"}),
+            _DIGITS)),
+    "extended": Measurement(
+        "symdyn.bench.extended:run", "make the references of symdyn bench loops anew, with more digits than floats", (
+            Option("names", "", {"metavar": "NAME", "nargs": "+", "help": "such as puma560, or 'flyball_governor(rods)'"}),
+            _number("--t", "end", "s (default: the system's duration, which is the published one)", float, "END"), _DIGITS,
+            Option("print_only", "--print", {"action": "store_true", "help": "print only, store nothing"}))),
+}
+
+
+def overview() -> str:
+    """A line of every word, for help."""
+    return "\n".join(f"  symdyn bench {word:11} {m.text}" for word, m in MEASUREMENTS.items())

@@ -1,0 +1,127 @@
+"""The words after `symdyn bench`: what each is given, what it returns, what is told when it is asked wrongly."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from symdyn.bench.figures import print_figures
+from symdyn.bench.work import converged, store
+from symdyn.bench.work.cases import known
+from symdyn.cli import main
+from symdyn.cli.measurements import MEASUREMENTS, Measurement, overview
+from symdyn.errors import ArgumentError
+
+ROOT = Path(__file__).parents[2]
+TEXTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "notebooks").glob("*.py"))]
+
+
+@pytest.mark.parametrize("word", MEASUREMENTS)
+def test_a_word_is_in_help_and_takes_what_its_function_takes(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    measurement = MEASUREMENTS[word]
+    with pytest.raises(SystemExit) as stopped:
+        main(["bench", word, "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert stopped.value.code == 0 and said.startswith(f"usage: symdyn bench {word}") and measurement.text in said
+    takes = inspect.signature(measurement.function()).parameters
+    for option in measurement.options:
+        assert option.parameter in takes
+        default = re.search(r"\(default: (\d+)\)", option.told["help"])
+        if default and takes[option.parameter].default is not None:
+            assert int(default[1]) == takes[option.parameter].default
+    needed = {name for name, p in takes.items() if p.default is p.empty}
+    assert needed == {o.parameter for o in measurement.options if o.told.get("nargs") == "+" and not o.flag}
+
+
+def test_help_has_every_word_and_no_mechanism_is_called_like_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["bench", "--help"])
+    assert overview() in capsys.readouterr().out
+    assert not set(MEASUREMENTS) & set(known())
+
+
+def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[dict[str, object]] = []
+
+    def function(**options: object) -> int:
+        given.append(options)
+        return len(given) - 1
+
+    monkeypatch.setattr(Measurement, "function", lambda self: function)
+    assert main(["bench", "loops"]) == 0
+    assert main(["bench", "loops", "--systems", "skate", "bricard", "--repeats", "3", "--json", "rows.json"]) == 1
+    assert main(["bench", "extended", "skate", "--t", "0.5"]) == 1
+    assert given == [{}, {"names": ["skate", "bricard"], "repeats": 3, "to_json": Path("rows.json")},
+                     {"names": ["skate"], "end": 0.5, "print_only": False}]
+
+
+@pytest.mark.parametrize("arguments, said", [
+    (["figurs"], "no measurement 'figurs'; did you mean symdyn bench figures?"),
+    (["pendulum", "turbin"], "no measurement 'turbin'; did you mean symdyn bench turbine?"),
+    (["pendulum", "loops"], "loops is a measurement of its own, which comes first and alone: symdyn bench loops"),
+    (["--progress", "growth"], "growth is a measurement of its own"),
+    (["pendulm"], "there is no mechanism 'pendulm' to measure; did you mean pendulum"),
+    (["figures", "--only", "chian"], "there is no group chian of figures; did you mean chain? There are chain, long_chain"),
+    (["flexible", "--only", "of_no_kind_at_all"], "there is no group of_no_kind_at_all of figures; there are rotating_beam"),
+    (["sweep", "--count", "9"], "9 motions were asked for; pass 10 or more"),
+    (["references", "nothing_of_the_kind"], "there is no mechanism 'nothing_of_the_kind' to measure"),
+    (["extended", "skat"], "did you mean skate"),
+    (["published", "--only", "A99", "--against", "nobody"], "there is no published mechanism 'A99'"),
+])
+def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments, said", [(["growth", "--sizes", "many"], "invalid int value: 'many'"),
+                                             (["extended"], "the following arguments are required: NAME"),
+                                             (["turbine", "pendulum"], "unrecognized arguments: pendulum")])
+def test_what_cannot_be_read_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["bench", *arguments])
+    assert said in capsys.readouterr().err
+
+
+def test_figures_beside_their_bounds(capsys: pytest.CaptureFixture[str]) -> None:
+    def small() -> Iterator[tuple[str, float, str, str]]:
+        yield "within", 1.5, "s", "< 2"
+        yield "on the edge", 2.0, "s", "< 2"
+
+    def not_there() -> Iterator[tuple[str, float, str, str]]:
+        yield "no number", float("nan"), "", ">= 1"
+        yield "a count", 24736.0, "", ""
+
+    groups = (small, not_there)
+    assert print_figures(groups) == 2 and print_figures(groups, ["small"]) == 1 and print_figures(groups, ["not_there"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.endswith("MISSED") for line in lines[:4]] == [False, True, True, False] and len(lines) == 8
+    assert lines[3].split() == ["a", "count", "24736"]
+    with pytest.raises(ArgumentError, match="did you mean small"):
+        print_figures(groups, ["smal"])
+
+
+def test_references_are_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(store, "STORE", tmp_path / "references.json")
+    assert main(["bench", "references", "pendulum", "--digits", "6"]) == 0
+    assert list(store.stored()) == ["pendulum"] and capsys.readouterr().out.startswith("pendulum: ")
+
+    def too_long(*given: object) -> None:
+        raise converged.TooLong("it would take too long")
+
+    monkeypatch.setattr(converged, "converged", too_long)
+    assert main(["bench", "references", "double_pendulum"]) == 1
+    assert capsys.readouterr().out == "double_pendulum: it would take too long\n" and list(store.stored()) == ["pendulum"]
+
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
+def test_commands_in_texts_are_there(path: Path) -> None:
+    """What README, notebooks and the change log call is a word or a mechanism; every word is in README."""
+    text = path.read_text(encoding="utf-8")
+    named = set(re.findall(r"symdyn bench (\w+)", text))
+    assert named <= {*MEASUREMENTS, *known(), "NAME"} and "python -m symdyn" not in text
+    assert path.name != "README.md" or set(MEASUREMENTS) <= named | set(re.findall(r"`(\w+)`", text))
