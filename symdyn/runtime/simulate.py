@@ -49,11 +49,12 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
     rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol
     method      compiled: one of symdyn.runtime.methods.COMPILED: "dop853" (default with the C backend), "bs54" for loose
-                tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very long
-                conservative motion (with first_step all its steps have that length, and tolerances do not count); or one of
-                SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact Jacobian. With constraints also
-                "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit method (pip install
-                'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and constraints; `Solution.why` tells
+                tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very
+                long conservative motion (with first_step all its steps have that length, and tolerances do not count); or one
+                of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
+                Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit
+                method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and constraints;
+                `Solution.why` tells
     max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
     progress    show a bar (needs tqdm)
     work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
