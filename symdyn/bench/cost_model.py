@@ -27,6 +27,7 @@ from symdyn.choice import (
     solving_instructions,
     terms,
 )
+from symdyn.errors import ArgumentError
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.recursion import recursive
 from symdyn.model.system import System
@@ -167,6 +168,8 @@ def print_system(samples: Sequence[Sample]) -> None:
 
 def run(repeats: int = 40) -> int:
     """Measure, print every system, what each model loses, its constants, and what the constants in use lose; returns 0."""
+    if repeats < 1:
+        raise ArgumentError(f"{repeats} repeats were asked for; pass 1 or more")
     samples: list[Sample] = []
     print(f"  {HEADING}")
     for name, make in systems().items():

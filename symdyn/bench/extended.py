@@ -7,6 +7,7 @@ extended.json beside this module.
 from __future__ import annotations
 
 import json
+import math
 import re
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +20,7 @@ import mpmath
 from symdyn.bench.extrapolation import integrate
 from symdyn.bench.loop_cases import CASES
 from symdyn.bench.precise import Lost, decimal, program
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.systems import get
 
@@ -183,9 +184,13 @@ def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, pr
     end     s (default: the system's duration, which is the published one)
     digits  of the local errors
     """
+    if end is not None and not 0 < end < math.inf:
+        raise ArgumentError(f"the end is {end!r}; pass a positive time, s")
+    if digits < 1:
+        raise ArgumentError(f"{digits} digits were asked for; pass 1 or more")
     for name, system in [(name, CASES[name].system() if name in CASES else get(name)) for name in names]:
         begun = clock.perf_counter()
-        made = record(system.equations(), end or system.duration, digits)
+        made = record(system.equations(), system.duration if end is None else end, digits)
         print(f"{name} at t = {made['t']:g} s: {made['digits']} digits, runs of tolerance {' and '.join(made['tolerances'])} "
               f"differ by {made['runs_differ_by']:.2g}; {made['steps']} steps, {made['evaluations']} evaluations, "
               f"{clock.perf_counter() - begun:.0f} s")

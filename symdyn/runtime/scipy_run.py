@@ -117,7 +117,7 @@ class _Run:
         self.here, self.state = request.span[0], request.x0
         self.ts, self.xs = [self.here], [self.state]
         self.pending = list(request.times[1:]) if request.times is not None else []
-        self.accepted, self.spent, self.message, self.over = 0, 0, "", False
+        self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0), "", False
         self.solver: Any = None
         self.dense: Any = None
 
@@ -250,7 +250,7 @@ class _Run:
         if self.here == t_end:
             return
         step = solver.direction * 1e-6 * solver.step_size
-        self.spent += int(solver.nfev)
+        self.spent = self._used()
         later = {k: v for k, v in self.options.items() if k != "first_step"}
         self.solver = self.solver_class(self.field, self.here, self.state, t_end, **later)
         locator.begin(self.here, self.state, self.field(self.here, self.state), step)
@@ -266,11 +266,17 @@ class _Run:
         t, x = np.array(self.ts[:n]), np.array(self.xs[:n])
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
-        used = (0, 0, 0) if self.solver is None else (self.solver.nfev, self.solver.njev, self.solver.nlu)
-        return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, 0, self.spent + int(used[0]),
+        evaluations, jacobians, factorizations = self._used()
+        return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, 0, evaluations,
                        corrections=self.projector.corrections if self.projector is not None else Corrections(),
                        happened=self.locator.happened if self.locator is not None else (),
-                       n_jacobians=int(used[1]), n_factorizations=int(used[2]))
+                       n_jacobians=jacobians, n_factorizations=factorizations)
+
+    def _used(self) -> tuple[int, int, int]:
+        """Evaluations, Jacobians and factorizations of all solvers so far."""
+        solver = self.solver
+        now = (0, 0, 0) if solver is None else (int(solver.nfev), int(solver.njev), int(solver.nlu))
+        return self.spent[0] + now[0], self.spent[1] + now[1], self.spent[2] + now[2]
 
 
 def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:

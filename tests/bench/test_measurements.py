@@ -70,6 +70,12 @@ def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypat
     (["sweep", "--count", "9"], "9 motions were asked for; pass 10 or more"),
     (["references", "nothing_of_the_kind"], "there is no mechanism 'nothing_of_the_kind' to measure"),
     (["extended", "skat"], "did you mean skate"),
+    (["extended", "skate", "--t", "nan"], "the end is nan; pass a positive time, s"),
+    (["extended", "skate", "--digits", "0"], "0 digits were asked for; pass 1 or more"),
+    (["references", "pendulum", "--digits", "0"], "0 digits were asked for; pass 1 or more"),
+    (["costs", "--repeats", "0"], "0 repeats were asked for; pass 1 or more"),
+    (["pendulum", "--end", "0"], "the end 0.0 of pendulum must be a positive time, s"),
+    (["pendulum", "--rtol", "0.5"], "the tolerance 0.5 does not lie between 1e-15 and 0.1"),
     (["published", "--only", "A99", "--against", "nobody"], "there is no published mechanism 'A99'"),
 ])
 def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

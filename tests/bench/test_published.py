@@ -126,7 +126,14 @@ def test_a_faster_program_is_a_missed_bound():
     assert result.missed() == [0.1] and "within 0.1: symdyn dop853 2000 ms; other 1000 ms, 0.5 times ours MISSED" in str(result)
     assert Result(_short(), "", [theirs], {}).missed() == [0.1, 1e-3]
     assert Result(_short(), "", [ours], {}).missed() == []
-    assert Run(1e-3, 0.0, [1.0, 1.1, 1.2]).time == 1.1 and Run(1e-3, 0.0, [1.0, 2.0, 2.1]).time == 1.0
+    assert Run(1e-3, 0.0, [1.2, 1.0, 2.1]).time == 1.0
+    cut = Result(_short(), "", [ours, theirs], {}, unfinished=True)
+    assert cut.missed() == [] and "not decided, the budget was used up" in str(cut) and cut.record()["unfinished"]
+
+
+def test_what_a_budget_leaves_is_told(tmp_path, capsys):
+    assert published.run(["A01", "A05"], ["heyoka"], budget=1e-9, folder=tmp_path) == 2
+    assert "the budget of 1e-09 s is used up: A01, A05 were not begun" in capsys.readouterr().out
 
 
 def test_what_never_gets_within_the_bounds_is_left_out_with_the_error(monkeypatch):

@@ -14,6 +14,8 @@ from symdyn.errors import ArgumentError
 
 # Of the usual grid, and the most to a decade.
 LOOSEST, TIGHTEST, DENSEST = 1e-3, 1e-15, 10
+# What no method takes tolerances above.
+LARGEST = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,8 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
     faults = [*_unknown(formulations, known, "formulation"), *_unknown(method_names, methods.names(), "method"),
               *_unknown(peers, against.names(), "peer")]
     for value in tolerances or ():
-        if not (_is_number(value) and TIGHTEST <= value < 1):
-            faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and 1")
+        if not (_is_number(value) and TIGHTEST <= value <= LARGEST):
+            faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and {LARGEST:g}")
     shortest = min((s.end for s in subjects), default=math.inf)
     for value in steps or ():
         if not (_is_number(value) and 0 < value <= shortest):

@@ -98,7 +98,7 @@ def subject(name: str, end: float | None = None) -> Subject:
                 raise ArgumentError(f"{found[1]} takes no option, found {name!r}")
             options = {first.name: int(found[2]) if found[2].isdigit() else found[2]}
         case = Case(found[1], options)
-    made = from_maker(file_name(name), case.maker(), end or case.end, case.options)
+    made = from_maker(file_name(name), case.maker(), case.end if end is None else end, case.options)
     return Subject(made.name, made.variants, made.end, closed=case.closed, source=case.source)
 
 
@@ -124,17 +124,17 @@ def from_maker(name: str, make: Callable[..., System], end: float | None = None,
     takes = {p.name: p.default for p in inspect.signature(make).parameters.values()}
     both = _ORIENTATION in takes and takes[_ORIENTATION] in _ORIENTATIONS and _ORIENTATION not in options
     variants = {v: make(**options, **({_ORIENTATION: v} if both else {})) for v in (_ORIENTATIONS if both else ("",))}
-    return Subject(name, variants, float(end or next(iter(variants.values())).duration))
+    return Subject(name, variants, float(next(iter(variants.values())).duration if end is None else end))
 
 
 def of_system(system: System, end: float | None = None) -> Subject:
     """What is measured of one system."""
-    return Subject(file_name(system.name), {"": system}, float(end or system.duration))
+    return Subject(file_name(system.name), {"": system}, float(system.duration if end is None else end))
 
 
 def of_equations(equations: Equations, end: float | None = None) -> Subject:
     """What is measured of equations, such as those of sd.embedding."""
-    return Subject(file_name(equations.name), {}, float(end or equations.symbols.duration), given=equations)
+    return Subject(file_name(equations.name), {}, float(equations.symbols.duration if end is None else end), given=equations)
 
 
 def file_name(name: str) -> str:

@@ -74,7 +74,7 @@ def _which(row: Row | None) -> str:
 
 def _row(row: Row, indices: Sequence[int]) -> dict[str, Any]:
     return {"formulation": title(row.formulation), "method": row.method, "setting": row.setting, "message": row.message,
-            "ms": "" if math.isnan(row.time) else milliseconds(row.time) + "*" * row.disturbed,
+            "ms": "" if math.isnan(row.seconds) else milliseconds(row.seconds) + "*" * row.disturbed,
             "evaluations": row.evaluations or "–", "steps": row.steps or "–",
             "operations": f"{row.operations:.3g}" if row.operations else "–",
             "errors": [figure(row.error_q), figure(row.error_u), *[figure(row.error_at(k)) for k in indices], figure(row.worst)],

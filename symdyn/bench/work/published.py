@@ -21,20 +21,21 @@ from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.compiler import require_compiler
 
 LEGEND = f"""\
-ms: inside the integrator, to the end, median of the runs, or their least time, marked *, where the median is far above it; error:
-of all outputs, root mean square of differences relative to the exact value, or to {THRESHOLD:g} where that is larger; of A03 q
-the largest relative one. The library's text gives bounds (low and high precision), outputs and threshold of A01 and A02(40);
-they are taken for the others as they are of A02(40). Runs with outputs take the same steps and are not timed."""
+ms: inside the integrator, to the end, least time of the runs, which are the same bit by bit; error: of all outputs, root mean
+square of differences relative to the exact value, or to {THRESHOLD:g} where that is larger; of A03 q the largest relative one.
+The library's text gives bounds (low and high precision), outputs and threshold of A01 and A02(40); they are taken for the
+others as they are of A02(40). Runs with outputs take the same steps and are not timed."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """One mechanism; reference: how it was made; left_out: programs with the reason."""
+    """One mechanism; reference: how it was made; left_out: programs with the reason; unfinished: the budget ended it."""
 
     case: Case
     reference: str
     lines: list[Line]
     left_out: dict[str, str]
+    unfinished: bool = False
 
     def least(self, bound: float, peer: bool) -> tuple[Line, Run] | None:
         """The fastest within a bound, of other programs or of ours."""
@@ -42,7 +43,9 @@ class Result:
         return min(found, key=lambda both: both[1].time, default=None)
 
     def missed(self) -> list[float]:
-        """The bounds within which ours is not the first."""
+        """The bounds within which ours is not the first; none where that is not decided."""
+        if self.unfinished:
+            return []
         return [bound for bound in self.case.bounds if (ours := self.least(bound, False)) is None or (
             (theirs := self.least(bound, True)) is not None and theirs[1].time < ours[1].time)]
 
@@ -58,12 +61,14 @@ class Result:
             found = [(line, run) for line in self.lines if (run := line.within(bound)) is not None]
             for line, run in sorted(found, key=lambda both: both[1].time):
                 yield (f"{line.program:26}{line.formulation.name:14}{bound:>8.0e}{run.tolerance:>9.0e}"
-                       f"{run.time * 1e3:>10.4g}{'*' if run.disturbed else ' '}{run.error:>10.1e}")
+                       f"{run.time * 1e3:>11.4g}{run.error:>10.1e}")
             yield self._told(bound)
         for name, why in self.left_out.items():
             yield f"  left out: {name}: {textwrap.shorten(why, 170)}"
 
     def _told(self, bound: float) -> str:
+        if self.unfinished:
+            return f"  within {bound:g}: not decided, the budget was used up before all programs were timed"
         ours, theirs = self.least(bound, False), self.least(bound, True)
         first = "none of ours" if ours is None else f"{ours[0].program} {ours[1].time * 1e3:.4g} ms"
         if theirs is None:
@@ -76,6 +81,7 @@ class Result:
         """As plain data."""
         return {"name": self.case.name, "title": self.case.title, "bounds": self.case.bounds, "reference": self.reference,
                 "outputs": self.case.outputs, "published": self.case.published, "missed": self.missed(),
+                "unfinished": self.unfinished,
                 "threshold": None if self.case.relative else THRESHOLD, "left out": self.left_out, "lines": [
                     {"program": line.program, "formulation": line.formulation.name, "peer": line.peer, "why": line.why,
                      "runs": [{k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(run).items()}
@@ -104,8 +110,8 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
         for line in lines:
             if not any(r.error <= case.bounds[0] for r in line.runs):
                 left_out[f"{line.program}, {line.formulation.name}"] = line.nearest()
-        time_all([(line, run) for line in lines for run in worth(line, case)], repeats)
-    return Result(case, how, lines, left_out)
+        time_all([(line, run) for line in lines for run in worth(line, case)], repeats, deadline)
+    return Result(case, how, lines, left_out, clock.perf_counter() > deadline)
 
 
 def _tell(text: str) -> None:
@@ -114,7 +120,8 @@ def _tell(text: str) -> None:
 
 def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, repeats: int = 5, budget: float | None = None,
         folder: Path | None = None) -> int:
-    """Measure the named mechanisms (default: all) and print a table of each; returns of how many bounds ours is not the first.
+    """Measure the named mechanisms (default: all) and print a table of each; returns of how many bounds ours is not
+    the first, and how many mechanisms are not decided.
 
     names   such as A03;  peers: other programs, default: all;  budget: s, after which nothing new is tried
     folder  of published.json, written after every mechanism (default: generated/published)
@@ -135,12 +142,17 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
     deadline = math.inf if budget is None else clock.perf_counter() + budget
     results: list[Result] = []
     for case in chosen:
+        if clock.perf_counter() > deadline:
+            break
         results.append(measure(case, peers, repeats, deadline, _tell))
         print(results[-1], end="\n\n", flush=True)
         folder.mkdir(parents=True, exist_ok=True)
         data = {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats,
                 "mechanisms": [r.record() for r in results]}
         (folder / "published.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    left = [case.name for case in chosen[len(results):]]
+    if left:
+        print(f"the budget of {budget:g} s is used up: {', '.join(left)} were not begun\n")
     print(LEGEND)
     print(f"wrote {folder / 'published.json'}")
-    return sum(len(r.missed()) for r in results)
+    return sum(len(r.missed()) for r in results) + sum(r.unfinished for r in results) + len(left)

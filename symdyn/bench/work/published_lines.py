@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import statistics
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -35,14 +34,9 @@ class Run:
     seconds: list[float] = field(default_factory=list)
 
     @property
-    def disturbed(self) -> bool:
-        """Whether the machine had other work."""
-        return statistics.median(self.seconds) > 1.5 * min(self.seconds)
-
-    @property
     def time(self) -> float:
         """s"""
-        return min(self.seconds) if self.disturbed else statistics.median(self.seconds)
+        return min(self.seconds)
 
 
 @dataclass
@@ -151,14 +145,18 @@ def worth(line: Line, case: Case) -> list[Run]:
     return [r for r in loose if any(r in [s for s in loose if s.error <= bound][:3] for bound in case.bounds)]
 
 
-def time_all(runs: Sequence[tuple[Line, Run]], repeats: int) -> None:
-    """Time all runs, one after the other, several times over, so that they see the machine alike."""
+def time_all(runs: Sequence[tuple[Line, Run]], repeats: int, deadline: float = math.inf) -> None:
+    """Time all runs, one after the other, several times over, so that they see the machine alike.
+
+    deadline   of time.perf_counter, after which none is begun
+    """
     each = -(-repeats // _PASSES)
     for _ in range(_PASSES):
         for line, run in runs:
             now: list[float] = []
-            while not now or (sum(now) < _ENOUGH and sum(run.seconds) < _PASSES * _ENOUGH and (
-                    len(now) < each or (sum(now) < _MUCH and len(now) < 8 * each))):
+            while clock.perf_counter() < deadline and (not now or (
+                    sum(now) < _ENOUGH and sum(run.seconds) < _PASSES * _ENOUGH and (
+                        len(now) < each or (sum(now) < _MUCH and len(now) < 8 * each)))):
                 try:
                     now.append(line.timed(run.tolerance))
                 except Exception as failed:

@@ -8,13 +8,8 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 NAN = math.nan
-# A median this many times the least time tells of other work on the machine: the runs are the same, bit by bit.
+# A median this many times the least time tells of other work on the machine.
 DISTURBED = 1.25
-
-
-def compared(median: float, least: float) -> float:
-    """The time that is compared: the median, or the least time where other work disturbed the runs."""
-    return least if median > DISTURBED * least else median
 
 
 @dataclass(frozen=True)
@@ -68,8 +63,8 @@ class Row:
 
     @property
     def time(self) -> float:
-        """What is compared, s: the median, or the least time where other work disturbed the runs."""
-        return compared(self.seconds, self.least)
+        """What is compared, s: the least time, since the runs are the same, bit by bit, and other work only lengthens them."""
+        return self.least
 
     @property
     def worst(self) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation
-from symdyn.errors import EvaluationError, SymdynError
+from symdyn.errors import ArgumentError, EvaluationError, SymdynError
 from symdyn.runtime.cache import cache_dir
 
 STORE = Path(__file__).with_name("references.json")
@@ -125,12 +125,14 @@ def run(names: Sequence[str] = (), digits: int | None = None) -> int:
     from symdyn.bench.work.converged import DIGITS, converged
     from symdyn.bench.work.reference import default_times
 
+    if digits is not None and digits < 1:
+        raise ArgumentError(f"{digits} digits were asked for; pass 1 or more")
     failed = 0
     for about in [subject(name) for name in names or CASES]:
         begun = clock.perf_counter()
         first = about.first()
         try:
-            reference, text = converged(first, default_times(about), digits or DIGITS)
+            reference, text = converged(first, default_times(about), DIGITS if digits is None else digits)
         except SymdynError as error:
             failed += 1
             print(f"{about.name}: {error}", flush=True)

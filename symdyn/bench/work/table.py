@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 LEVELS = tuple(10.0**-k for k in range(2, 14))
 LEGEND = """\
-ms: wall time inside the integrator, median of the repeats; operations: evaluations times operations of one; worst: the largest
-error over the reference's times; energy: error of the balance, relative; C: residual of the constraints relative to the
-mechanism's length, and of the norms of Euler parameters; errors q, u: at the end, norm-wise relative to the largest norm of the
-reference over its times, of """
+ms: wall time inside the integrator, median of the repeats (what is compared, and drawn, are the least times); operations:
+evaluations times operations of one; worst: the largest error over the reference's times; energy: error of the balance,
+relative; C: residual of the constraints relative to the mechanism's length, and of the norms of Euler parameters; errors q, u:
+at the end, norm-wise relative to the largest norm of the reference over its times, of """
 
 
 def table(benchmark: Benchmark) -> str:
@@ -44,8 +44,8 @@ def _lines(benchmark: Benchmark) -> Iterator[str]:
         yield from _wrapped(f"left out: {skipped}")
     busy = sum(row.disturbed for row in benchmark.rows)
     if busy:
-        yield (f"the machine had other work: of {busy} of {len(benchmark.rows)} rows the median is over {DISTURBED:g} times the "
-               "least time, which is told in its place, marked *")
+        yield (f"the machine had other work: of {busy} of {len(benchmark.rows)} rows, marked *, the median is over {DISTURBED:g} "
+               "times the least time")
     if benchmark.unfinished:
         yield f"unfinished: {benchmark.unfinished}; run it again with the same output folder to go on"
     yield f"{LEGEND}{benchmark.measure}"
@@ -88,7 +88,7 @@ def _row(row: Row, indices: Sequence[int], widths: tuple[int, int]) -> str:
         return f"{head}  stopped: {textwrap.shorten(row.message, 150)}"
     counts = "".join(f"{n or '-':>{w}}" for n, w in ((row.evaluations, 13), (row.steps, 9)))
     operations = f"{row.operations:.3g}" if row.operations else "-"
-    taken = milliseconds(row.time) + "*" * row.disturbed
+    taken = milliseconds(row.seconds) + "*" * row.disturbed
     return (f"{head}{taken:>10}{counts}{operations:>12}{figure(row.error_q):>9}{figure(row.error_u):>9}"
             + "".join(f"{figure(row.error_at(k)):>10}" for k in indices)
             + f"{figure(row.worst):>9}{figure(row.energy_error):>9}{figure(row.constraint_error):>9}")

@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from symdyn.bench.work.record import NAN, Row, compared
+from symdyn.bench.work.record import NAN, Row
 
 # Passes over all rows that the repeats are spread over: the speed of a processor that others use changes within seconds.
 PASSES = 3
@@ -47,7 +47,7 @@ class Timing:
         seconds = self.seconds[end]
         until = [(NAN, 0)] * n_times
         for place in self.runs:
-            until[place] = compared(statistics.median(self.seconds[place]), min(self.seconds[place])), self.evaluations[place]
+            until[place] = min(self.seconds[place]), self.evaluations[place]
         return replace(row, seconds=statistics.median(seconds), least=min(seconds), repeats=len(seconds),
                        evaluations=self.evaluations[end], until=tuple(until))
 
