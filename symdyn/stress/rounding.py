@@ -13,7 +13,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, CompileError, SymdynError
 from symdyn.pipeline import function_tape
-from symdyn.runtime.compiler import Compiler, _installed, _probe, find_compiler
+from symdyn.runtime.compiler import Compiler, find_compiler, package_path, probe
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
 from symdyn.stress.subject import EPS, Subject, evaluated
 from symdyn.stress.yardstick import CORRECTIONS, conditions, exact, largest, redundant, smoothed, solved, terms, together, weights
@@ -292,11 +292,11 @@ def compilers() -> list[Compiler]:
     if usual is None:
         return []
     found = [usual]
-    path, package = os.environ.get("PATH"), _installed("ziglang")
+    path, package = os.environ.get("PATH"), package_path("ziglang")
     candidates = [("gcc",), ("clang",), *([(str(Path(package).with_name("zig")), "cc")] if package else [])]
     for command in candidates:
         if shutil.which(command[0]):
-            other = _probe(command, path)
+            other = probe(command, path)
             if isinstance(other, Compiler) and other.kind not in [c.kind for c in found]:
                 found.append(other)
     return found

@@ -8,12 +8,12 @@ import mpmath
 import numpy as np
 
 from symdyn.bench.precise import Lost, program
-from symdyn.pipeline import _quantities, function_tape
+from symdyn.pipeline import function_tape, tape_as_derived
 from symdyn.stress.subject import EPS, Subject
 from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node
 from symdyn.tape.tape import unsigned
-from symdyn.verification.identities import _equilibrated
+from symdyn.verification.identities import equilibrated
 
 DIGITS = 32
 # Singular values of the scaled Jacobian below this part of the usual belong to constraints that depend on others but for
@@ -74,7 +74,7 @@ def solved(subject: Subject, name: str) -> bool:
     if subject.has("lam"):
         found += list(subject.equations.quantity("lam").ravel())
     unknown = {unsigned(e) for e in found if isinstance(unsigned(e), Node) and unsigned(e).op != "leaf"}
-    return not unknown.isdisjoint(_quantities(subject.equations, name).steps)
+    return not unknown.isdisjoint(tape_as_derived(subject.equations, name).steps)
 
 
 def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None, scaled: bool = True,
@@ -89,12 +89,13 @@ def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarra
     n = len(subject.symbols.speeds)
     M = subject.evaluate("mass_matrix", t, x, params).reshape(-1, n, n)
     if not subject.constrained:
-        return np.array([_condition(m, -1, scaled) for m in M])
+        return np.array([_condition(_by_diagonal(m) if scaled else m) for m in M])
     C = subject.evaluate("C_r", t, x, params).reshape(len(M), -1, n)
     whole = np.zeros((len(M), n + C.shape[1], n + C.shape[1]))
     whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = M, C, C.transpose(0, 2, 1)
     values = _singular_values(subject, t, x, params)
-    found = np.array([_condition(w, int((v <= DEPENDENT).sum()), scaled) for w, v in zip(whole, values, strict=True)])
+    found = np.array([_condition(equilibrated(w) if scaled else w, int((v <= DEPENDENT).sum()))
+                      for w, v in zip(whole, values, strict=True)])
     if not gradients:
         return found
     return found * [max(1.0, 1 / v[v > DEPENDENT][-1]) if (v > DEPENDENT).any() else np.inf for v in values]
@@ -129,22 +130,21 @@ def smoothed(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, params: 
     return np.any((values > DEPENDENT) & (values < below), axis=1) | (rank < rank.max())  # type: ignore[no-any-return]
 
 
-def _condition(matrix: np.ndarray, without: int, scaled: bool) -> float:
-    """Of a mass matrix, or with constraints without so many singular values."""
+def _by_diagonal(matrix: np.ndarray) -> np.ndarray:
+    """A mass matrix with ones on its diagonal."""
+    size = np.sqrt(np.abs(np.diagonal(matrix)))
+    size = np.where(size > 0, size, 1.0)
+    return matrix / size[:, None] / size[None, :]
+
+
+def _condition(matrix: np.ndarray, without: int = 0) -> float:
+    """Of a matrix without its smallest so many singular values."""
     if not np.isfinite(matrix).all():
         return float("nan")
     if not len(matrix):
         return 1.0
-    if not scaled:
-        pass
-    elif without >= 0:
-        matrix = _equilibrated(matrix)
-    else:
-        size = np.sqrt(np.abs(np.diagonal(matrix)))
-        size = np.where(size > 0, size, 1.0)
-        matrix = matrix / size[:, None] / size[None, :]
     values = np.linalg.svd(matrix, compute_uv=False)
-    last = values[len(values) - 1 - max(without, 0)]
+    last = values[len(values) - 1 - without]
     return float(values[0] / last) if last > 0 else float("inf")
 
 

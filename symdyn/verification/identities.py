@@ -131,7 +131,7 @@ def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
         x = [float(s.values[n.name]) for g in (eq.symbols.coordinates, eq.symbols.speeds, eq.symbols.states) for n in g]
         p, inputs = ([float(s.values[n.name]) for n in g] for g in (eq.symbols.parameters, eq.symbols.inputs))
         matrix = _whole(s)[0].astype(float) if eq.constraints else s["M_tilde"].astype(float)
-        condition = max(1.0, np.linalg.cond(_equilibrated(matrix))) if len(matrix) else 1.0
+        condition = max(1.0, np.linalg.cond(equilibrated(matrix))) if len(matrix) else 1.0
         try:
             found = module.evaluate("rhs", float(s.values["t"]), x, p, inputs)
             lam = module.evaluate("lam", float(s.values["t"]), x, p, inputs) if eq.constraints else np.zeros(0)
@@ -146,7 +146,7 @@ def backend_agrees(backend: str) -> Callable[[Sample], float | None]:
     return check
 
 
-def _equilibrated(matrix: np.ndarray) -> np.ndarray:
+def equilibrated(matrix: np.ndarray) -> np.ndarray:
     """A symmetric matrix with rows and columns scaled, so that units do not count."""
     if len(matrix) and (np.diagonal(matrix) > 0).all():
         return matrix

@@ -41,7 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         subject._cpu,
         subject._private,
         compilers._search,
-        compilers._probe,
+        compilers.probe,
         compilers._accepts_native,
     ):
         cached.cache_clear()

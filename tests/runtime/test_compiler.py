@@ -51,7 +51,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def clear_caches() -> None:
-    for cached in (subject._search, subject._probe, subject._accepts_native):
+    for cached in (subject._search, subject.probe, subject._accepts_native):
         cached.cache_clear()
 
 
