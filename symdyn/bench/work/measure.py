@@ -13,7 +13,7 @@ import numpy as np
 from symdyn.bench.work.against.peer import Peer, Runner
 from symdyn.bench.work.record import NAN, Row
 from symdyn.bench.work.subject import Formulation, Yardstick
-from symdyn.bench.work.timing import Timing
+from symdyn.bench.work.timing import Timing, seconds_of
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 
 # Output times, besides those of the reference, at which energy and constraints are looked at.
@@ -40,7 +40,7 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SimulationWarning)
             timed = formulation.module.simulate(np.array([0.0, until]), **given)
-        return timed.seconds if timed.integrator_seconds is None else timed.integrator_seconds, timed.nfev
+        return seconds_of(timed), timed.nfev
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # it is in the row

@@ -18,6 +18,7 @@ from symdyn.bench.work import against
 from symdyn.bench.work.published_cases import CASES, THRESHOLD, Case
 from symdyn.bench.work.published_lines import Line, Run, lines_of, search, time_all, worth
 from symdyn.errors import SimulationWarning, SymdynError
+from symdyn.pages import write_text
 from symdyn.runtime.compiler import require_compiler
 
 LEGEND = f"""\
@@ -146,10 +147,9 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
             break
         results.append(measure(case, peers, repeats, deadline, _tell))
         print(results[-1], end="\n\n", flush=True)
-        folder.mkdir(parents=True, exist_ok=True)
         data = {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats,
                 "mechanisms": [r.record() for r in results]}
-        (folder / "published.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        write_text(folder / "published.json", json.dumps(data, indent=1) + "\n", "what was measured")
     left = [case.name for case in chosen[len(results):]]
     if left:
         print(f"the budget of {budget:g} s is used up: {', '.join(left)} were not begun\n")

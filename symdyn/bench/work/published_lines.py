@@ -6,20 +6,18 @@ import math
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from symdyn.bench.work import against
 from symdyn.bench.work.published_cases import Case
 from symdyn.bench.work.subject import Formulation
+from symdyn.bench.work.timing import ENOUGH, PASSES, one_pass, seconds_of
 from symdyn.errors import SymdynError
 
 # Tolerances, from loose to tight; between the last that is off by too much and the first that is not, there are _HALVINGS more.
 TOLERANCES = tuple(10.0**-k for k in range(2, 15, 2))
 _HALVINGS = 3
-# Passes over all runs that the repeats are spread over; s after which a run is not repeated, and for which short ones are.
-_PASSES, _ENOUGH, _MUCH = 3, 1.0, 0.02
 # A line whose runs take longer than _SLOW, s, or whose search with all that it compiles takes longer than _PATIENCE, s, is not
 # asked for tighter tolerances.
 _SLOW, _PATIENCE = 10.0, 300.0
@@ -93,11 +91,6 @@ def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[st
                 left_out[peer.name] = str(there) if there is not True else "; ".join(dict.fromkeys(why.values()))
 
 
-def seconds_of(sol: Any) -> float:
-    """Inside the integrator."""
-    return float(sol.seconds if sol.integrator_seconds is None else sol.integrator_seconds)
-
-
 def _own(case: Case, f: Formulation, method: str) -> Line:
     def look(tolerance: float) -> tuple[float, np.ndarray]:
         sol = f.module.simulate(np.r_[0.0, case.times], method=method, rtol=tolerance)
@@ -150,16 +143,10 @@ def time_all(runs: Sequence[tuple[Line, Run]], repeats: int, deadline: float = m
 
     deadline   of time.perf_counter, after which none is begun
     """
-    each = -(-repeats // _PASSES)
-    for _ in range(_PASSES):
-        for line, run in runs:
-            now: list[float] = []
-            while clock.perf_counter() < deadline and (not now or (
-                    sum(now) < _ENOUGH and sum(run.seconds) < _PASSES * _ENOUGH and (
-                        len(now) < each or (sum(now) < _MUCH and len(now) < 8 * each)))):
-                try:
-                    now.append(line.timed(run.tolerance))
-                except Exception as failed:
-                    line.why = str(failed) or type(failed).__name__
-                    break
-            run.seconds += now
+    for line, run in [both for _ in range(PASSES) for both in runs]:
+        if sum(run.seconds) >= ENOUGH:
+            continue
+        try:
+            run.seconds += one_pass(lambda line=line, run=run: line.timed(run.tolerance), repeats, deadline)  # type: ignore[misc]
+        except Exception as failed:  # whatever another program raises is told as its own
+            line.why = str(failed) or type(failed).__name__

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import statistics
+import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from symdyn.bench.work.record import NAN, Row
 
@@ -52,10 +55,26 @@ class Timing:
                        evaluations=self.evaluations[end], until=tuple(until))
 
     def _repeat(self, place: int, repeats: int) -> None:
-        now: list[float] = []
-        each = -(-repeats // PASSES)
-        while not now or (sum(now) < ENOUGH / PASSES and (
-                len(now) < each or (len(now) * min(now) < MUCH and len(now) < MOST * each))):
+        def one() -> float:
             took, self.evaluations[place] = self.runs[place]()
-            now.append(took)
-        self.seconds[place] += now
+            return took
+
+        self.seconds[place] += one_pass(one, repeats)
+
+
+def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:
+    """What the runs of one pass take, s, each as it tells.
+
+    repeats    asked for in all passes together;  deadline: of time.perf_counter, after which none is begun
+    """
+    now: list[float] = []
+    each = -(-repeats // PASSES)
+    while clock.perf_counter() < deadline and (not now or (sum(now) < ENOUGH / PASSES and (
+            len(now) < each or (len(now) * min(now) < MUCH and len(now) < MOST * each)))):
+        now.append(run())
+    return now
+
+
+def seconds_of(solution: Any) -> float:
+    """Inside the integrator, where it tells, else of the whole call."""
+    return float(solution.seconds if solution.integrator_seconds is None else solution.integrator_seconds)
