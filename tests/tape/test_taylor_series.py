@@ -46,6 +46,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Any, Any, Any], Any], Callable[[Any, Any, A
     "add": (lambda r, a, p: a + p * r.sin(a), lambda a, t, p: a + p * mpmath.sin(a)),
     "sub": (lambda r, a, p: p - a * a, lambda a, t, p: p - a * a),
     "mul": (lambda r, a, p: (a + 1) * r.cos(p * a) * (3 * a), lambda a, t, p: (a + 1) * mpmath.cos(p * a) * 3 * a),
+    "multiples": (lambda r, a, p: 1 - p * (2 - 3 * (p * r.sin(a))), lambda a, t, p: 1 - p * (2 - 3 * p * mpmath.sin(a))),
     "square": (lambda r, a, p: (p - 2 * a) * (p - 2 * a), lambda a, t, p: (p - 2 * a) ** 2),
     "div": (lambda r, a, p: r.sin(a) / (p + a), lambda a, t, p: mpmath.sin(a) / (p + a)),
     "reciprocal": (lambda r, a, p: (2 / (1 + a * a)) * r.sin(a), lambda a, t, p: 2 / (1 + a * a) * mpmath.sin(a)),
@@ -105,6 +106,14 @@ def test_what_costs_no_sum() -> None:
     # x' = 3 * 0.75; x'' = 2 x' 0.75 - 3 * 3 y', y' = x y / 2
     assert found[2, 0] * 2 == pytest.approx(2 * 2.25 * 0.75 - 9 * 0.0625)
     assert series(r, [(1 / (1 + x * x)) * y, r.sin(x)], ["x", "y"]).n_s == 4  # x^2, quotient, sine, cosine
+
+
+def test_multiples_of_multiples_are_one_product() -> None:
+    """Constants are multiplied once, not in every order: what varies waits for one product only."""
+    r = Recorder()
+    x, p, f = r.leaf("x", COORDINATE), r.leaf("p", PARAMETER), r.leaf("f", INPUT)
+    once, often = (series(r, [field], ["x"]).next for field in (p * r.sin(x), p * (3 * (1 - p * (f * r.sin(x))))))
+    assert often.count() == once.count()
 
 
 @pytest.mark.parametrize(("op", "why"), [("abs", "switches (abs)"), ("floor", "switches (floor)"), ("sign", "switches (sign)"),

@@ -1617,7 +1617,7 @@ static void four_bar_dop853_judge(four_bar_dop853 *run, const four_bar_dop853_st
     if (failure || !(err <= 1.0)) {
         run->n_rejected++, run->rejected = 1;
         if (h <= step->h_min) run->status = failure ? failure : four_bar_dop853_STEP_TOO_SMALL;
-        grow = failure || !(err <= four_bar_dop853_huge) ? 0.25 : 0.85/step->root;
+        grow = failure || !(err <= four_bar_dop853_huge) ? 0.5 : 0.85/step->root;
         run->h = h*(grow > 0.2 ? grow : 0.2);
         return;
     }
@@ -1646,7 +1646,8 @@ __attribute__((noinline)) static void four_bar_dop853_attempt(four_bar_dop853 *r
     four_bar_dop853_propose(run, &step);
     int failure = four_bar_dop853_try(run, step.h, step.t_new, x_new, xd_new, &err);
     if (!failure && err <= 1.0) failure = four_bar_dop853_eval(run, step.t_new, x_new, xd_new);
-    step.root = four_bar_dop853_root(err > 1e-8 ? err : 1e-8), step.pull = sqrt(sqrt(run->root_old));
+    step.root = 1.0, step.pull = sqrt(sqrt(run->root_old));
+    step.root = four_bar_dop853_root(err > 1e-8 ? err : 1e-8);
     four_bar_dop853_judge(run, &step, failure, err, x_new, xd_new);
 }
 

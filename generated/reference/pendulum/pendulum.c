@@ -627,7 +627,7 @@ static void pendulum_dop853_judge(pendulum_dop853 *run, const pendulum_dop853_st
     if (failure || !(err <= 1.0)) {
         run->n_rejected++, run->rejected = 1;
         if (h <= step->h_min) run->status = failure ? failure : pendulum_dop853_STEP_TOO_SMALL;
-        grow = failure || !(err <= pendulum_dop853_huge) ? 0.25 : 0.85/step->root;
+        grow = failure || !(err <= pendulum_dop853_huge) ? 0.5 : 0.85/step->root;
         run->h = h*(grow > 0.2 ? grow : 0.2);
         return;
     }
@@ -656,7 +656,8 @@ __attribute__((noinline)) static void pendulum_dop853_attempt(pendulum_dop853 *r
     pendulum_dop853_propose(run, &step);
     int failure = pendulum_dop853_try(run, step.h, step.t_new, x_new, xd_new, &err);
     if (!failure && err <= 1.0) failure = pendulum_dop853_eval(run, step.t_new, x_new, xd_new);
-    step.root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8), step.pull = sqrt(sqrt(run->root_old));
+    step.root = 1.0, step.pull = sqrt(sqrt(run->root_old));
+    step.root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8);
     pendulum_dop853_judge(run, &step, failure, err, x_new, xd_new);
 }
 
