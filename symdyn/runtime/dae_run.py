@@ -9,6 +9,8 @@ Source: Gear, Leimkuhler and Gupta, Automatic integration of Euler-Lagrange equa
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +19,8 @@ from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
 from symdyn.runtime.constraints import names, rank
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.outcome import Outcome, Request
-from symdyn.runtime.stabilization import ProjectionFailed, Projector
-from symdyn.runtime.stops import describe_stop, lost_rank, with_last
+from symdyn.runtime.scipy_run import Field, Run
+from symdyn.runtime.stabilization import Projector
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 _UNCONTROLLED = 1e100
 
 
-def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabilization: Any, work: bool, events: bool) -> None:
+def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabilization: Any, work: bool) -> None:
     """Raise ArgumentError if the form does not apply, MissingExtra if the solver is not installed."""
     known = names(module)
     if not known:
@@ -39,8 +41,6 @@ def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabi
     if work:
         raise ArgumentError(f"{module.name}: method 'ggl' does not integrate the work of loads; leave out work=True, or take "
                             "another method")
-    if events:
-        raise ArgumentError(f"{module.name}: method 'ggl' does not look for events; pass events=False, or take another method")
     independent = int(rank(module, t, x, params))
     if independent < len(known):
         raise ArgumentError(f"{module.name}: method 'ggl' needs independent constraints; of {len(known)} only {independent} are. "
@@ -57,82 +57,100 @@ def _solver() -> Any:
 
 
 def run_ggl(module: Module, request: Request, bar: Any = None) -> Outcome:
-    """Integrate step by step, so that nothing is lost when a step fails."""
-    n_x, n_c, free = request.n_state, len(names(module)), request.inputs
-    n_in = len(free.constant)
-    evaluator = module.unit("residual").evaluator("residual")
-    evaluator.set_params(request.p)
-    trouble: list[str] = []
-    raised: list[Exception] = []
+    """Integrate from the nearest state that fulfils the constraints."""
+    return _Run(module, request, Stabilized, "rhs").through(bar)
 
-    def residual(t: float, y: np.ndarray, yd: np.ndarray) -> np.ndarray:
-        state = y[:n_x]
+
+class _Run(Run):
+    def start(self) -> None:
+        self.xs[0] = self.state = Projector(self.module, self.request.p)(self.here, self.request.x0)
+        super().start()
+
+    def outcome(self, interrupted: bool) -> Outcome:
+        made = super().outcome(interrupted)
+        return replace(made, n_rejected=self.solver.n_rejected) if self.solver is not None else made
+
+
+class Stabilized:
+    """The solver, called like those of SciPy: its y is the state of the mechanism, without the integrals of multipliers.
+
+    field   right-hand side, of whose mechanism and inputs it is; x0: on the constraints
+    """
+
+    def __init__(self, field: Field, t0: float, x0: np.ndarray, t_end: float, rtol: float, atol: np.ndarray,
+                 max_step: float = np.inf, first_step: float | None = None) -> None:
+        module, p, integrals = field.module, field.request.p, np.zeros(len(names(field.module)))
+        self.field, self.n_x = field, len(x0)
+        self.evaluator = module.unit("residual").evaluator("residual")
+        self.evaluator.set_params(p)
+        lam = module.evaluate("lam", t0, x0, p, field.given(t0, x0))
+        self.solver = _solver()(self.residual, t0, np.concatenate([x0, integrals, integrals]),
+                                np.concatenate([field(t0, x0), lam, integrals]), t_end, rtol=rtol, max_step=max_step,
+                                atol=np.append(atol, np.full(2 * len(lam), _UNCONTROLLED)), first_step=first_step)
+        self.status = self.solver.status
+
+    def residual(self, t: float, y: np.ndarray, yd: np.ndarray) -> np.ndarray:
+        """Of the form, (n_x + 2 n_c,); NaN where it cannot be evaluated, which the field keeps the reason of."""
+        state = y[:self.n_x]
+        inputs = self.field.given(t, state)
         try:
-            inputs = free.at(t, state) if n_in else None
-        except Exception as error:
-            raised.append(error)
-            raise
-        try:
-            return evaluator.one(t, state, inputs, yd)
+            return self.evaluator.one(t, state, inputs if self.field.n_in else None, yd)
         except EvaluationError as error:
             if np.isfinite(y).all() and np.isfinite(yd).all():
-                trouble.append(str(error).removeprefix(f"{module.name}: ") + not_finite(module.metadata["inputs"], inputs, t))
+                told = not_finite(self.field.module.metadata["inputs"], inputs, t)
+                self.field.trouble.append(str(error).removeprefix(f"{self.field.module.name}: ") + told)
             return np.full(len(y), np.nan)
 
-    t0, t_end = request.span
-    here, state = t0, request.x0
-    ts, xs = [t0], [state]
-    pending = list(request.times[1:]) if request.times is not None else []
-    accepted, message, interrupted = 0, "", False
-    solver: Any = None
-    try:
-        with np.errstate(all="ignore"):
-            state = Projector(module, request.p)(t0, request.x0)
-            inputs = free.at(t0, state) if n_in else ()
-            lam = module.evaluate("lam", t0, state, request.p, inputs)
-            xs[0] = state
-            y0 = np.concatenate([state, np.zeros(2 * n_c)])
-            yd0 = np.concatenate([module.evaluate("rhs", t0, state, request.p, inputs), lam, np.zeros(n_c)])
-            if t_end == t0:
-                times = request.times if request.times is not None else np.array([t0])
-                ts, xs = list(times), [state] * len(times)
-            else:
-                solver = _solver()(residual, t0, y0, yd0, t_end, rtol=request.rtol, max_step=request.max_step or np.inf,
-                                   atol=np.append(request.atol, np.full(2 * n_c, _UNCONTROLLED)),
-                                   first_step=request.first_step or None)
-            while solver is not None and solver.status == "running":
-                before = solver.t
-                note = solver.step()
-                if solver.status == "failed" or not np.isfinite(solver.y).all():
-                    message = trouble[-1] if trouble else (note or "the state is not finite").rstrip(".") + lost_rank(
-                        module, here, state, request.p, request.x0, t0)
-                    break
-                accepted += 1
-                here, state = float(solver.t), solver.y[:n_x].copy()
-                trouble.clear()
-                if request.times is None:
-                    ts.append(here)
-                    xs.append(state)
-                while pending and (pending[0] - solver.t) * solver.direction <= 0:
-                    xs.append(state if pending[0] == solver.t else solver.dense_output()(pending[0])[0][:n_x])
-                    ts.append(pending.pop(0))
-                if bar is not None:
-                    bar.update(abs(solver.t - before))
-                if request.max_steps is not None and accepted >= request.max_steps and solver.status == "running":
-                    message = f"stopped after {accepted} steps, as asked"
-                    break
-    except KeyboardInterrupt:
-        interrupted, message = True, "interrupted"
-    except ProjectionFailed as error:
-        message = str(error)
-    except (ValueError, ArithmeticError) as error:
-        if error in raised:
-            raise
-        message = trouble[-1] if trouble else str(error)
-    n = min(len(ts), len(xs))  # an interrupt may come between them
-    t, x = np.array(ts[:n]), np.array(xs[:n])
-    if message:
-        message = describe_stop(module.metadata, here, state, message)
-        t, x = with_last(t, x, here, state)
-    return Outcome(t, x, not message, message or "reached the end", interrupted, accepted,
-                   int(getattr(solver, "nrejct", 0)), int(getattr(solver, "nfev", 0)))
+    def step(self) -> str | None:
+        """One step; returns why it failed."""
+        if self.t == self.solver.t_bound:
+            self.status = "finished"
+            return None
+        note: str | None = self.solver.step()
+        self.status = self.solver.status
+        return note
+
+    def dense_output(self) -> Callable[[float], np.ndarray]:
+        """The state within the latest step."""
+        polynomials = self.solver.dense_output()
+        return lambda t: np.asarray(polynomials(t)[0][:self.n_x])
+
+    @property
+    def t(self) -> float:
+        """s"""
+        return float(self.solver.t)
+
+    @property
+    def y(self) -> np.ndarray:
+        """The state, (n_x,)."""
+        return np.asarray(self.solver.y[:self.n_x])
+
+    @property
+    def direction(self) -> float:
+        """1, or -1 backward."""
+        return float(self.solver.direction)
+
+    @property
+    def step_size(self) -> float:
+        """Of the latest step, s."""
+        return abs(self.t - float(self.solver.t_old))
+
+    @property
+    def nfev(self) -> int:
+        """Evaluations of the residual."""
+        return int(self.solver.nfev)
+
+    @property
+    def n_rejected(self) -> int:
+        """Steps given up."""
+        return int(self.solver.nrejct)
+
+    @property
+    def njev(self) -> int:
+        """Jacobians."""
+        return int(self.solver.njev)
+
+    @property
+    def nlu(self) -> int:
+        """Factorizations."""
+        return int(self.solver.nlu)

@@ -1,4 +1,4 @@
-"""Integration by SciPy's solvers, step by step, so that nothing is lost when a step fails."""
+"""Integration by SciPy's solvers, or by what has their interface, step by step, so that nothing is lost when a step fails."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def takes_changed_states(solver_class: Any) -> bool:
     return issubclass(solver_class, (RungeKutta, Radau))
 
 
-class _Field:
+class Field:
     """The right-hand side as SciPy calls it; it keeps why the step under way could not be evaluated."""
 
     def __init__(self, module: Module, request: Request, name: str) -> None:
@@ -98,14 +98,13 @@ class _Cut(NamedTuple):
     after: np.ndarray | None
 
 
-class _Run:
-    """One run of a solver, with what is stored of it."""
+class Run:
+    """One run of a solver, with what is stored of it; solver_class: of SciPy, or called like these."""
 
-    def __init__(self, module: Module, request: Request, method: Any, field_name: str) -> None:
-        self.module, self.request = module, request
-        self.solver_class = solver_class_of(module, method)
+    def __init__(self, module: Module, request: Request, solver_class: Any, field_name: str) -> None:
+        self.module, self.request, self.solver_class = module, request, solver_class
         self.metadata = module.unit(field_name).metadata
-        self.field = _Field(module, request, field_name)
+        self.field = Field(module, request, field_name)
         self.options = self._options()
         way = request.stabilization.way
         self.projector = Projector(module, request.p) if way == "projection" else None
@@ -278,25 +277,28 @@ class _Run:
         now = (0, 0, 0) if solver is None else (int(solver.nfev), int(solver.njev), int(solver.nlu))
         return self.spent[0] + now[0], self.spent[1] + now[1], self.spent[2] + now[2]
 
+    def through(self, bar: Any) -> Outcome:
+        """To the end, or as far as it gets."""
+        interrupted = False
+        try:
+            with np.errstate(all="ignore"):
+                self.start()
+                while self.running:
+                    before = self.here
+                    self.step()
+                    if bar is not None:
+                        bar.update(abs(self.here - before))
+        except KeyboardInterrupt:
+            interrupted, self.message = True, "interrupted"
+        except ProjectionFailed as error:
+            self.message = str(error) + self.dependent()
+        except (ValueError, ArithmeticError) as error:
+            if error in self.field.raised:
+                raise
+            self.message = (self.field.trouble[-1] if self.field.trouble else str(error)) + self.dependent()
+        return self.outcome(interrupted)
+
 
 def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
-    """Integrate with SciPy, step by step, so that nothing is lost when a step fails."""
-    run = _Run(module, request, method, field_name)
-    interrupted = False
-    try:
-        with np.errstate(all="ignore"):
-            run.start()
-            while run.running:
-                before = run.here
-                run.step()
-                if bar is not None:
-                    bar.update(abs(run.here - before))
-    except KeyboardInterrupt:
-        interrupted, run.message = True, "interrupted"
-    except ProjectionFailed as error:
-        run.message = str(error) + run.dependent()
-    except (ValueError, ArithmeticError) as error:
-        if error in run.field.raised:
-            raise
-        run.message = (run.field.trouble[-1] if run.field.trouble else str(error)) + run.dependent()
-    return run.outcome(interrupted)
+    """Integrate with SciPy."""
+    return Run(module, request, solver_class_of(module, method), field_name).through(bar)

@@ -92,7 +92,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     if method == "ggl":
         from symdyn.runtime.dae_run import check_ggl
 
-        check_ggl(module, start, p, span[0], stabilization, work, bool(wanted(module, events).any()))
+        check_ggl(module, start, p, span[0], stabilization, work)
     else:
         request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
         if request.stabilization.way == "baumgarte":

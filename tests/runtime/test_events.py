@@ -212,7 +212,8 @@ def test_event_at_the_very_end_of_a_step() -> None:
         assert run.events["clock"].t == pytest.approx([1.0], abs=1e-15), method
 
 
-@pytest.mark.parametrize(("method", "way"), [("dop853", "baumgarte"), ("dop853", "none"), ("RK45", "baumgarte"), ("LSODA", None)])
+@pytest.mark.parametrize(("method", "way"), [("dop853", "baumgarte"), ("dop853", "none"), ("RK45", "baumgarte"), ("LSODA", None),
+                                             ("ggl", None)])
 def test_reset_is_put_onto_the_constraints_whatever_keeps_the_steps_there(method: str, way: str | None) -> None:
     x, y = sd.coordinates("x y")
     s = sd.System("circling", gravity=[0, -G])
@@ -222,6 +223,13 @@ def test_reset_is_put_onto_the_constraints_whatever_keeps_the_steps_there(method
     s.add_constraint(x**2 + y**2 - 1, "circle")
     s.initial = {x: 1}
     s.add_event("bottom", x, reset={x.dot: -x.dot / 2, y.dot: 3})  # upwards, which the circle does not let it go
-    run = s.augmented().compile(backend="c").simulate((0, 1.2), method=method, stabilization=way, rtol=1e-9)
+    s.add_event("half", x - sp.Rational(1, 2), stop=True, direction=1)
+    if method == "ggl":
+        pytest.importorskip("solve_dae")
+    module = s.augmented().compile(backend="c")
+    run = module.simulate((0, 1.2), method=method, stabilization=way, rtol=1e-9)
     assert run.success and len(run.events["bottom"].t) == 1
     assert np.abs(run["x"] ** 2 + run["y"] ** 2 - 1).max() < 1e-7 and np.abs(run.velocity_violation).max() < 1e-7
+    exact = module.simulate((0, 1.2), rtol=1e-12)
+    assert run.t[-1] == pytest.approx(exact.t[-1], abs=1e-7) and run.x[-1] == pytest.approx(exact.x[-1], abs=1e-6)
+    assert len(run.events["half"].t) == 1 and "event half ended the motion" in run.message
