@@ -217,7 +217,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     projection = None
     if all(n in uses for n in CORRECTIONS):
         projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
-                      "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]]}
+                      "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]],
+                      "angles": [content.units.get(n) in ("rad", "1") for n in groups["q"]]}
 
     metadata = {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,

@@ -67,9 +67,8 @@ static int four_bar_all_finite(const double *values, int n) {
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
 // The angle is reduced to h + l = x - n*pi/2 with |h| <= pi/4, where l is what rounding cuts off h. pi/2 has three parts,
 // the first two of 37 bits, so that their products with n are exact. Polynomials in z = h*h give sin(h + l) and cos(h + l);
-// the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler can take
-// several angles at once, and nothing but IEEE arithmetic in the order written: the same bits from every compiler that does
-// not contract products and sums.
+// the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
+// angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
 // (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
@@ -92,20 +91,18 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     *sine = a.value, *cosine = b.value;
 }
 
-// Larger angles, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
-#if defined(__FAST_MATH__)
-#define SYMDYN_SMALL_ANGLE (-1.0)
-#else
-#define SYMDYN_SMALL_ANGLE 102943.7
-#endif
-
-// Sines and cosines of n angles.
+// Of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
 static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
+#if defined(__FAST_MATH__)
+    const double largest = -1.0;
+#else
+    const double largest = 102943.7;
+#endif
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
-    for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= SYMDYN_SMALL_ANGLE;
+    for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= largest;
     for (int i = 0; !small && i < n; i++)
-        if (!(fabs(angles[i]) <= SYMDYN_SMALL_ANGLE)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
+        if (!(fabs(angles[i]) <= largest)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
 }
 
 // start - a_0 x_0 - ... - a_(n - 1) x_(n - 1), where the a are `step` numbers apart.
@@ -114,8 +111,7 @@ static inline double symdyn_less(double start, int n, const double *a, int step,
     return start;
 }
 
-// A = L D L^T in place, of the lower triangle of A (n x n, rows `row` numbers apart). Returns 1 if no more than `least` is left of
-// a diagonal entry.
+// A = L D L^T in place, by lower triangles (n x n, rows `row` apart). Returns 1 if a pivot is no more than `least` of its entry.
 static int symdyn_factorize(int n, int row, double *A, double least) {
     for (int j = 0; j < n; j++) {
         const double entry = A[j*row + j];
@@ -175,7 +171,7 @@ static int symdyn_saddle(int n, int m, const double *in, double *x) {
     const double *const m_in = in + 1, *const c_in = m_in + n*(n + 1)/2, *const s = c_in + m*n, *const w = s + m;
     const double *const f = w + n, *const d = f + n;
     double M[3][3], A[3][3], C[2][3], rows[2] = { 0.0 }, columns[3], lighter[3];
-    double r[3], lam[2], largest = 0.0;
+    double r[3], lam[2] = { 0.0 }, largest = 0.0;
     // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
     for (int i = 0; i < n; i++) {
         columns[i] = w[i]*w[i]*m_in[i*(i + 1)/2 + i];
@@ -192,7 +188,6 @@ static int symdyn_saddle(int n, int m, const double *in, double *x) {
         double most = 1.0;
         for (int j = 0; j < n; j++) most = c_in[k*n + j] != 0.0 && lighter[j] > most ? lighter[j] : most;
         rows[k] = s[k]/most;
-        lam[k] = 0.0;
         for (int j = 0; j < n; j++) C[k][j] = rows[k]*columns[j]*c_in[k*n + j];
     }
     for (int i = 0; i < n; i++)
@@ -379,7 +374,7 @@ static int four_bar_rhs_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// rhs where it does, or nearly so: 425 operations (39 add, 339 kernel, 41 mul, 6 trig); longest chain 12.
+// rhs where one does, or nearly so: 425 operations (39 add, 339 kernel, 41 mul, 6 trig); longest chain 12.
 static int four_bar_rhs_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -730,7 +725,7 @@ static int four_bar_lam_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// lam where it does, or nearly so: 709 operations (48 add, 605 kernel, 50 mul, 6 trig); longest chain 17.
+// lam where one does, or nearly so: 709 operations (48 add, 605 kernel, 50 mul, 6 trig); longest chain 17.
 static int four_bar_lam_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -1034,7 +1029,7 @@ static int four_bar_reactions_regular(const double *q, const double *u, const do
     return 0;
 }
 
-// reactions where it does, or nearly so: 805 operations (92 add, 605 kernel, 102 mul, 6 trig); longest chain 24.
+// reactions where one does, or nearly so: 805 operations (92 add, 605 kernel, 102 mul, 6 trig); longest chain 24.
 static int four_bar_reactions_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -1223,14 +1218,13 @@ SYMDYN_EXPORT int four_bar_reactions(const double *q, const double *u, const dou
 // What a return code means.
 SYMDYN_EXPORT const char *four_bar_reason(int code);
 SYMDYN_EXPORT const char *four_bar_reason(int code) {
-    switch (code) {
-    case 0: return "no fault";
-    case -1: return "the result is not finite";
-    case 1: return "the dependent speeds do not follow from hinge4_y and hinge4_x here";
-    case 2: return "the mass matrix under the constraints is not positive definite at q2_dot";
-    case 3: return "a speed is held neither by mass nor by a constraint";
-    default: return "unknown code";
-    }
+    static const char *const reasons[] = {
+        "the result is not finite", "no fault",
+        "the dependent speeds do not follow from hinge4_y and hinge4_x here",
+        "the mass matrix under the constraints is not positive definite at q2_dot",
+        "a speed is held neither by mass nor by a constraint",
+    };
+    return code < -1 || code > 3 ? "unknown code" : reasons[code + 1];
 }
 
 // One call for many states: rows of t, of x = [q; u; z] (6), of ud (3), of inputs (0); strides are in rows, 0 repeats
@@ -1329,8 +1323,7 @@ static int four_bar_field(const four_bar_problem *problem, double t, const doubl
 // E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
 // Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
 // error estimate, p. 254). The coefficients are those of the authors' code DOP853.
-// Nothing is allocated and nothing is global: a run lives in one struct, and a run that was interrupted continues to the same
-// bits as one that was not.
+// Nothing is allocated or global: a run lives in one struct, and one that was interrupted continues to the same bits.
 
 enum {
     // t_end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event
@@ -1350,6 +1343,7 @@ typedef struct {
     double t_end, direction;     // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
     double t_slack, h_floor;     // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
     double h, h_max;             // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min, t_new, t_new_low;  // the step that is tried: its length with sign, the shortest one, its end
     double rtol, atol[6];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
     double root_old;             // error of the latest accepted step (tolerated: 1) to the 1/8
     double x[6], xd[6];          // state at t and its derivative
@@ -1357,9 +1351,8 @@ typedef struct {
     int dense_ready, unstored;   // what is needed within the latest step is prepared; (t, x) is not stored yet
     int rejected, status;        // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
-    // The latest evaluation that failed; the run did because of it if status says so, else a smaller step got round it. reason:
-    // what a function returned, 0 if results were not finite or a correction went too far. bad_index: the first state that is
-    // not finite, or the constraint with the largest residual; else -1.
+    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
     int reason;
     long bad_index;
     double t_fail, x_fail[6];
@@ -1368,8 +1361,10 @@ typedef struct {
     double dq, du, residual, largest_dq, largest_du;
     int worst, of_speeds;
     long n_corrected, n_corrections, n_jacobians, n_factorizations;
-    // Steps tried across a position of lost rank; the latest step went across one; the best of those tried.
-    int n_crossing, crossed;
+    double before[6], x_end[6];  // what was projected last; the latest step's end before projection: what is within it ends here
+    int end_moved;               // by more than a thousandth of the tolerance
+    // Steps tried across a position of lost rank; the one that is tried, the latest one goes across one; the best of those tried.
+    int n_crossing, crossing, crossed;
     double k[16][6];  // stages of the latest step; k[12] at its end
     double dense[7][6];  // polynomial of the latest step, if dense_ready
 } four_bar_dop853;
@@ -1383,8 +1378,7 @@ static int four_bar_dop853_fail(four_bar_dop853 *run, int status, int reason, lo
     return status;
 }
 
-// Evaluate the right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that it can be inlined
-// whatever its size.
+// The right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that this can be inlined.
 static int four_bar_dop853_eval(four_bar_dop853 *run, double t, const double *y, double *xd) {
     int bad = 0, first = 0;
     run->n_evaluations++;
@@ -1530,8 +1524,7 @@ static int four_bar_dop853_state_at(four_bar_dop853 *run, double s, double *x) {
     return 0;
 }
 
-// Length of the first step (Hairer, Norsett, Wanner, section II.4), from the size of the state, its derivative and the change of
-// the derivative over a small Euler step.
+// Length of the first step (Hairer, Norsett, Wanner, section II.4): by state, derivative, its change over a small Euler step.
 static double four_bar_dop853_first_step(four_bar_dop853 *run) {
     const double span = fabs(run->t_end - run->t);
     double d0 = 0.0, d1 = 0.0, d2 = 0.0, y[6], yd[6], scale[6];
@@ -1560,8 +1553,7 @@ static int four_bar_dop853_restart(four_bar_dop853 *run, double t, const double 
     if (t == run->t_end) return run->status = four_bar_dop853_DONE;
     if ((run->status = four_bar_dop853_eval(run, t, run->x, run->xd))) return run->status;
     run->h = h_first > 0.0 ? h_first : four_bar_dop853_first_step(run);
-    run->status = four_bar_dop853_STEP_LIMIT;
-    return 0;
+    return run->status = four_bar_dop853_STEP_LIMIT, 0;
 }
 
 // Prepare a run, backward where t_end < t0. told: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
@@ -1584,81 +1576,58 @@ SYMDYN_EXPORT int four_bar_simulation_start(four_bar_dop853 *run, const four_bar
     return bad ? (run->status = four_bar_dop853_BAD_ARGUMENT) : four_bar_dop853_restart(run, t0, x0, h_first);
 }
 
-// A step that is tried: its length with sign, the shortest one, its end, roots of its error and of the one before.
-typedef struct {
-    double h, h_min, t_new, t_low, root, pull;
-    int crossing;
-} four_bar_dop853_step;
-
 // The step to be tried next.
-static void four_bar_dop853_propose(const four_bar_dop853 *run, four_bar_dop853_step *step) {
-    const double rest = fabs((run->t_end - run->t) - run->t_low);
-    const double least = 16.0*four_bar_dop853_eps*fabs(run->t), h_min = least > run->h_floor ? least : run->h_floor;
+static void four_bar_dop853_propose(four_bar_dop853 *run) {
+    const double rest = fabs((run->t_end - run->t) - run->t_low), least = 16.0*four_bar_dop853_eps*fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
-    h = h > h_min ? h : h_min;
-    step->t_low = 0.0, step->crossing = 0;
-    if (1.01*h >= rest) {
-        h = run->direction*rest;
-        step->t_new = run->t_end;
-    } else {
-        if (2.0*h > rest) h = 0.5*rest;  // two equal steps, not a whole one and a bit
-        h *= run->direction;
-        const double way = h + run->t_low, t_new = run->t + way;  // two-sum: the rounding error of t does not build up
-        const double back = t_new - run->t;
-        step->t_low = (run->t - (t_new - back)) + (way - back), step->t_new = t_new;
-    }
-    step->h = h, step->h_min = h_min;
+    run->h_min = least > run->h_floor ? least : run->h_floor;
+    h = h > run->h_min ? h : run->h_min;
+    const int last = 1.01*h >= rest;
+    run->h_try = run->direction*(last ? rest : 2.0*h > rest ? 0.5*rest : h);  // two equal steps, not a whole one and a bit
+    run->t_new = run->t_end, run->t_new_low = 0.0, run->crossing = 0;
+    if (last) return;
+    const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
+    run->t_new = run->t + way;
+    const double back = run->t_new - run->t;
+    run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
-// What becomes of a step, by its error or failure: accepted, it moves (t, x) on; else the next one to be tried is shorter.
-static void four_bar_dop853_judge(four_bar_dop853 *run, const four_bar_dop853_step *step, int failure, double err, const double *x_new, const double *xd_new) {
-    const double h = fabs(step->h);
+// What becomes of a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
+static void four_bar_dop853_judge(four_bar_dop853 *run, int failure, double err, double root, const double *x_new, const double *xd_new) {
+    const double h = fabs(run->h_try);
     double grow;
     if (failure || !(err <= 1.0)) {
         run->n_rejected++, run->rejected = 1;
-        if (h <= step->h_min) run->status = failure ? failure : four_bar_dop853_STEP_TOO_SMALL;
-        grow = failure || !(err <= four_bar_dop853_huge) ? 0.5 : 0.85/step->root;
+        if (h <= run->h_min) run->status = failure ? failure : four_bar_dop853_STEP_TOO_SMALL;
+        grow = failure || !(err <= four_bar_dop853_huge) ? 0.5 : 0.85/root;
         run->h = h*(grow > 0.2 ? grow : 0.2);
         return;
     }
     // PI control (Hairer and Wanner, volume II, section IV.2): h*0.85*err^(-1/8)*err_old^(1/32). Measured for
     // order 8 against h*0.9*err^(-1/8), at equal error: 7 % fewer evaluations for double pendulums, 1 % more for Kepler orbits.
-    grow = 0.85/step->root*step->pull;
-    grow = grow < 6.0 ? grow : 6.0;
-    grow = grow > 0.333 ? grow : 0.333;
+    grow = 0.85/root*sqrt(sqrt(run->root_old));
+    grow = grow > 6.0 ? 6.0 : grow > 0.333 ? grow : 0.333;
     run->h = h*(run->rejected && grow > 1.0 ? 1.0 : grow);
-    run->root_old = step->root > 0.316 ? step->root : 0.316;
-    run->t_old = run->t, run->h_old = step->h;
-    run->t = step->t_new, run->t_low = step->t_low;
+    run->root_old = root > 0.316 ? root : 0.316;
+    run->t_old = run->t, run->h_old = run->h_try;
+    run->t = run->t_new, run->t_low = run->t_new_low;
     for (int i = 0; i < 6; i++) {
         run->x_old[i] = run->x[i];
         run->x[i] = x_new[i], run->xd[i] = xd_new[i];
     }
     run->n_steps++, run->unstored = 1, run->rejected = run->dense_ready = 0;
-    run->crossed = step->crossing, run->n_crossing = 0;
+    run->crossed = run->crossing, run->n_crossing = 0;
     if (run->t == run->t_end) run->status = four_bar_dop853_DONE;
 }
 
 // Try one step. Sets run->status if t_end is reached or if there is no shorter step. (On its own it keeps more in registers.)
 __attribute__((noinline)) static void four_bar_dop853_attempt(four_bar_dop853 *run) {
     double x_new[6], xd_new[6], err = 0.0;
-    four_bar_dop853_step step;
-    four_bar_dop853_propose(run, &step);
-    int failure = four_bar_dop853_try(run, step.h, step.t_new, x_new, xd_new, &err);
-    if (!failure && err <= 1.0) failure = four_bar_dop853_eval(run, step.t_new, x_new, xd_new);
-    step.root = 1.0, step.pull = sqrt(sqrt(run->root_old));
-    step.root = four_bar_dop853_root(err > 1e-8 ? err : 1e-8);
-    four_bar_dop853_judge(run, &step, failure, err, x_new, xd_new);
-}
-
-// Write the end of the latest step unless that is done; returns 0 or STORE_FULL.
-static int four_bar_dop853_store(four_bar_dop853 *run, double *t, long n, double *x, long *n_written) {
-    if (!run->unstored) return 0;
-    if (*n_written >= n) return four_bar_dop853_STORE_FULL;
-    t[*n_written] = run->t;
-    for (int i = 0; i < 6; i++) x[*n_written*6 + i] = run->x[i];
-    ++*n_written, run->unstored = 0;
-    return 0;
+    four_bar_dop853_propose(run);
+    int failure = four_bar_dop853_try(run, run->h_try, run->t_new, x_new, xd_new, &err);
+    if (!failure && err <= 1.0) failure = four_bar_dop853_eval(run, run->t_new, x_new, xd_new);
+    const double root = four_bar_dop853_root(err > 1e-8 ? err : 1e-8);
+    four_bar_dop853_judge(run, failure, err, root, x_new, xd_new);
 }
 
 // Write the requested times that are passed by now; returns 0 or a failure.
@@ -1670,11 +1639,9 @@ static int four_bar_dop853_serve(four_bar_dop853 *run, const double *t_out, long
         if (run->direction == 0.0 ? !(fabs(s - run->t) <= run->t_slack)
                 : !(ahead <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;  // not reached yet
         if (behind > run->t_slack) return four_bar_dop853_BAD_OUTPUT_TIME;
-        if (ahead >= 0.0 || behind >= 0.0) {
-            for (int i = 0; i < 6; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
-            continue;
-        }
-        const int failure = four_bar_dop853_state_at(run, s, x);
+        int failure = 0;
+        if (ahead >= 0.0 || behind >= 0.0) for (int i = 0; i < 6; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
+        else failure = four_bar_dop853_state_at(run, s, x);
         if (failure) return failure == four_bar_dop853_BAD_OUTPUT_TIME ? failure : (run->status = failure);
     }
     return 0;
@@ -1685,14 +1652,19 @@ SYMDYN_EXPORT long four_bar_simulation_size(void);
 SYMDYN_EXPORT long four_bar_simulation_size(void) { return (long)sizeof(four_bar_dop853); }
 
 // Continue by at most max_steps attempted steps and write the states at the requested times t[*written .. n), sorted in the
-// direction of integration, as they are passed, to the rows of x[n][6]; times beyond t_end are never served. With `every`,
-// append to t and x the start and the end of every accepted step instead; one for which STORE_FULL left no room is stored first
-// by the next call. Returns a status.
+// direction of integration, to the rows of x[n][6] as they are passed; times beyond t_end never are. With `every`, append
+// start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int four_bar_simulation_go(four_bar_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written);
 SYMDYN_EXPORT int four_bar_simulation_go(four_bar_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written) {
     for (;; max_steps--) {
-        const int failure = every ? four_bar_dop853_store(run, t, n, x, written) : four_bar_dop853_serve(run, t, n, x, written);
+        const int failure = every ? 0 : four_bar_dop853_serve(run, t, n, x, written);
         if (failure) return failure;
+        if (every && run->unstored) {
+            if (*written >= n) return four_bar_dop853_STORE_FULL;
+            t[*written] = run->t;
+            for (int i = 0; i < 6; i++) x[*written*6 + i] = run->x[i];
+            ++*written, run->unstored = 0;
+        }
         if (run->status != four_bar_dop853_STEP_LIMIT || max_steps <= 0) return run->status;
         four_bar_dop853_attempt(run);
     }

@@ -50,9 +50,8 @@ static int pendulum_all_finite(const double *values, int n) {
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
 // The angle is reduced to h + l = x - n*pi/2 with |h| <= pi/4, where l is what rounding cuts off h. pi/2 has three parts,
 // the first two of 37 bits, so that their products with n are exact. Polynomials in z = h*h give sin(h + l) and cos(h + l);
-// the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler can take
-// several angles at once, and nothing but IEEE arithmetic in the order written: the same bits from every compiler that does
-// not contract products and sums.
+// the last two bits of n tell whether to exchange and to negate them. There is no branch, so that the compiler takes several
+// angles at once, and only IEEE arithmetic as written: the same bits from every compiler that contracts no products and sums.
 // The coefficients are computed for symdyn: Remez' algorithm in 60 digits makes the largest error on |h| <= pi/4 smallest
 // (of the sine: the relative error times z); they are rounded one after the other, the rest fitted anew each time.
 static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
@@ -75,20 +74,18 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     *sine = a.value, *cosine = b.value;
 }
 
-// Larger angles, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
-#if defined(__FAST_MATH__)
-#define SYMDYN_SMALL_ANGLE (-1.0)
-#else
-#define SYMDYN_SMALL_ANGLE 102943.7
-#endif
-
-// Sines and cosines of n angles.
+// Of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
 static inline void symdyn_sincos(int n, const double *restrict angles, double *restrict sines, double *restrict cosines) {
+#if defined(__FAST_MATH__)
+    const double largest = -1.0;
+#else
+    const double largest = 102943.7;
+#endif
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
-    for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= SYMDYN_SMALL_ANGLE;
+    for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= largest;
     for (int i = 0; !small && i < n; i++)
-        if (!(fabs(angles[i]) <= SYMDYN_SMALL_ANGLE)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
+        if (!(fabs(angles[i]) <= largest)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
 }
 
 // Constants: everything that depends on parameters only; 3 operations, once per set of parameters.
@@ -225,12 +222,11 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics(const double *q, const double *ud, c
 // What a return code means.
 SYMDYN_EXPORT const char *pendulum_reason(int code);
 SYMDYN_EXPORT const char *pendulum_reason(int code) {
-    switch (code) {
-    case 0: return "no fault";
-    case -1: return "the result is not finite";
-    case 1: return "the mass matrix is not positive definite at q1_dot";
-    default: return "unknown code";
-    }
+    static const char *const reasons[] = {
+        "the result is not finite", "no fault",
+        "the mass matrix is not positive definite at q1_dot",
+    };
+    return code < -1 || code > 1 ? "unknown code" : reasons[code + 1];
 }
 
 // One call for many states: rows of t, of x = [q; u; z] (2), of ud (1), of inputs (0); strides are in rows, 0 repeats
@@ -339,8 +335,7 @@ static int pendulum_field(const pendulum_problem *problem, double t, const doubl
 // E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
 // Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
 // error estimate, p. 254). The coefficients are those of the authors' code DOP853.
-// Nothing is allocated and nothing is global: a run lives in one struct, and a run that was interrupted continues to the same
-// bits as one that was not.
+// Nothing is allocated or global: a run lives in one struct, and one that was interrupted continues to the same bits.
 
 enum {
     // t_end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event
@@ -360,6 +355,7 @@ typedef struct {
     double t_end, direction;     // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
     double t_slack, h_floor;     // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
     double h, h_max;             // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min, t_new, t_new_low;  // the step that is tried: its length with sign, the shortest one, its end
     double rtol, atol[2];        // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
     double root_old;             // error of the latest accepted step (tolerated: 1) to the 1/8
     double x[2], xd[2];          // state at t and its derivative
@@ -367,9 +363,8 @@ typedef struct {
     int dense_ready, unstored;   // what is needed within the latest step is prepared; (t, x) is not stored yet
     int rejected, status;        // the latest attempt was rejected: do not lengthen the step
     long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
-    // The latest evaluation that failed; the run did because of it if status says so, else a smaller step got round it. reason:
-    // what a function returned, 0 if results were not finite or a correction went too far. bad_index: the first state that is
-    // not finite, or the constraint with the largest residual; else -1.
+    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
     int reason;
     long bad_index;
     double t_fail, x_fail[2];
@@ -378,8 +373,10 @@ typedef struct {
     double dq, du, residual, largest_dq, largest_du;
     int worst, of_speeds;
     long n_corrected, n_corrections, n_jacobians, n_factorizations;
-    // Steps tried across a position of lost rank; the latest step went across one; the best of those tried.
-    int n_crossing, crossed;
+    double before[2], x_end[2];  // what was projected last; the latest step's end before projection: what is within it ends here
+    int end_moved;               // by more than a thousandth of the tolerance
+    // Steps tried across a position of lost rank; the one that is tried, the latest one goes across one; the best of those tried.
+    int n_crossing, crossing, crossed;
     double k[16][2];  // stages of the latest step; k[12] at its end
     double dense[7][2];  // polynomial of the latest step, if dense_ready
 } pendulum_dop853;
@@ -393,8 +390,7 @@ static int pendulum_dop853_fail(pendulum_dop853 *run, int status, int reason, lo
     return status;
 }
 
-// Evaluate the right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that it can be inlined
-// whatever its size.
+// The right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field, so that this can be inlined.
 static int pendulum_dop853_eval(pendulum_dop853 *run, double t, const double *y, double *xd) {
     int bad = 0, first = 0;
     run->n_evaluations++;
@@ -540,8 +536,7 @@ static int pendulum_dop853_state_at(pendulum_dop853 *run, double s, double *x) {
     return 0;
 }
 
-// Length of the first step (Hairer, Norsett, Wanner, section II.4), from the size of the state, its derivative and the change of
-// the derivative over a small Euler step.
+// Length of the first step (Hairer, Norsett, Wanner, section II.4): by state, derivative, its change over a small Euler step.
 static double pendulum_dop853_first_step(pendulum_dop853 *run) {
     const double span = fabs(run->t_end - run->t);
     double d0 = 0.0, d1 = 0.0, d2 = 0.0, y[2], yd[2], scale[2];
@@ -570,8 +565,7 @@ static int pendulum_dop853_restart(pendulum_dop853 *run, double t, const double 
     if (t == run->t_end) return run->status = pendulum_dop853_DONE;
     if ((run->status = pendulum_dop853_eval(run, t, run->x, run->xd))) return run->status;
     run->h = h_first > 0.0 ? h_first : pendulum_dop853_first_step(run);
-    run->status = pendulum_dop853_STEP_LIMIT;
-    return 0;
+    return run->status = pendulum_dop853_STEP_LIMIT, 0;
 }
 
 // Prepare a run, backward where t_end < t0. told: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
@@ -594,81 +588,58 @@ SYMDYN_EXPORT int pendulum_simulation_start(pendulum_dop853 *run, const pendulum
     return bad ? (run->status = pendulum_dop853_BAD_ARGUMENT) : pendulum_dop853_restart(run, t0, x0, h_first);
 }
 
-// A step that is tried: its length with sign, the shortest one, its end, roots of its error and of the one before.
-typedef struct {
-    double h, h_min, t_new, t_low, root, pull;
-    int crossing;
-} pendulum_dop853_step;
-
 // The step to be tried next.
-static void pendulum_dop853_propose(const pendulum_dop853 *run, pendulum_dop853_step *step) {
-    const double rest = fabs((run->t_end - run->t) - run->t_low);
-    const double least = 16.0*pendulum_dop853_eps*fabs(run->t), h_min = least > run->h_floor ? least : run->h_floor;
+static void pendulum_dop853_propose(pendulum_dop853 *run) {
+    const double rest = fabs((run->t_end - run->t) - run->t_low), least = 16.0*pendulum_dop853_eps*fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
-    h = h > h_min ? h : h_min;
-    step->t_low = 0.0, step->crossing = 0;
-    if (1.01*h >= rest) {
-        h = run->direction*rest;
-        step->t_new = run->t_end;
-    } else {
-        if (2.0*h > rest) h = 0.5*rest;  // two equal steps, not a whole one and a bit
-        h *= run->direction;
-        const double way = h + run->t_low, t_new = run->t + way;  // two-sum: the rounding error of t does not build up
-        const double back = t_new - run->t;
-        step->t_low = (run->t - (t_new - back)) + (way - back), step->t_new = t_new;
-    }
-    step->h = h, step->h_min = h_min;
+    run->h_min = least > run->h_floor ? least : run->h_floor;
+    h = h > run->h_min ? h : run->h_min;
+    const int last = 1.01*h >= rest;
+    run->h_try = run->direction*(last ? rest : 2.0*h > rest ? 0.5*rest : h);  // two equal steps, not a whole one and a bit
+    run->t_new = run->t_end, run->t_new_low = 0.0, run->crossing = 0;
+    if (last) return;
+    const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
+    run->t_new = run->t + way;
+    const double back = run->t_new - run->t;
+    run->t_new_low = (run->t - (run->t_new - back)) + (way - back);
 }
 
-// What becomes of a step, by its error or failure: accepted, it moves (t, x) on; else the next one to be tried is shorter.
-static void pendulum_dop853_judge(pendulum_dop853 *run, const pendulum_dop853_step *step, int failure, double err, const double *x_new, const double *xd_new) {
-    const double h = fabs(step->h);
+// What becomes of a step, by its error and the root of that, or failure: accepted, it moves (t, x) on; else the next is shorter.
+static void pendulum_dop853_judge(pendulum_dop853 *run, int failure, double err, double root, const double *x_new, const double *xd_new) {
+    const double h = fabs(run->h_try);
     double grow;
     if (failure || !(err <= 1.0)) {
         run->n_rejected++, run->rejected = 1;
-        if (h <= step->h_min) run->status = failure ? failure : pendulum_dop853_STEP_TOO_SMALL;
-        grow = failure || !(err <= pendulum_dop853_huge) ? 0.5 : 0.85/step->root;
+        if (h <= run->h_min) run->status = failure ? failure : pendulum_dop853_STEP_TOO_SMALL;
+        grow = failure || !(err <= pendulum_dop853_huge) ? 0.5 : 0.85/root;
         run->h = h*(grow > 0.2 ? grow : 0.2);
         return;
     }
     // PI control (Hairer and Wanner, volume II, section IV.2): h*0.85*err^(-1/8)*err_old^(1/32). Measured for
     // order 8 against h*0.9*err^(-1/8), at equal error: 7 % fewer evaluations for double pendulums, 1 % more for Kepler orbits.
-    grow = 0.85/step->root*step->pull;
-    grow = grow < 6.0 ? grow : 6.0;
-    grow = grow > 0.333 ? grow : 0.333;
+    grow = 0.85/root*sqrt(sqrt(run->root_old));
+    grow = grow > 6.0 ? 6.0 : grow > 0.333 ? grow : 0.333;
     run->h = h*(run->rejected && grow > 1.0 ? 1.0 : grow);
-    run->root_old = step->root > 0.316 ? step->root : 0.316;
-    run->t_old = run->t, run->h_old = step->h;
-    run->t = step->t_new, run->t_low = step->t_low;
+    run->root_old = root > 0.316 ? root : 0.316;
+    run->t_old = run->t, run->h_old = run->h_try;
+    run->t = run->t_new, run->t_low = run->t_new_low;
     for (int i = 0; i < 2; i++) {
         run->x_old[i] = run->x[i];
         run->x[i] = x_new[i], run->xd[i] = xd_new[i];
     }
     run->n_steps++, run->unstored = 1, run->rejected = run->dense_ready = 0;
-    run->crossed = step->crossing, run->n_crossing = 0;
+    run->crossed = run->crossing, run->n_crossing = 0;
     if (run->t == run->t_end) run->status = pendulum_dop853_DONE;
 }
 
 // Try one step. Sets run->status if t_end is reached or if there is no shorter step. (On its own it keeps more in registers.)
 __attribute__((noinline)) static void pendulum_dop853_attempt(pendulum_dop853 *run) {
     double x_new[2], xd_new[2], err = 0.0;
-    pendulum_dop853_step step;
-    pendulum_dop853_propose(run, &step);
-    int failure = pendulum_dop853_try(run, step.h, step.t_new, x_new, xd_new, &err);
-    if (!failure && err <= 1.0) failure = pendulum_dop853_eval(run, step.t_new, x_new, xd_new);
-    step.root = 1.0, step.pull = sqrt(sqrt(run->root_old));
-    step.root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8);
-    pendulum_dop853_judge(run, &step, failure, err, x_new, xd_new);
-}
-
-// Write the end of the latest step unless that is done; returns 0 or STORE_FULL.
-static int pendulum_dop853_store(pendulum_dop853 *run, double *t, long n, double *x, long *n_written) {
-    if (!run->unstored) return 0;
-    if (*n_written >= n) return pendulum_dop853_STORE_FULL;
-    t[*n_written] = run->t;
-    for (int i = 0; i < 2; i++) x[*n_written*2 + i] = run->x[i];
-    ++*n_written, run->unstored = 0;
-    return 0;
+    pendulum_dop853_propose(run);
+    int failure = pendulum_dop853_try(run, run->h_try, run->t_new, x_new, xd_new, &err);
+    if (!failure && err <= 1.0) failure = pendulum_dop853_eval(run, run->t_new, x_new, xd_new);
+    const double root = pendulum_dop853_root(err > 1e-8 ? err : 1e-8);
+    pendulum_dop853_judge(run, failure, err, root, x_new, xd_new);
 }
 
 // Write the requested times that are passed by now; returns 0 or a failure.
@@ -680,11 +651,9 @@ static int pendulum_dop853_serve(pendulum_dop853 *run, const double *t_out, long
         if (run->direction == 0.0 ? !(fabs(s - run->t) <= run->t_slack)
                 : !(ahead <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;  // not reached yet
         if (behind > run->t_slack) return pendulum_dop853_BAD_OUTPUT_TIME;
-        if (ahead >= 0.0 || behind >= 0.0) {
-            for (int i = 0; i < 2; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
-            continue;
-        }
-        const int failure = pendulum_dop853_state_at(run, s, x);
+        int failure = 0;
+        if (ahead >= 0.0 || behind >= 0.0) for (int i = 0; i < 2; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];
+        else failure = pendulum_dop853_state_at(run, s, x);
         if (failure) return failure == pendulum_dop853_BAD_OUTPUT_TIME ? failure : (run->status = failure);
     }
     return 0;
@@ -695,14 +664,19 @@ SYMDYN_EXPORT long pendulum_simulation_size(void);
 SYMDYN_EXPORT long pendulum_simulation_size(void) { return (long)sizeof(pendulum_dop853); }
 
 // Continue by at most max_steps attempted steps and write the states at the requested times t[*written .. n), sorted in the
-// direction of integration, as they are passed, to the rows of x[n][2]; times beyond t_end are never served. With `every`,
-// append to t and x the start and the end of every accepted step instead; one for which STORE_FULL left no room is stored first
-// by the next call. Returns a status.
+// direction of integration, to the rows of x[n][2] as they are passed; times beyond t_end never are. With `every`, append
+// start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int pendulum_simulation_go(pendulum_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written);
 SYMDYN_EXPORT int pendulum_simulation_go(pendulum_dop853 *run, int every, long max_steps, double *t, long n, double *x, long *written) {
     for (;; max_steps--) {
-        const int failure = every ? pendulum_dop853_store(run, t, n, x, written) : pendulum_dop853_serve(run, t, n, x, written);
+        const int failure = every ? 0 : pendulum_dop853_serve(run, t, n, x, written);
         if (failure) return failure;
+        if (every && run->unstored) {
+            if (*written >= n) return pendulum_dop853_STORE_FULL;
+            t[*written] = run->t;
+            for (int i = 0; i < 2; i++) x[*written*2 + i] = run->x[i];
+            ++*written, run->unstored = 0;
+        }
         if (run->status != pendulum_dop853_STEP_LIMIT || max_steps <= 0) return run->status;
         pendulum_dop853_attempt(run);
     }
