@@ -5,13 +5,19 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from symdyn.cli.messages import FAILED, Stop
+
+if TYPE_CHECKING:
+    from symdyn.stress.subject import Subject
+
+FILES = ("stress.json", "stress.txt", "stress.html")
 
 
 def stress(arguments: argparse.Namespace) -> int:
     """Run the checks, print rows as they come, save the report; a row that failed is a failure."""
-    from symdyn.cli.find import find_system
+    from symdyn.bench.work.resume import check_writable
     from symdyn.stress.record import HEAD, told
     from symdyn.stress.run import CHECKS
     from symdyn.stress.run import stress as run
@@ -22,16 +28,31 @@ def stress(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.jobs is not None and arguments.jobs < 1:
         raise Stop(f"--jobs must be 1 or more, found {arguments.jobs}")
-    from symdyn.systems import names
-
-    systems = [name if name in names() else find_system(name, {}) for name in arguments.systems] or None
+    folder = arguments.output or Path("generated") / "stress"
+    check_writable(folder, FILES)
+    systems = [_subject(name) for name in arguments.systems] or None
     print(HEAD)
     report = run(systems, arguments.short, arguments.checks, arguments.progress, arguments.jobs or os.cpu_count() or 1,
                  lambda row: print(told(row), flush=True))
     for text in report.left_out:
         print(f"left out: {text}")
     print(report.summary())
-    folder = arguments.output or Path("generated") / "stress"
-    for name in ("stress.json", "stress.txt", "stress.html"):
+    for name in FILES:
         print(f"wrote {report.save(folder / name)}")
     return 0 if report.passed else FAILED
+
+
+def _subject(name: str) -> str | Subject:
+    """A name of the catalogue, or a user's mechanism. Raises Stop for parameters without values: nothing could be run."""
+    from symdyn.cli.find import find_system
+    from symdyn.stress.subject import Subject
+    from symdyn.systems import names
+
+    if name in names():
+        return name
+    subject = Subject(find_system(name, {}))
+    if subject.lacking:
+        raise Stop(f"{subject.name}: parameters: no value for {', '.join(subject.lacking)}, which "
+                   f"{'has no default' if len(subject.lacking) == 1 else 'have no defaults'}; give every parameter a number in "
+                   "the system's `defaults`")
+    return subject

@@ -8,10 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from symdyn.stress.finding import first_order_row, judged
 from symdyn.stress.flow import flow, path
 from symdyn.stress.motion import energy_gradient
 from symdyn.stress.record import FAIL, NotApplicable, Row, within
-from symdyn.stress.rounding import Measured, judged, states
+from symdyn.stress.rounding import Measured, states
+from symdyn.stress.statements import emitted
 from symdyn.stress.subject import EPS, Subject
 from symdyn.systems import get
 
@@ -23,13 +25,14 @@ def long_chains(short: bool) -> Iterator[Row]:
         subject = Subject(get(name, n=n).recursive())
         subject.everything = ("rhs", "mass_matrix", "energy")
         where = states(subject, 4 if short else 8)
-        measured = Measured(subject, "rhs", where)
+        measured = Measured(subject, "rhs", where, None, emitted(subject, subject.everything)["rhs"])
         values = subject.evaluate("rhs", where.t, where.x, None, where.inputs, where.ud)
-        found = measured.compared(values)
+        found = measured.compared(values, subject.backend)
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("long chains", f"{name}({n})", f"{subject.equations.tape('rhs').operations} operations, accelerations at "
                      f"{len(where.x)} states, condition of the mass matrix up to {finite.max(initial=1.0):.2g}, "
                      f"{found.refused} refused", [found])
+        yield from first_order_row(subject, f"accelerations at {len(where.x)} states", [found])
         rtol, end = 1e-8, 0.2 if short else 0.5
         try:
             motion = path(subject, end, rtol)

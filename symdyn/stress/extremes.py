@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import SymdynError
+from symdyn.stress.finding import Finding, first_order_row, judged
 from symdyn.stress.flow import Path, flow, growth_to
 from symdyn.stress.motion import MAGNIFIED, reversible
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
-from symdyn.stress.rounding import FEW, Measured, judged, states
+from symdyn.stress.rounding import FEW, Measured, states
+from symdyn.stress.statements import emitted
 from symdyn.stress.subject import EPS, RTOL, Subject
 
 RATIOS = tuple(10.0**k for k in range(-8, 9, 2))
@@ -89,23 +91,29 @@ def masses(subject: Subject, short: bool) -> Iterator[Row]:
     if len(heavy) == 0 or sum(units.get(n) == "kg" for n in names) < 2:
         raise NotApplicable("there are no two masses that are parameters")
     where = states(subject, FEW)
+    statements = emitted(subject, subject.everything)["rhs"]
+    every: list[Finding] = []
     for ratio in RATIOS[::4] if short else RATIOS:
         p = subject.params.copy()
         p[heavy] *= ratio
         done = f"masses and inertias {', '.join(names[k] for k in heavy[:4])}{' ...' if len(heavy) > 4 else ''} times {ratio:g}"
         try:
-            measured = Measured(subject, "rhs", where, p)
+            measured = Measured(subject, "rhs", where, p, statements)
             values = subject.evaluate("rhs", where.t, where.x, p, where.inputs, where.ud)
         except SymdynError as error:
             yield Row("mass ratios", subject.name, done, None, None, "", DEGRADE, str(error))
             continue
-        found = measured.compared(values)
+        found = measured.compared(values, subject.backend)
+        every.append(found)
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("mass ratios", subject.name, f"{done}: accelerations at {FEW} states, condition up to {finite.max():.2g}, "
                      f"{found.refused} refused", [found])
         if found.refused and found.least_refused < 1e8:
             yield Row("mass ratios", subject.name, f"{done}: {found.refused} states refused, condition from "
                       f"{found.least_refused:.2g}", None, None, "", FAIL, "well-conditioned states are refused")
+    if every:
+        worst = max(every, key=lambda f: f.beyond)
+        yield from first_order_row(subject, f"accelerations at {len(every)} ratios of masses, {FEW} states each", [worst])
 
 
 def inputs(subject: Subject, short: bool) -> Iterator[Row]:

@@ -12,11 +12,27 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, CompileError, SymdynError
+from symdyn.formulation.equations import Symbols
 from symdyn.pipeline import function_tape
 from symdyn.runtime.compiler import Compiler, find_compiler, package_path, probe
-from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
+from symdyn.stress.coded import SMALLEST, Coded, imbalance
+from symdyn.stress.finding import Aside, Finding, first_order_row, judged, refusals, set_aside
+from symdyn.stress.record import FAIL, NotApplicable, Row
+from symdyn.stress.statements import Statements, emitted
 from symdyn.stress.subject import EPS, Subject, evaluated
-from symdyn.stress.yardstick import CORRECTIONS, conditions, exact, largest, redundant, smoothed, solved, terms, together, weights
+from symdyn.stress.yardstick import (
+    CORRECTIONS,
+    conditions,
+    exact,
+    halves,
+    largest,
+    redundant,
+    smoothed,
+    solved,
+    terms,
+    together,
+    weights,
+)
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
@@ -26,18 +42,19 @@ BESIDE, ASIDE = ("C", "C_dot", *CORRECTIONS), 1e-3
 STATES, WORK, FEW = 1000, 1.5e6, 24
 # Relative changes that conditions are estimated by, and how many.
 CHANGE, TRIALS = 2.0**-30, 8
-# Below this numbers lose digits by themselves.
-SMALLEST = 1e-290
+# Of positions of lost rank so many are looked at more closely, this far from them.
+LANDMARKS, DISTANCES = 3, (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 
 
 @dataclass(frozen=True)
 class States:
-    """Arguments of functions, row by row."""
+    """Arguments of functions, row by row; the last so many of them were sought close to positions of lost rank."""
 
     t: np.ndarray
     x: np.ndarray
     inputs: np.ndarray
     ud: np.ndarray
+    closer: int = 0
 
 
 def states(subject: Subject, n: int, seed: int = 1) -> States:
@@ -46,8 +63,7 @@ def states(subject: Subject, n: int, seed: int = 1) -> States:
     rng = np.random.default_rng(seed)
     symbols, x0 = subject.symbols, subject.start
     n_q, n_u = len(symbols.coordinates), len(symbols.speeds)
-    groups = (symbols.coordinates, symbols.speeds, symbols.states)
-    reach = np.array([float(symbols.reach.get(s, 1)) for group in groups for s in group])
+    reach = _reach(symbols)
     x = x0 + rng.uniform(-1, 1, (n, len(x0))) * reach
     angles = _angles(subject)
     for k in range(n // 2):
@@ -92,10 +108,26 @@ def _consistent(subject: Subject, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
 def beside(subject: Subject, where: States) -> States:
     """The same states, every other one off the constraints by a thousandth of what coordinates and speeds usually are."""
     symbols, x = subject.symbols, where.x.copy()
-    reach = np.array([float(symbols.reach.get(s, 1)) for group in (symbols.coordinates, symbols.speeds, symbols.states)
-                      for s in group])
-    x[1::2] += ASIDE * np.random.default_rng(2).uniform(-1, 1, x[1::2].shape) * reach
+    x[1::2] += ASIDE * np.random.default_rng(2).uniform(-1, 1, x[1::2].shape) * _reach(symbols)
     return replace(where, x=x)
+
+
+def towards_lost_rank(subject: Subject, where: States) -> States:
+    """The same states and, where some of them lie next to a position of lost rank, more around these at smaller distances."""
+    near = np.flatnonzero(smoothed(subject, "rhs", where.t, where.x))[:LANDMARKS]
+    if not len(near):
+        return where
+    k = np.tile(near, len(DISTANCES))
+    sides = np.random.default_rng(4).uniform(-1, 1, where.x[k].shape) * _reach(subject.symbols)
+    x = _consistent(subject, where.x[k] + np.repeat(DISTANCES, len(near))[:, None] * sides, subject.start)
+    t, x, inputs, ud = (np.concatenate([old, more]) for old, more in (
+        (where.t, where.t[k]), (where.x, x), (where.inputs, where.inputs[k]), (where.ud, where.ud[k])))
+    return States(t, x, inputs, ud, len(k))
+
+
+def _reach(symbols: Symbols) -> np.ndarray:
+    """How large coordinates, speeds and states usually are, (n_x,)."""
+    return np.array([float(symbols.reach.get(s, 1)) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)])
 
 
 def functions(subject: Subject) -> list[str]:
@@ -105,16 +137,22 @@ def functions(subject: Subject) -> list[str]:
 
 
 def rounding(subject: Subject, short: bool) -> Iterator[Row]:
-    """Every function at random and adversarial states, by every compiler and backend, against 32 digits."""
+    """Every function at random and adversarial states, by every compiler and backend, against 32 digits.
+
+    Two bounds: what the condition of the problem costs, which tells whether the equations are solved as well as they can be; and,
+    of each result, what rounding every operation once can do, which tells whether the code computes these equations at all, also
+    where the condition tells nothing, next to lost rank.
+    """
     names = functions(subject)
     if not names:
         raise NotApplicable("nothing depends on the state")
     operations = sum(function_tape(subject.equations, name).operations for name in names)
     n = FEW if short else int(np.clip(WORK / max(operations, 1), FEW, STATES))
-    where = states(subject, n)
+    where = towards_lost_rank(subject, states(subject, n))
     # Constraints that depend on others contradict them beside.
     near = beside(subject, where) if subject.constrained and not redundant(subject, where.t, where.x) else where
-    measured = [Measured(subject, name, near if name in BESIDE else where) for name in names]
+    statements = emitted(subject, names)
+    measured = [Measured(subject, name, near if name in BESIDE else where, None, statements[name]) for name in names]
     reference: dict[str, np.ndarray] = {}
     every: list[Finding] = []
     for label, unit in _builds(subject, names, short):
@@ -123,88 +161,22 @@ def rounding(subject: Subject, short: bool) -> Iterator[Row]:
             continue
         same, found = bool(reference), []
         for one in measured:
-            values = evaluated(unit.evaluator(one.name), one.where.t, one.where.x, subject.params, one.where.inputs, one.where.ud)
+            values = one.run(unit.evaluator(one.name))
             if one.name in reference:
                 same &= bool(np.array_equal(values, reference[one.name], equal_nan=True))
             reference.setdefault(one.name, values)
-            found.append(one.compared(values))
+            found.append(one.compared(values, "numpy" if label == "NumPy" else "c"))
         if all(f.digits == -np.inf for f in found):
             raise NotApplicable("no state at which the functions are defined")
         refused = sum(f.refused for f in found)
-        yield judged("rounding", subject.name, f"{label}: {len(names)} functions at {n} states, half of them adversarial, "
-                     f"{refused} values refused where 32 digits have one" + ("; the same bits as the first" if same else ""),
-                     found)
+        yield from first_order_row(subject, label, found)
+        done = (f"{label}: {len(names)} functions at {len(where.x)} states, half of them adversarial, {refused} values refused "
+                "where 32 digits have one" + ("; the same bits as the first" if same else ""))
+        yield judged("rounding", subject.name, done, found)
         if refused:
-            yield _refusals(subject, label, found, refused)
+            yield refusals(subject, label, found, refused)
         every += found
-    yield from _set_aside(subject, every)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What came of a function's values: the most decimal digits lost beyond what is due (plain: with a system that is solved in
-    plain numbers), how many states were refused and the least condition there; of states that are set aside, next to lost rank
-    or singular to the last digit, how many have lost more than that, the most digits, and the least condition."""
-
-    name: str
-    digits: float
-    plain: float
-    refused: int
-    least_refused: float
-    smoothed: int
-    most_smoothed: float
-    singular: int
-    least_singular: float
-
-    @property
-    def verdict(self) -> str:
-        return PASS if self.digits <= 0 else DEGRADE if self.plain <= 0 else FAIL
-
-
-def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
-    """The row of digits that functions lose beyond what the condition costs: every function is judged by itself, and the worst
-    verdict counts. Within the condition of plain numbers it is said so."""
-    origin = ("decimal digits lost beyond log10(condition of inputs and of what is solved, scaled) + log10(longest chain of "
-              "operations), each of which may round once")
-    verdict = max((f.verdict for f in found), key=(PASS, DEGRADE, FAIL).index)
-    alike = [f for f in found if f.verdict == verdict]
-    worst = max(alike, key=lambda f: f.digits)
-    named = ", ".join(f.name for f in alike) if verdict != PASS else worst.name
-    if verdict == DEGRADE:
-        return Row(check, system, f"{done}; beyond it {named}", worst.digits, 0.0, origin, DEGRADE, "more digits are lost than "
-                   "the scaled condition costs, but no more than that of the matrix in plain numbers: inertias of very different "
-                   "size meet in one body or joint, and the small ones are what is left of sums")
-    place = "nearest to it" if verdict == PASS else "beyond it"
-    return within(check, system, f"{done}; {place} {named}", worst.digits, 0.0, origin,
-                  "no more digits are lost than the problem itself costs", "digits are lost that the problem does not cost")
-
-
-def _refusals(subject: Subject, label: str, found: Sequence[Finding], refused: int) -> Row:
-    """Values that were refused: right where the system that is solved has no digits left."""
-    least = min(f.least_refused for f in found)
-    return Row("refused states", subject.name, f"{label}: {refused} values refused; condition there from {least:.2g}", 1 / least
-               if least > 0 else np.inf, 1e-8, "a pivot that vanishes to half of the digits", DEGRADE if least > 1e8 else FAIL,
-               "only states are refused whose equations are singular to half of the digits" if least > 1e8 else
-               "states are refused whose equations are well-conditioned")
-
-
-def _set_aside(subject: Subject, found: Sequence[Finding]) -> Iterator[Row]:
-    """Rows of states that no bound is known for: what is computed there, and why."""
-    near = [f for f in found if f.smoothed]
-    if near:
-        names = ", ".join(dict.fromkeys(f.name for f in near))
-        yield Row("lost rank", subject.name, f"{names} at {max(f.smoothed for f in near)} of the states, which lie next to a "
-                  "position where constraints lose rank: decimal digits lost beyond what is due",
-                  max(f.most_smoothed for f in near), None, "", DEGRADE, "the exact multipliers and accelerations grow without "
-                  "bound towards such a position; they are smoothed there, so that motions pass it, and only the motion's energy "
-                  "and branch tell whether it passes rightly")
-    singular = [f for f in found if f.singular]
-    if singular:
-        names = ", ".join(dict.fromkeys(f.name for f in singular))
-        yield Row("singular states", subject.name, f"{names} at {max(f.singular for f in singular)} of the states: condition of "
-                  "what is solved, from", min(f.least_singular for f in singular), None, "", DEGRADE, "the mass matrix is "
-                  "singular to the last digit, as at gimbal lock: accelerations have no digits there, and a motion that comes "
-                  "there stops and names it")
+    yield from set_aside(subject, every)
 
 
 def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
@@ -229,11 +201,12 @@ class Measured:
     one, plain   (n, size), what one rounding of every input and of every entry of what is solved does to each entry; plain: with
                  a system that is solved without scales of its own
     condition    (n,), of what is solved, scaled; 1 where nothing is
+    coded        with the statements of generated code: what they give but for rounding
     """
 
-    def __init__(self, subject: Subject, name: str, where: States, params: np.ndarray | None = None) -> None:
+    def __init__(self, subject: Subject, name: str, where: States, params: np.ndarray | None = None,
+                 statements: Sequence[Statements] = ()) -> None:
         self.name, self.where = name, where
-        self.exact = exact(subject, name, where.t, where.x, where.inputs, where.ud, params)
         p = subject.params if params is None else params
         self.chain = max(1, function_tape(subject.equations, name).longest_chain())
         rng = np.random.default_rng(3)
@@ -247,7 +220,7 @@ class Measured:
             other = subject.evaluate(name, changed(where.t), changed(where.x, known), changed(p), changed(where.inputs),
                                      changed(where.ud))
             moved = np.fmax(moved, np.abs(other - base) / CHANGE)
-        self.values = np.array([[float(v) for v in row] if row is not None else [np.nan] * base.shape[1] for row in self.exact])
+        self.values, self.rest = halves(exact(subject, name, where.t, where.x, where.inputs, where.ud, params), base.shape[1])
         self.condition = (conditions(subject, where.t, where.x, params, gradients=False) if solved(subject, name)
                           else np.ones(len(base)))
         labels = together(subject, name, base.shape[1])
@@ -261,16 +234,30 @@ class Measured:
         # No bound holds where a relative change by rounding makes the matrix singular.
         self.singular = ~(self.condition * EPS * self.chain < 1)
         self.smoothed = smoothed(subject, name, where.t, where.x, params) & ~self.singular
+        rows = np.column_stack([where.t, where.x, where.inputs, where.ud])
+        self.coded = Coded(subject, statements, rows, (labels, factors), (self.values, self.rest), params) if statements else None
+        self._subject = subject
 
-    def compared(self, values: np.ndarray) -> Finding:
+    def run(self, evaluator: Any) -> np.ndarray:
+        """The function of generated code at the states, (n, size). Those that need other equations are run by themselves: the
+        NumPy backend takes these for all states if it has to for one."""
+        values = np.full(self.values.shape, np.nan)
+        usual = self.coded.usual if self.coded else np.ones(len(values), dtype=bool)
+        where = self.where
+        for rows in (usual, ~usual):
+            if rows.any():
+                values[rows] = evaluated(evaluator, where.t[rows], where.x[rows], self._subject.params, where.inputs[rows],
+                                         where.ud[rows])
+        return values
+
+    def compared(self, values: np.ndarray, backend: str = "c") -> Finding:
         """Values of generated code (n, size) against these."""
-        errors = np.zeros(values.shape)
-        usable = np.array([row is not None and len(row) > 0 for row in self.exact]) & np.isfinite(self.values).all(axis=1)
+        usable = np.isfinite(self.values).all(axis=1) & (values.shape[1] > 0)
         usable &= np.abs(self.values).max(axis=1, initial=0.0) <= 1 / SMALLEST
         refused = usable & ~np.isfinite(values).all(axis=1)
         usable &= ~refused
-        for k in np.flatnonzero(usable):
-            errors[k] = [abs(float(e - float(v))) for e, v in zip(self.exact[k] or (), values[k], strict=True)]
+        with np.errstate(invalid="ignore"):
+            errors = np.where(usable[:, None], np.abs((self.values - values) + self.rest), 0.0)
 
         def excess(one: np.ndarray) -> np.ndarray:
             with np.errstate(all="ignore"):
@@ -278,12 +265,34 @@ class Measured:
             return np.where(errors > SMALLEST, digits, -16.0).max(axis=1, initial=-16.0)
 
         scaled = excess(self.one)
-        aside = usable & (self.singular | self.smoothed) & (scaled > 0)
-        usable &= ~(self.singular | self.smoothed)
-        near, lost = aside & self.smoothed, aside & self.singular
-        return Finding(self.name, scaled[usable].max(initial=-np.inf), excess(self.plain)[usable].max(initial=-np.inf),
-                       int(refused.sum()), self.condition[refused].min(initial=np.inf), int(near.sum()),
-                       scaled[near].max(initial=-np.inf), int(lost.sum()), self.condition[lost].min(initial=np.inf))
+        regular = usable & ~(self.singular | self.smoothed)
+        # Conditions change within the distance that they are estimated by, close to lost rank.
+        apart = regular & (np.arange(len(values)) < len(values) - self.where.closer)
+        beyond, known = np.full(len(values), -np.inf), np.ones(len(values), dtype=bool)
+        if self.coded is not None:
+            beyond, known = self.coded.beyond(values, backend), self.coded.known
+
+        def aside(states: np.ndarray) -> Aside:
+            lost = states & (scaled > 0)
+            noise = np.zeros(len(values), dtype=bool) if self.coded is None else ~(self.coded.divisors < 1)
+            return Aside(int(lost.sum()), scaled[lost].max(initial=-np.inf), self.condition[lost].min(initial=np.inf),
+                         beyond[states & known].max(initial=-np.inf), int((states & noise).sum()),
+                         self._imbalance(values, states & ~noise & usable, backend))
+
+        return Finding(self.name, scaled[apart].max(initial=-np.inf), excess(self.plain)[apart].max(initial=-np.inf),
+                       int(refused.sum()), self.condition[refused].min(initial=np.inf), aside(usable & self.smoothed),
+                       aside(usable & self.singular), beyond[regular & known].max(initial=-np.inf), int((regular & ~known).sum()))
+
+    def _imbalance(self, values: np.ndarray, states: np.ndarray, backend: str) -> float:
+        """Digits by which accelerations miss their equations beyond what is due, at those of the states where they have no bound
+        themselves."""
+        subject, where = self._subject, self.where
+        if self.coded is None or self.name != "rhs" or not subject.has("mass_matrix"):
+            return -np.inf
+        n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+        states = states & ~np.isfinite(self.coded.bound(backend)[:, n_q:n_q + n_u]).all(axis=1)
+        rows = np.column_stack([where.t, where.x, where.inputs, where.ud])[states]
+        return float(imbalance(subject, rows, values[states, n_q:n_q + n_u], backend).max(initial=-np.inf))
 
 
 def compilers() -> list[Compiler]:

@@ -60,6 +60,11 @@ class Subject:
         return bool(self.equations.constraints)
 
     @property
+    def backend(self) -> str:
+        """What `evaluate` runs: "c", or "numpy" where there is no compiler."""
+        return "c" if find_compiler() is not None else "numpy"
+
+    @property
     def lacking(self) -> list[str]:
         """Parameters without a number."""
         return [p.name for p in self.symbols.parameters if p not in self.symbols.defaults]

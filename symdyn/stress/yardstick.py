@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -12,7 +13,7 @@ from symdyn.pipeline import function_tape, tape_as_derived
 from symdyn.stress.subject import EPS, Subject
 from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node
-from symdyn.tape.tape import unsigned
+from symdyn.tape.tape import Tape, unsigned
 from symdyn.verification.identities import equilibrated
 
 DIGITS = 32
@@ -28,13 +29,8 @@ MAY_DEPEND = ("outputs", "reactions", "power")
 def exact(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray,
           params: np.ndarray | None = None) -> list[list[mpmath.mpf] | None]:
     """A function at rows of states with 32 digits, all numbers taken as the binary ones they are; None where it is undefined."""
-    context = mpmath.mp.clone()
-    context.dps = DIGITS
-    symbols = subject.symbols
-    free = ["t", *[s.name for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs) for s in group],
-            *[f"{s.name}_dot" for s in symbols.speeds]]
-    values = subject.params if params is None else params
-    fixed = {s.name: v for s, v in zip(symbols.parameters, values.tolist(), strict=True)}
+    context = _precise()
+    fixed, free = _fixed(subject, params), free_leaves(subject)
     rows = [[context.mpf(float(v)) for v in row] for row in np.column_stack([t, x, inputs, ud])]
     programs = [program(function_tape(subject.equations, name), context, fixed, free)]
     found: list[list[mpmath.mpf] | None] = []
@@ -46,7 +42,54 @@ def exact(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.
     return found
 
 
-def _otherwise(subject: Subject, name: str, context: object, fixed: dict[str, float], free: Sequence[str], programs: list,
+def exactly_as_written(subject: Subject, tape: Tape, rows: np.ndarray,
+                       params: np.ndarray | None = None) -> list[list[mpmath.mpf] | None]:
+    """A tape with 32 digits at rows of its free leaves, (n, n_free); None where it is undefined."""
+    context = _precise()
+    run = program(tape, context, _fixed(subject, params), free_leaves(subject))
+    found: list[list[mpmath.mpf] | None] = []
+    for row in rows:
+        try:
+            found.append(run([context.mpf(float(v)) for v in row]))
+        except (Lost, ValueError, TypeError, ZeroDivisionError):
+            found.append(None)
+    return found
+
+
+def halves(rows: Sequence[list[mpmath.mpf] | None], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers with 32 digits as sums of two doubles, each (n, size); NaN in rows that are None."""
+    hi, lo = np.full((len(rows), size), np.nan), np.zeros((len(rows), size))
+    for k, row in enumerate(rows):
+        if row is not None:
+            hi[k] = [float(v) for v in row]
+            lo[k] = [float(v - h) for v, h in zip(row, hi[k].tolist(), strict=True)]
+    return hi, lo
+
+
+def free_leaves(subject: Subject) -> list[str]:
+    """Names of time, coordinates, speeds, states, inputs and given accelerations."""
+    symbols = subject.symbols
+    return ["t", *[s.name for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs) for s in group],
+            *[f"{s.name}_dot" for s in symbols.speeds]]
+
+
+def leaves(subject: Subject, rows: np.ndarray, params: np.ndarray | None = None) -> dict[str, Any]:
+    """Every leaf of a tape by name, from rows of the free ones: arrays (n,), and numbers for parameters."""
+    return {**_fixed(subject, params), **dict(zip(free_leaves(subject), rows.T, strict=True))}
+
+
+def _precise() -> Any:
+    context = mpmath.mp.clone()
+    context.dps = DIGITS
+    return context
+
+
+def _fixed(subject: Subject, params: np.ndarray | None) -> dict[str, float]:
+    values = subject.params if params is None else params
+    return {s.name: v for s, v in zip(subject.symbols.parameters, values.tolist(), strict=True)}
+
+
+def _otherwise(subject: Subject, name: str, context: Any, fixed: dict[str, float], free: Sequence[str], programs: list,
                row: list) -> list[mpmath.mpf] | None:
     """By the equations for states where what the usual ones divide by vanishes."""
     if subject.equations.otherwise is None:

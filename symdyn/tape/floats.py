@@ -35,7 +35,7 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
             elif node.op == "item":
                 done[node] = done[node.args[0]][node.args[1]]
             else:
-                done[node] = _function(node.op)(*[number(a) for a in node.args])
+                done[node] = function_of(node.op)(*[number(a) for a in node.args])
     result = {}
     for name, output in tape.outputs.items():
         flat = np.empty((n, len(output.entries)))
@@ -45,7 +45,8 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
     return result
 
 
-def _function(op: str) -> Callable[..., Any]:
+def function_of(op: str) -> Callable[..., Any]:
+    """What computes an operation with NumPy's arrays."""
     if op == "guard":
         return lambda value, margin: np.where(margin > 0, value, np.nan)
     if op == "pi":

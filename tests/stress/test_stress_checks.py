@@ -13,6 +13,7 @@ import pytest
 import symdyn as sd
 from symdyn.runtime.compiler import find_compiler
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units, yardstick
+from symdyn.stress.finding import Finding, judged
 from symdyn.stress.record import FAIL, PASS, NotApplicable, Row
 from symdyn.stress.run import CHECKS
 from symdyn.stress.subject import Subject
@@ -85,28 +86,13 @@ def test_noise_in_one_entry_of_one_function_is_found(double: Subject, monkeypatc
     assert names and set(verdicts(rows)) == {FAIL} and all("beyond it frames" in row.done for row in rows)
 
 
-def finding(name: str, digits: float, plain: float, **others: Any) -> rounding.Finding:
-    usual = {"refused": 0, "least_refused": math.inf, "smoothed": 0, "most_smoothed": -math.inf, "singular": 0,
-             "least_singular": math.inf}
-    return rounding.Finding(name, digits, plain, **{**usual, **others})
-
-
 def test_every_function_is_judged_and_the_worst_verdict_counts() -> None:
-    gentle, wrong, fine = finding("rhs", 3.0, -1.0), finding("J", 0.5, 0.5), finding("C", -2.0, -2.0)
-    row = rounding.judged("rounding", "arm", "C", [gentle, wrong, fine])
+    gentle, wrong, fine = Finding("rhs", 3.0, -1.0), Finding("J", 0.5, 0.5), Finding("C", -2.0, -2.0)
+    row = judged("rounding", "arm", "C", [gentle, wrong, fine])
     assert row.verdict == FAIL and row.figure == 0.5 and row.done == "C; beyond it J"
-    row = rounding.judged("rounding", "arm", "C", [gentle, fine])
+    row = judged("rounding", "arm", "C", [gentle, fine])
     assert row.verdict == "degrade" and row.done == "C; beyond it rhs" and "plain numbers" in row.why
-    assert rounding.judged("rounding", "arm", "C", [fine, finding("J", -0.5, -0.5)]).done == "C; nearest to it J"
-
-
-def test_states_that_are_set_aside_are_told() -> None:
-    arm = type("Named", (), {"name": "arm"})
-    near, lost = rounding._set_aside(arm, [finding("lam", -1.0, -1.0, smoothed=3, most_smoothed=4.5),
-                                           finding("rhs", -1.0, -1.0, singular=2, least_singular=1e17)])
-    assert (near.verdict, near.figure) == ("degrade", 4.5) and near.done.startswith("lam at 3 of the states")
-    assert (lost.verdict, lost.figure) == ("degrade", 1e17) and lost.done.startswith("rhs at 2 of the states")
-    assert list(rounding._set_aside(arm, [finding("rhs", 1.0, 1.0)])) == []
+    assert judged("rounding", "arm", "C", [fine, Finding("J", -0.5, -0.5)]).done == "C; nearest to it J"
 
 
 @needs_c
@@ -418,8 +404,8 @@ def test_long_chains_find_noise_and_leaks(monkeypatch: pytest.MonkeyPatch) -> No
             return values * (1 + 1e-6) if name == "rhs" and Noisy.calls > 1 + rounding.TRIALS else values
 
     monkeypatch.setattr(chains, "Subject", Noisy)
-    accelerations, energy = chains.long_chains(True)
-    assert accelerations.verdict == FAIL and energy.verdict == FAIL
+    assert [(row.check, row.verdict) for row in chains.long_chains(True)] == [
+        ("long chains", FAIL), ("first order", FAIL), ("long chains", FAIL)]
 
 
 def test_lost_digits_at_gimbal_lock_must_be_told() -> None:
