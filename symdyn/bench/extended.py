@@ -1,38 +1,40 @@
 """Motions at more digits than floats have, from the same tape as the generated code: yardsticks for `symdyn bench loops`.
 
 `symdyn bench extended andrews_squeezer` makes the end of a motion anew, at two tolerances, and stores the digits in
-extended.json beside this module.
+extended.json beside this module, or in another file.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import re
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import mpmath
 
-from symdyn.bench.extrapolation import integrate
+from symdyn.bench import kept, quad
+from symdyn.bench.extrapolation import Rule, integrate, midpoint
 from symdyn.bench.loop_cases import CASES
 from symdyn.bench.precise import Lost, decimal, program
-from symdyn.errors import ArgumentError, SymdynError
+from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.systems import get
 
 STORE = Path(__file__).with_name("extended.json")
-# Decimal digits of a stored motion's local errors; the second run that shows convergence has four more.
+# Decimal digits of a stored motion's local errors, and how many more the second run has, which shows convergence.
 DIGITS = 26
+MORE = 4
 # Computed with this many more digits than the local errors have.
 SPARE = 12
 _ROUNDS = 8
-HOW = ("Gragg-Bulirsch-Stoer extrapolation of the accelerations on the tape with mpmath, projected onto the constraints after "
+HOW = ("Gragg-Bulirsch-Stoer extrapolation of the accelerations on the tape {}, projected onto the constraints after "
        "every step; parameters and start are the catalogue's decimal numbers, the start projected; made by "
        "symdyn bench extended")
+WITH = ("with mpmath", f"in C with numbers of {quad.BITS} binary digits")
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,17 @@ class Motion:
 
 
 class Precise:
-    """The equations of a mechanism with numbers of `digits` decimal digits: parameters and start as decimals."""
+    """The equations of a mechanism with numbers of `digits` decimal digits: parameters and start as decimals.
 
-    def __init__(self, equations: Equations, digits: int) -> None:
-        self.equations, self.digits = equations, digits
+    compiled   in C with those of symdyn.bench.quad instead, as far as there is C of them
+    """
+
+    def __init__(self, equations: Equations, digits: int, compiled: bool = False) -> None:
+        self.equations, self.digits, self.compiled = equations, quad.DIGITS if compiled else digits, compiled
         self.context = mpmath.mp.clone()
         self.context.dps = digits
+        if compiled:
+            self.context.prec = quad.BITS
         symbols = equations.symbols
         names = lambda group: [s.name for s in group]
         initial = {str(key): value for key, value in symbols.initial.items()}
@@ -71,6 +78,7 @@ class Precise:
         self.start = [decimal(self.context, initial.get(name, 0.0)) for name in self.leaves[1:]]
         self.n_c = len(equations.constraints)
         self._programs: dict[str, Callable[[Sequence[Any]], list[Any]]] = {}
+        self._usual: dict[str, Callable[[Sequence[Any]], list[Any]]] = {}
 
     def __call__(self, name: str, t: Any, x: Sequence[Any]) -> list[Any]:
         """A quantity at a state, its entries one after the other; where its divisors vanish the equations for that case."""
@@ -79,7 +87,7 @@ class Precise:
     def _program(self, name: str) -> Callable[[Sequence[Any]], list[Any]]:
         if name not in self._programs:
             usual = self._made(self.equations, name)
-            self._programs[name] = usual
+            self._programs[name] = self._usual[name] = usual
             if self.equations.otherwise is not None:
                 known: list[Callable[[Sequence[Any]], list[Any]]] = []
 
@@ -94,13 +102,33 @@ class Precise:
                 self._programs[name] = either
         return self._programs[name]
 
+    def rule(self) -> Rule | None:
+        """The midpoint rule for the states, compiled; None if it is not."""
+        self._program("rhs")
+        made = self._usual["rhs"]
+        if not isinstance(made, quad.Compiled):
+            return None
+
+        def either(t: Any, x: Sequence[Any], begin: Sequence[Any], h: Any, n: int) -> list[Any]:
+            try:
+                return made.midpoint(t, x, begin, h, n)
+            except Lost:
+                return midpoint(partial(self, "rhs"), t, x, begin, h, n)
+
+        return either
+
     def _made(self, equations: Any, name: str) -> Callable[[Sequence[Any]], list[Any]]:
+        if self.compiled:
+            try:
+                return quad.program(equations.tape(name), self.context, self.fixed, self.leaves)
+            except quad.NotInQuad:
+                pass
         return program(equations.tape(name), self.context, self.fixed, self.leaves)
 
     def projected(self, t: Any, x: list[Any]) -> list[Any]:
         """The state on the constraints to all digits but a few, by the smallest change in the metric of the mass matrix.
 
-        Raises SymdynError if there is no way back.
+        Raises TooRough if there is no way back.
         """
         if not self.n_c:
             return x
@@ -117,20 +145,20 @@ class Precise:
                 before = left
                 x[part] = [a + b for a, b in zip(x[part], row[self.n_c:], strict=True)]
             if left > 1e6 * enough:
-                raise SymdynError(f"{self.equations.name}: constraints stay violated by {self.context.nstr(left, 3)} at t = "
+                raise quad.TooRough(f"{self.equations.name}: constraints stay violated by {self.context.nstr(left, 3)} at t = "
                                   f"{self.context.nstr(t, 10)}")
         return x
 
 
-def motion(equations: Equations, end: Any, digits: int = DIGITS) -> Motion:
-    """The motion from the catalogue's start at t = 0 until `end` (s), local errors of 10^-digits."""
-    precise = Precise(equations, digits + SPARE)
+def motion(equations: Equations, end: Any, digits: int = DIGITS, compiled: bool = False) -> Motion:
+    """The motion from the catalogue's start at t = 0 until `end` (s), local errors of 10^-digits; compiled: see Precise."""
+    precise = Precise(equations, digits + SPARE, compiled)
     context = precise.context
     zero, last = context.mpf(0), decimal(context, end)
     n_q, n_u = precise.n_q, precise.n_u
     run = integrate(lambda t, x: precise("rhs", t, x), (zero, last), precise.projected(zero, precise.start),
                     context.mpf(10) ** -digits, [slice(0, n_q), slice(n_q, n_q + n_u), slice(n_q + n_u, None)], context,
-                    precise.projected)
+                    precise.projected, precise.rule())
     lam = precise("lam", last, run.x) if precise.n_c else []
     return Motion(last, run.x[:n_q], run.x[n_q:n_q + n_u], precise("rhs", last, run.x)[n_q:n_q + n_u], lam, digits, run.n_steps,
                   run.n_evaluations)
@@ -148,20 +176,20 @@ def agreement(a: Motion, b: Motion) -> float:
 
 def record(equations: Equations, end: Any, digits: int = DIGITS) -> dict[str, Any]:
     """What is stored of a motion: the digits in which runs at two tolerances agree, and what they took."""
-    coarse, fine = motion(equations, end, digits), motion(equations, end, digits + 4)
+    coarse, fine, compiled = quad.twice(lambda n, compiled: motion(equations, end, n, compiled), digits, MORE)
     differ = agreement(coarse, fine)
-    kept = min(digits, int(-mpmath.log10(max(differ, 1e-50))))
+    held = min(digits, int(-mpmath.log10(max(differ, 1e-50))))
     text = {"q": fine.q, "q_dot": fine.u, "q_ddot": fine.u_dot, "lambda": fine.lam}
-    return {"source": HOW, "t": float(end), "digits": kept, "tolerances": [f"1e-{digits}", f"1e-{digits + 4}"],
-            "runs_differ_by": float(f"{differ:.2g}"), "steps": [coarse.n_steps, fine.n_steps],
-            "evaluations": [coarse.n_evaluations, fine.n_evaluations],
-            **{name: [mpmath.nstr(e, kept, min_fixed=-5, max_fixed=30, strip_zeros=False) for e in values]
+    return {"source": HOW.format(WITH[compiled]), "t": float(end), "digits": held,
+            "tolerances": [f"1e-{n}" for n in (digits, digits + MORE)], "runs_differ_by": float(f"{differ:.2g}"),
+            "steps": [coarse.n_steps, fine.n_steps], "evaluations": [coarse.n_evaluations, fine.n_evaluations],
+            **{name: [mpmath.nstr(e, held, min_fixed=-5, max_fixed=30, strip_zeros=False) for e in values]
                for name, values in text.items()}}
 
 
 def stored() -> dict[str, dict[str, Any]]:
     """Every stored motion, by the name of its system."""
-    return json.loads(STORE.read_text(encoding="utf-8")) if STORE.exists() else {}  # type: ignore[no-any-return]
+    return kept.read(STORE) or {}
 
 
 def known(name: str) -> Mapping[str, Any] | None:
@@ -169,25 +197,21 @@ def known(name: str) -> Mapping[str, Any] | None:
     return stored().get(name)
 
 
-def store(name: str, made: Mapping[str, Any]) -> None:
-    """Put a motion into the file."""
-    everything = dict(sorted({**stored(), name: dict(made)}.items()))
-    text = json.dumps(everything, indent=1)
-    text = re.sub(r"\[\s+((?:[^\[\]{}]+?))\s+\]", lambda m: "[" + re.sub(r",\s+", ", ", m[1]) + "]", text)
-    STORE.write_text(text + "\n", encoding="utf-8")
-
-
-def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, print_only: bool = False) -> int:
+def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, print_only: bool = False,
+        file: Path | None = None) -> int:
     """Make the ends of motions anew, print them and, unless `print_only`, store them; returns 0.
 
     names   of the catalogue, or variants such as "flyball_governor(rods)"
     end     s (default: the system's duration, which is the published one)
     digits  of the local errors
+    file    to store them in beside what it holds (default: the package's)
     """
     if end is not None and not 0 < end < math.inf:
         raise ArgumentError(f"the end is {end!r}; pass a positive time, s")
     if digits < 1:
         raise ArgumentError(f"{digits} digits were asked for; pass 1 or more")
+    if not print_only:
+        file = kept.writable(file, STORE)
     for name, system in [(name, CASES[name].system() if name in CASES else get(name)) for name in names]:
         begun = clock.perf_counter()
         made = record(system.equations(), system.duration if end is None else end, digits)
@@ -196,6 +220,6 @@ def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, pr
               f"{clock.perf_counter() - begun:.0f} s")
         for what in ("q", "q_dot", "q_ddot", "lambda"):
             print(f"  {what}: {', '.join(made[what])}")
-        if not print_only:
-            store(name, made)
+        if file is not None and not print_only:
+            kept.put(file, name, made)
     return 0

@@ -65,7 +65,8 @@ _ONLY = _names("--only", "only", "some of the groups of figures", "GROUP")
 _TIMED = _number("--repeats", "repeats", "timed runs, of which the median counts (default: 5)")
 _BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
 _JSON = Option("to_json", "--json", {"metavar": "FILE", "type": Path, "help": "write everything that was measured into a file"})
-_DIGITS = _number("--digits", "digits", "of the local errors (default: 26)")
+_STORE = Option("file", "--store", {"metavar": "FILE", "type": Path,
+                                    "help": "file to store them in beside what it holds (default: the package's own)"})
 
 MEASUREMENTS: dict[str, Measurement] = {
     "figures": Measurement(
@@ -85,7 +86,8 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.bench.work.published:run", "published mechanisms within their bounds, in the least time of all programs", (
             _names("--only", "names", "some of the mechanisms, such as A03"),
             _names("--against", "peers", "other programs, as of symdyn bench"), _TIMED,
-            _number("--budget", "budget", "begin nothing new after this time", float, "SECONDS"), _folder("published"))),
+            _number("--budget", "budget", "begin nothing new after this time; the same command goes on", float, "SECONDS"),
+            _folder("published"), Option("progress", "--progress", {"action": "store_true", "help": "show a bar (needs tqdm)"}))),
     "growth": Measurement(
         "symdyn.bench.growth:run", "how everything grows with the number of bodies: table and picture", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
@@ -106,11 +108,12 @@ MEASUREMENTS: dict[str, Measurement] = {
     "references": Measurement(
         "symdyn.bench.work.store:run", "make the references of work against error anew, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "*", "help": "some of symdyn bench --all (default: all)"}),
-            _DIGITS)),
+            _number("--digits", "digits", "of the local errors (default: 20)"), _STORE)),
     "extended": Measurement(
         "symdyn.bench.extended:run", "make the references of symdyn bench loops anew, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "+", "help": "such as puma560, or 'flyball_governor(rods)'"}),
-            _number("--t", "end", "s (default: the system's duration, which is the published one)", float, "END"), _DIGITS,
+            _number("--t", "end", "s (default: the system's duration, which is the published one)", float, "END"),
+            _number("--digits", "digits", "of the local errors (default: 26)"), _STORE,
             Option("print_only", "--print", {"action": "store_true", "help": "print only, store nothing"}))),
 }
 

@@ -179,8 +179,9 @@ def _add_bench(commands: Any) -> None:
     work.add_argument("--all", action="store_true", help="sixteen mechanisms from the pendulum to the floating turbine")
     for flag, what in (("--formulations", "embedding, recursive, augmented, absolute, absolute:angles, and with Euler "
                         "parameters embedding:parameters and the like (default: all that there are)"),
-                       ("--methods", "compiled ones and SciPy's (default: all compiled ones)"),
-                       ("--against", "other programs in the same run: scipy cvode ida heyoka casadi pinocchio mujoco exudyn")):
+                       ("--methods", "compiled ones, SciPy's, auto (default: all compiled ones)"),
+                       ("--against", "other programs in the same run: scipy cvode ida heyoka casadi pinocchio mujoco exudyn; "
+                        "or all")):
         work.add_argument(flag, metavar="NAME", nargs="+", help=what)
     for flag, metavar, what in (("--rtol", "TOLERANCE", "tolerances, relative and absolute (default: 1e-3 to 1e-15)"),
                                 ("--steps", "STEP", "s, for gauss, whose steps have one length, besides the tolerances"),

@@ -41,10 +41,9 @@ def measure(subject: Any, formulation: str, budget: float, told: Callable[[str],
         return 0.0 if found is not None and found.reference.kind == "agreement" and rest < _AGAIN * budget else max(rest, 0.0)
 
     def run(formulations: Sequence[str] | None, methods: Sequence[str], seconds: float) -> Benchmark:
-        import symdyn
+        from symdyn.bench.work import bench
 
-        return symdyn.bench(subject, formulations=formulations, methods=methods, tolerances=TOLERANCES,  # type: ignore[no-any-return]
-                            repeats=REPEATS, budget=seconds)
+        return bench(subject, formulations=formulations, methods=methods, tolerances=TOLERANCES, repeats=REPEATS, budget=seconds)
 
     compiled = find_compiler() is not None
     own = (formulation,) if formulation else None

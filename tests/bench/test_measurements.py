@@ -77,6 +77,8 @@ def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypat
     (["pendulum", "--end", "0"], "the end 0.0 of pendulum must be a positive time, s"),
     (["pendulum", "--rtol", "0.5"], "the tolerance 0.5 does not lie between 1e-15 and 0.1"),
     (["published", "--only", "A99", "--against", "nobody"], "there is no published mechanism 'A99'"),
+    (["published", "--output", f"{__file__}/there"], "test_measurements.py is a file, not a folder"),
+    (["pendulum", "--methods", "bs54", "--steps", "0.1"], "none of the methods bs54 has steps of one length; add gauss"),
 ])
 def test_what_is_asked_wrongly_is_told(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", *arguments]) == 2
@@ -122,6 +124,17 @@ def test_references_are_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, ca
     assert main(["bench", "references", "double_pendulum"]) == 1
     assert capsys.readouterr().out == "double_pendulum: it would take too long\n" and list(store.stored()) == ["pendulum"]
 
+
+def test_stress_is_told_what_is_missing_before_anything_is_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("import symdyn as sd\n\n\ndef system():\n    found = sd.systems.get('pendulum')\n"
+                    "    found.defaults = dict(list(found.defaults.items())[1:])\n    return found\n")
+    assert main(["stress", str(mine), "--short", "--output", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert "pendulum: parameters: no value for m, which has no default; give every parameter a number" in told.err
+    assert not told.out and not (tmp_path / "out").exists()
+    assert main(["stress", "pendulum", "--short", "--output", str(mine)]) == 2
+    assert "mine.py is a file, not a folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)

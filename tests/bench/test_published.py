@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from symdyn.bench.work.published_lines import Line, Run
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Subject, Yardstick
 from symdyn.errors import SymdynError
+from symdyn.runtime.compiler import LINUX
 
 TIMES = np.array([0.3, 0.31, 1.0, 2.0])
 
@@ -116,7 +118,7 @@ def test_loosest_tolerances_within_the_bounds_are_timed(short):
 
 def _line(program, peer, *runs):
     formulation, = _short().formulations()
-    return Line(program, formulation, peer, lambda t: None, lambda t: 0.0, [Run(*run) for run in runs])
+    return Line(program, formulation, peer, lambda t: None, lambda t, repeats, deadline: [0.0], [Run(*run) for run in runs])
 
 
 def test_a_faster_program_is_a_missed_bound():
@@ -159,8 +161,67 @@ def test_command_writes_what_it_prints(monkeypatch, tmp_path, capsys):
     assert "symdyn: short: symdyn dop853, embedding: " in told.err
     (kept,) = json.loads((tmp_path / "published.json").read_text())["mechanisms"]
     assert kept["name"] == "short" and kept["missed"] == [] and kept["lines"][0]["runs"]
-    with pytest.raises(SymdynError, match=r"(?s)no published mechanism 'A09'.*no peer 'x'.*0 repeats.*budget is -1"):
-        published.run(["A09"], ["x"], 0, -1)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SymdynError, match=r"(?s)no published mechanism 'A09'.*no peer 'x'.*0 repeats.*budget is -1.*is a file"):
+        published.run(["A09"], ["x"], 0, -1, tmp_path / "file")
+
+
+def test_a_stopped_run_goes_on_where_it_was(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(published, "CASES", {name: _short(name=name) for name in ("first", "second")})
+    original, looked = published_lines.search, []
+
+    def search(line, case, exact, deadline):
+        if len(looked) == 3:
+            raise KeyboardInterrupt
+        looked.append((case.name, line.program))
+        original(line, case, exact, deadline)
+
+    monkeypatch.setattr(published, "search", search)
+    with pytest.raises(KeyboardInterrupt):
+        published.run(None, [], 1, None, tmp_path)
+    data = json.loads((tmp_path / "published.json").read_text())
+    assert not data["complete"] and [m["unfinished"] for m in data["mechanisms"]] == [False, True]
+    assert data["mechanisms"][0]["text"] in capsys.readouterr().out
+    looked[:] = []
+    assert published.run(None, [], 1, None, tmp_path, progress=True) == 0
+    told = capsys.readouterr()
+    assert looked == [("second", "symdyn bs54")] and told.out.count("all of it was measured in an earlier run, of 2") == 1
+    assert "second:" in told.err and "0/5" in told.err  # two lines, three passes
+    whole = json.loads((tmp_path / "published.json").read_text())
+    assert whole["complete"] and whole["mechanisms"][0] == data["mechanisms"][0]
+    before, after = ([(r["tolerance"], r["error"]) for r in m["mechanisms"][1]["lines"][0]["runs"]] for m in (data, whole))
+    assert before == after and any(r["seconds"] for r in whole["mechanisms"][1]["lines"][0]["runs"])
+    looked[:] = []
+    with pytest.raises(KeyboardInterrupt):  # it was complete: measured anew
+        published.run(None, [], 1, None, tmp_path)
+    looked[:] = []
+    with pytest.raises(KeyboardInterrupt):  # other repeats: nothing of it is taken
+        published.run(None, [], 2, None, tmp_path)
+    assert len(looked) == 3
+
+
+class _Slow:
+    """A program that takes far too long to prepare."""
+
+    name = title = "slow"
+
+    def available(self):
+        return True
+
+    def prepare(self, *_):
+        time.sleep(60)
+
+
+@pytest.mark.skipif(not LINUX, reason="processes of their own are forked")
+def test_what_a_program_prepares_counts(monkeypatch):
+    monkeypatch.setattr(against, "peers", lambda name: (_Slow(),))
+    begun = time.perf_counter()
+    result = measure(_short(methods=("dop853",)), ["some"], 1, begun + 2)
+    assert time.perf_counter() - begun < 2 and result.unfinished and result.lines[0].searched
+    assert "its preparation was not done after 0." in result.left_out["slow"]
+    late = measure(_short(methods=("dop853",)), [], 1, begun)
+    assert late.unfinished and not late.lines[0].runs
+    assert late.left_out == {"symdyn dop853, embedding": "not tried within the budget"}
 
 
 def test_errors_in_other_coordinates_where_a_state_is_known(swinging):

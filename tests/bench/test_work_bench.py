@@ -2,22 +2,32 @@
 
 import json
 import math
+import multiprocessing
+import os
+import re
+import subprocess
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.work import against, benchmark, picture
-from symdyn.bench.work.against.peer import Unfit
+from symdyn.bench.work import against, picture, plan, resume
+from symdyn.bench.work.against.apart import TooLong, prepared
+from symdyn.bench.work.against.peer import Failed, Unfit
 from symdyn.bench.work.asked import checked, grid
-from symdyn.bench.work.benchmark import Benchmark, _spread, run
+from symdyn.bench.work.benchmark import Benchmark, run
 from symdyn.bench.work.cases import CASES, from_maker, subject
+from symdyn.bench.work.command import nothing
 from symdyn.bench.work.picture import COLORS, styles_of
+from symdyn.bench.work.plan import spread
 from symdyn.bench.work.record import Reference, Row
-from symdyn.bench.work.subject import Subject
-from symdyn.bench.work.timing import Timing
+from symdyn.bench.work.subject import Subject, Yardstick
+from symdyn.bench.work.timing import Timing, one_pass
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
+from symdyn.runtime.compiler import LINUX
 
 ASKED = {"method_names": ["dop853"], "tolerances": [1e-4, 1e-7, 1e-10], "repeats": 2}
 
@@ -29,6 +39,18 @@ def measured(tmp_path_factory):
     about = subject("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding", "augmented", "absolute"], at=[0.4], **ASKED), folder)
     return result, folder
+
+
+@pytest.fixture()
+def drawn(monkeypatch):
+    """Pictures that take no time."""
+    def draw(result, folder):
+        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
+        for path in paths:
+            path.write_text(result.name)
+        return paths
+
+    monkeypatch.setattr(picture, "write_pictures", draw)
 
 
 def test_errors_fall_with_the_tolerance_and_work_rises(measured):
@@ -80,12 +102,12 @@ def test_runs_until_an_earlier_time_are_timed_alone(measured):
 def test_repeats_are_spread_over_passes_and_the_least_time_counts():
     took = iter([3.0, 1.0, 1.1, 1.2, 9.0, 9.0])
     timing, row = Timing(), Row("a", "b", 1e-6, errors=(0.1, 0.2))
-    timing.add(1, lambda: (next(took), 7), 3)
+    timing.add(1, lambda repeats: (one_pass(lambda: next(took), repeats), 7), 3)
     assert timing.told(row, 2).repeats == 1 and timing.told(row, 2).time == 3.0
     assert timing.again(row, 3).repeats == 1  # a run of over ENOUGH seconds is not made again
     quick = iter([0.5, 0.1, 0.11, 0.12, 0.1])
     timing = Timing()
-    timing.add(1, lambda: (next(quick), 7), 3)
+    timing.add(1, lambda repeats: (one_pass(lambda: next(quick), repeats), 7), 3)
     twice = timing.again(timing.again(row, 3), 3)
     assert (twice.seconds, twice.least, twice.time, twice.repeats, twice.evaluations) == (0.11, 0.1, 0.1, 3, 7)
     assert twice.time_at(1) == 0.1 and math.isnan(twice.time_at(0))
@@ -123,10 +145,10 @@ def test_files_are_whole_and_stand_alone(measured):
     assert page.count("<tr") == page.count("</tr>") and "closed form, 15.9 digits" in page
 
 
-def test_an_unfinished_run_goes_on(measured, tmp_path, monkeypatch):
+def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
     about = subject("pendulum", end=2.0)
     asked = checked([about], ["embedding"], **ASKED)
-    made, original = [], benchmark.own
+    made, original = [], plan.own
 
     def stopping(*arguments):
         if len(made) == 2:
@@ -134,18 +156,47 @@ def test_an_unfinished_run_goes_on(measured, tmp_path, monkeypatch):
         made.append(original(*arguments))
         return made[-1]
 
-    monkeypatch.setattr(benchmark, "own", stopping)
+    monkeypatch.setattr(plan, "own", stopping)
     with pytest.raises(KeyboardInterrupt):
         run(about, asked, tmp_path)
     left = json.loads((tmp_path / "results.json").read_text())
     assert not left["complete"] and len(left["rows"]) == 2
     more = []
-    monkeypatch.setattr(benchmark, "own", lambda *arguments: more.append(original(*arguments)) or more[-1])
+    monkeypatch.setattr(plan, "own", lambda *arguments: more.append(original(*arguments)) or more[-1])
+    (tmp_path / "long").mkdir()
+    data = json.loads((tmp_path / "results.json").read_text())
+    data["timed"], data["rows"][0]["took"] = "2001-02-03 04:05", 1e9  # too long to time it anew
+    (tmp_path / "long" / "results.json").write_text(json.dumps(data))
+    mixed = run(about, asked, tmp_path / "long")
+    assert len(more) == 1 and not mixed.unfinished and {r.tolerance for r in mixed.earlier} == {r.tolerance for r in made}
+    assert {r.key: r.seconds for r in made} == {r.key: r.seconds for r in mixed.earlier}
+    told = "2 of 3 rows, marked ^, were timed in an earlier run, of 2001-02-03 04:05"
+    assert told in mixed.table() and mixed.table().count("^") == 3
+    assert [row["earlier"] for row in mixed.record()["rows"]].count("2001-02-03 04:05") == 2
+    assert told in (mixed.save(tmp_path / "long")[-1]).read_text()
+    # What is cheap is timed anew, beside the others: the times of a row are of one run.
     result = run(about, asked, tmp_path)
-    assert len(more) == 1 and not result.unfinished and [r.tolerance for r in result.rows] == [1e-4, 1e-7, 1e-10]
-    assert {r.key: r.seconds for r in made}.items() <= {r.key: r.seconds for r in result.rows}.items()
+    assert len(more) == 4 and [r.tolerance for r in result.rows] == [1e-4, 1e-7, 1e-10] and not result.earlier
+    assert {r.key: r.error for r in made}.items() <= {r.key: r.error for r in result.rows}.items()
     run(about, asked, tmp_path)  # complete: measured anew
-    assert len(more) == 4
+    assert len(more) == 7
+
+
+def test_what_a_run_left_stays_when_the_next_is_stopped_at_once(tmp_path, monkeypatch):
+    about = subject("pendulum", end=2.0)
+    asked = checked([about], ["embedding"], budget=1e-9, **ASKED)
+    run(about, asked, tmp_path)
+    data = json.loads((tmp_path / "results.json").read_text())
+    data["rows"] = [Row("embedding", "dop853", 1e-10, seconds=1.0).record()]
+    (tmp_path / "results.json").write_text(json.dumps(data))
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plan, "own", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run(about, checked([about], ["embedding"], **ASKED), tmp_path)
+    assert [row["tolerance"] for row in json.loads((tmp_path / "results.json").read_text())["rows"]] == [1e-10]
 
 
 def test_results_of_another_motion_are_not_gone_on_with(tmp_path):
@@ -175,7 +226,7 @@ def test_other_work_on_the_machine_is_told():
 
 
 def test_a_coarse_grid_comes_first():
-    assert _spread(range(10)) == [0, 4, 8, 2, 6, 1, 3, 5, 7, 9]
+    assert spread(range(10)) == [0, 4, 8, 2, 6, 1, 3, 5, 7, 9]
 
 
 def test_a_method_that_does_not_fit_is_left_out(monkeypatch):
@@ -184,14 +235,14 @@ def test_a_method_that_does_not_fit_is_left_out(monkeypatch):
     def unfit(*_):
         raise ArgumentError("pendulum: the method takes no pendulums")
 
-    monkeypatch.setattr(benchmark, "own", unfit)
+    monkeypatch.setattr(plan, "own", unfit)
     result = run(about, checked([about], ["embedding"], **ASKED))
     assert result.rows == [] and str(result.skipped[-1]) == "embedding, dop853: pendulum: the method takes no pendulums"
 
 
 def test_slow_methods_are_not_asked_for_more(monkeypatch):
     about = subject("pendulum", end=2.0)
-    monkeypatch.setattr(benchmark, "own", lambda f, m, t, *_: Row(f.name, m, t, seconds=3.0, least=3.0))
+    monkeypatch.setattr(plan, "own", lambda f, m, t, *_: Row(f.name, m, t, seconds=3.0, least=3.0))
     result = run(about, checked([about], ["embedding"], **ASKED))
     assert [r.tolerance for r in result.rows] == [1e-4]
     assert "not at tighter tolerances: a run took 3 s" in str(result.skipped[-1])
@@ -251,6 +302,129 @@ def test_other_programs_run_beside(monkeypatch):
     assert "times ours)" in result.table()
 
 
+class _Slow(_Exact):
+    """One that compiles for ever: before anything, or at the tightest tolerance."""
+
+    title = "slow"
+
+    def __init__(self, name):
+        self.name = name
+
+    def prepare(self, equations, params, x0, end, system=None):
+        if self.name == "slow at once":
+            time.sleep(60)
+        run = super().prepare(equations, params, x0, end, system)
+
+        def motion(tolerance, times=None):
+            if tolerance < 1e-9:
+                subprocess.run(["sleep", "60"])
+            return run(tolerance)
+
+        return motion
+
+
+class _Dying(_Slow):
+    """One that ends its process: at once, or later."""
+
+    def prepare(self, *_):
+        return (lambda tolerance: os._exit(3)) if self.name == "later" else os._exit(3)
+
+
+@pytest.mark.skipif(not LINUX, reason="processes of their own are forked")
+def test_a_budget_ends_what_other_programs_prepare(monkeypatch, tmp_path):
+    monkeypatch.setattr(against, "names", lambda: ["some"])
+    peers = _Slow("slow at once"), _Exact(), _Slow("slow later"), _Broken(), _Dying("dying")
+    monkeypatch.setattr(against, "peers", lambda name: peers)
+    about = subject("pendulum", end=2.0)
+    begun = time.perf_counter()
+    result = run(about, checked([about], ["embedding"], peers=["all"], budget=3.0, **ASKED), tmp_path)
+    assert time.perf_counter() - begun < 4.5
+    rows = {name: [r.tolerance for r in result.rows if r.method == name] for name in ("exact", "slow later", "broken", "dop853")}
+    assert rows == {"exact": [1e-4, 1e-7, 1e-10], "slow later": [1e-4], "broken": [1e-4, 1e-7, 1e-10],
+                    "dop853": [1e-4, 1e-7, 1e-10]}
+    told = {s.method: s.why for s in result.skipped}
+    assert re.fullmatch(r"its preparation was not done after 0\.\d+ s, its part of the budget", told["slow at once"])
+    assert told["slow later"].startswith("what it does for a tolerance of 1e-10 was not done after 1 s")
+    assert told["dying"] == "its process died with code 3"
+    assert result.unfinished == "2 of 12 runs were not made and slow at once was not ready within the budget of 3 s"
+    assert all(r.seconds == 1e-3 and r.error < 2e-4 for r in result.rows if r.method == "exact")
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.skipif(not LINUX, reason="processes of their own are forked")
+def test_a_process_of_its_own_gives_what_this_one_gives():
+    equations = sd.systems.get("pendulum").embedding()
+    module = equations.compile()
+    x0 = np.array([2.0, 0.0])
+    (peer,) = [p for p in against.peers("scipy") if p.name == "scipy DOP853"]
+    motion, far = (equations, module.default_parameters, x0, None), time.perf_counter() + 1e3
+    here, apart = prepared(peer, motion, [1.0, 2.0]), prepared(peer, motion, [1.0, 2.0], far, far)
+    for place in (0, 1):
+        (seconds, n, x), (known, n_known, x_known) = apart.timed(place, 1e-8, 9), here.timed(place, 1e-8, 9)
+        assert n == n_known and x.tolist() == x_known.tolist() and len(seconds) >= 1 and 0.1 < min(seconds) / min(known) < 10
+    assert apart.timed(1, 1e-8, 9, deadline=0.0)[0] == []
+    np.testing.assert_array_equal(apart.states(1e-8, np.array([1.0, 2.0]))[1], here.states(1e-8, np.array([1.0, 2.0]))[1])
+    with pytest.raises(Failed, match="index out of range"):
+        apart.timed(5, 1e-8, 9)
+    folder = Path(apart.folder.name)
+    assert folder.is_dir()
+    apart.close()
+    assert not folder.exists() and not apart.process.is_alive()
+    with pytest.raises(TooLong, match="its process was ended"):
+        apart.timed(0, 1e-8, 9)
+    apart = prepared(_Dying("later"), motion, [1.0], far, far)
+    for _ in range(2):  # it is told again
+        with pytest.raises(Failed, match="its process died with code 3"):
+            apart.timed(0, 1e-8, 9)
+    with pytest.raises(TooLong, match="the budget was used up before it was prepared"):
+        prepared(peer, motion, [1.0], 0.0, 0.0)
+
+
+def test_auto_is_measured_and_tells_what_it_chose(tmp_path, drawn):
+    result = sd.bench("pendulum", formulations=["embedding"], methods=["auto", "taylor"], tolerances=[1e-3, 1e-9], end=2.0,
+                      repeats=1, folder=tmp_path)
+    auto = [r for r in result.rows if r.method == "auto"]
+    assert [r.chosen for r in auto] == ["bs54", "taylor"] and all(r.why and r.seconds > 0 for r in auto)
+    assert auto[1].error == result.rows[-1].error and result.rows[-1].chosen == ""
+    text, page = result.table(), (tmp_path / "report.html").read_text()
+    for told in ("auto (bs54)", "auto (taylor)", "auto chose by short trial runs"):
+        assert told in text and told in page
+    kept = json.loads((tmp_path / "results.json").read_text())["rows"]
+    assert [Row.of(row).chosen for row in kept] == ["bs54", "taylor", "", ""]
+
+
+def test_steps_need_a_method_that_has_them():
+    about = subject("pendulum")
+    with pytest.raises(ArgumentError, match=r"none of the methods dop853, auto has steps of one length; add gauss, or leave"):
+        checked([about], method_names=["dop853", "auto"], steps=[0.1])
+    assert checked([about], method_names=["dop853", "gauss"], steps=[0.1]).steps == checked([about], steps=[0.1]).steps == (0.1,)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ArgumentError, match=r"results cannot be written into .*file/deep: .*file is a file, not a folder"):
+        sd.bench("pendulum", folder=tmp_path / "file" / "deep")
+    assert main(["bench", "pendulum", "--rtol", "3", "--output", str(tmp_path / "file")]) == 2
+    told = capsys.readouterr().err
+    assert "the tolerance 3.0" in told and "is a file, not a folder" in told
+    assert resume.unwritable(tmp_path / "new" / "deep") == "" and not (tmp_path / "new").exists()
+    monkeypatch.setattr(os, "access", lambda path, mode: path.name != "report.html")
+    (tmp_path / "report.html").write_text("")
+    assert resume.unwritable(tmp_path, ["report.html"]).endswith("report.html is closed to writing; name another one")
+    assert resume.unwritable(tmp_path, ["results.json"]) == ""
+
+
+def test_command_that_measures_nothing_fails(tmp_path, capsys, drawn):
+    assert main(["bench", "four_bar", "--formulations", "augmented", "--methods", "gauss", "--output", str(tmp_path)]) == 1
+    told = capsys.readouterr().err
+    assert "four_bar: nothing was measured, everything was left out or stopped:\n  - augmented, gauss: " in told
+    assert main(["bench", "pendulum", "--methods", "dop853", "--rtol", "1e-6", "--formulations", "embedding", "--budget", "1e-9",
+                 "--output", str(tmp_path / "b")]) == 1
+    assert "the budget of 1e-09 s is used up: pendulum" in capsys.readouterr().err
+    late = Benchmark("a", 1.0, [], [], Reference("x", (1.0,), [[0.0]], 3.0, ""), unfinished="2 of 2 runs were not made")
+    assert nothing(late) == "nothing was measured: 2 of 2 runs were not made"
+
+
 @pytest.mark.parametrize(("asked", "told"), [({"end": "late"}, "the end is 'late'; pass a time, s"),
                                              ({"folder": 3}, "of the folder is 3")])
 def test_end_and_folder_that_make_no_sense(asked, told):
@@ -275,6 +449,18 @@ def test_all_faults_are_told_at_once():
         sd.bench("double_pendulm")
     with pytest.raises(ArgumentError, match="pendulum takes no option, found 'pendulum\\(3\\)'"):
         sd.bench("pendulum(3)")
+
+
+def test_bodies_that_carry_joints_in_absolute_coordinates_do_not_count():
+    times = np.array([0.1, 0.2])
+    first, other = subject("slider_crank").formulated(["augmented", "absolute"])[0]
+    assert len(other.module.metadata["bodies"]) == 4 > len(first.module.metadata["bodies"]) == 2
+    x, y = (f.module.simulate(np.r_[0.0, times], rtol=1e-11).x[1:] for f in (first, other))
+    yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 11.0, ""), first, bodies=True)
+    for wrong, bound in ((0.0, 1e-9), (1e-3, 1e-2)):
+        y[:, :3] += wrong  # pose of the first rod
+        q, u = yardstick.errors(other, y)
+        assert (q <= bound).all() and (q >= 0.1 * wrong).all() and (u <= bound).all()
 
 
 def test_formulations_none_of_which_fits():
@@ -304,14 +490,7 @@ def test_lines_are_told_apart_by_colour_marker_and_line():
     assert {s["color"] for name, s in styles.items() if name != "other"} == set(COLORS[:4])
 
 
-def test_command(tmp_path, capsys, monkeypatch):
-    def drawn(result, folder):
-        paths = [folder / "work_precision.png", folder / "work_precision.svg"]
-        for path in paths:
-            path.write_text(result.name)
-        return paths
-
-    monkeypatch.setattr(picture, "write_pictures", drawn)
+def test_command(tmp_path, capsys, drawn):
     text = "import symdyn as sd\n\ndef system():\n    return sd.systems.get('pendulum')\n"
     (tmp_path / "mine.py").write_text(text)
     code = main(["bench", str(tmp_path / "mine.py"), "pendulum", "--formulations", "embedding", "--methods", "dop853", "--rtol",

@@ -280,7 +280,7 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         rows = [Row(f, m, 1e-3) for f in formulations or found.names for m in methods]
         return measured(*rows, kind=found.kind, unfinished="some" if found.now > 4 else "")
 
-    monkeypatch.setattr(sd, "bench", bench, raising=False)
+    monkeypatch.setattr("symdyn.bench.work.bench", bench, raising=False)
     monkeypatch.setattr(full_work, "find_compiler", lambda: "a compiler")
     monkeypatch.setattr(full_work, "clock", SimpleNamespace(perf_counter=lambda: found.now))
     return found
@@ -309,10 +309,10 @@ def test_a_reference_that_is_not_kept_is_not_made_too_often(benches: SimpleNames
 
 
 def test_nothing_measured_is_told(benches: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sd, "bench", lambda *arguments, **options: measured(unfinished="all"))
+    monkeypatch.setattr("symdyn.bench.work.bench", lambda *arguments, **options: measured(unfinished="all"))
     with pytest.raises(SymdynError, match=r"no run was made within 10 s.*give more time with --budget"):
         full_work.measure("m", "a", 10, quiet)
-    monkeypatch.setattr(sd, "bench", lambda *arguments, **options: measured())
+    monkeypatch.setattr("symdyn.bench.work.bench", lambda *arguments, **options: measured())
     with pytest.raises(SymdynError, match="no method fits:\n  - a: why"):
         full_work.measure("m", "a", 10, quiet)
 

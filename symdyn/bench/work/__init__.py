@@ -5,7 +5,8 @@
     reference, converged, store   what errors are measured by: closed forms, runs with more digits, runs that agree
     methods, asked                what can be asked for, checked
     measure, against              one row of ours, and of another program
-    benchmark                     the plan, the run that goes on where it was stopped, the result
+    plan, timing                  all rows in their order, and passes over them for their times
+    benchmark, resume             the run that goes on where it was stopped, the result
     table, picture, page          how it is shown
     command                       `symdyn bench`
 """
@@ -32,14 +33,18 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    "n_link_pendulum(5)", or of the list of `symdyn bench --all`
     formulations   some of "embedding", "recursive", "augmented", "absolute", "absolute:angles", and where the system can be had
                    with Euler parameters also "embedding:parameters" and so on; default: all that the mechanism has
-    methods        compiled ones and SciPy's, as for `simulate`; default: all compiled ones
+    methods        compiled ones, SciPy's, and "auto", as for `simulate`; default: all compiled ones
     tolerances     relative and absolute ones of a step; default: 1e-3 to 1e-15
     steps          s, for methods with steps of one length; besides the tolerances; default: none
     end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state
     repeats        timed runs of a row, of which the median counts; of very short ones up to eight times as many
-    against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn"
-    budget         s after which no further run is begun; two thirds of it are for the runs, however long the reference takes
-    folder         where results are written, after every run; what an unfinished run left there is gone on with
+    against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn",
+                   or "all" of these
+    budget         s after which no further run is begun; two thirds of it are for the runs, however long the reference takes.
+                   Other programs have processes of their own then, on Linux; what they prepare counts, and is ended and told
+                   where it takes too much of what is left
+    folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed anew
+                   at the end if there is time for that, else the rows say so
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s; runs that end there are timed alone
     per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and tell the least time below an error more
@@ -50,13 +55,18 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
     from symdyn.bench.work.asked import checked
     from symdyn.bench.work.benchmark import run
     from symdyn.bench.work.cases import taken
+    from symdyn.bench.work.command import FILES
+    from symdyn.bench.work.resume import check_writable
 
     if end is not None and (isinstance(end, bool) or not isinstance(end, (int, float))):
         raise ArgumentError(f"the end is {end!r}; pass a time, s")
     subject = taken(system, end)
     asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at,
                     per_decade)
-    result = run(subject, asked, None if folder is None else as_path(folder, "of the folder", "generated/bench/arm"), progress)
+    place = None if folder is None else as_path(folder, "of the folder", "generated/bench/arm")
+    if place is not None:
+        check_writable(place, FILES)
+    result = run(subject, asked, place, progress)
     if folder is not None:
         result.save(folder)
     return result

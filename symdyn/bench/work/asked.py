@@ -42,11 +42,14 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
     """Everything that is wrong with what is asked for, a sentence each."""
     known = list(dict.fromkeys(name for subject in subjects for name in subject.names))
     faults = [*_unknown(formulations, known, "formulation"), *_unknown(method_names, methods.names(), "method"),
-              *_unknown(peers, against.names(), "peer")]
+              *_unknown(peers, [*against.names(), against.ALL], "peer")]
     for value in tolerances or ():
         if not (_is_number(value) and TIGHTEST <= value <= LARGEST):
             faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and {LARGEST:g}")
     shortest = min((s.end for s in subjects), default=math.inf)
+    if steps and method_names and set(method_names) <= set(methods.names()) - set(methods.FIXED):
+        faults.append(f"steps are named, but none of the methods {', '.join(method_names)} has steps of one length; add "
+                      f"{' or '.join(methods.FIXED)}, or leave the steps out")
     for value in steps or ():
         if not (_is_number(value) and 0 < value <= shortest):
             faults.append(f"the step {value!r} must be a time, s, of at most the motion's {shortest:g} s")
@@ -77,9 +80,10 @@ def checked(subjects: Sequence[Subject], formulations: Any = None, method_names:
         raise ArgumentError("the bench cannot run: " + (faults[0] if len(faults) == 1 else
                                                         f"{len(faults)} faults:\n  - " + "\n  - ".join(faults)))
     once = lambda values: tuple(dict.fromkeys(values))
+    peers = against.named(peers or ())
     return Asked(once(formulations) if formulations else None, once(method_names or methods.usual()),
                  tuple(sorted({float(v) for v in tolerances or grid(per_decade)}, reverse=True)),
-                 tuple(sorted({float(v) for v in steps}, reverse=True)) if steps else None, repeats, once(peers or ()),
+                 tuple(sorted({float(v) for v in steps}, reverse=True)) if steps else None, repeats, once(peers),
                  budget, tuple(sorted({float(v) for v in at or ()})))
 
 

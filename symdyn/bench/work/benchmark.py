@@ -3,36 +3,28 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import math
-import os
-import platform
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import symdyn
-from symdyn.bench.work import against, methods
-from symdyn.bench.work.against.peer import Peer
+from symdyn.bench import kept as files
+from symdyn.bench.work import resume
 from symdyn.bench.work.asked import Asked
-from symdyn.bench.work.measure import own, peer_row
+from symdyn.bench.work.plan import Key, Peers, Walk, jobs_of
 from symdyn.bench.work.record import Reference, Row, Skipped
 from symdyn.bench.work.reference import PATIENCE, find_reference
 from symdyn.bench.work.subject import Formulation, Subject, Yardstick
-from symdyn.bench.work.timing import PASSES, Timing
-from symdyn.errors import ArgumentError, MissingExtra, SymdynError
+from symdyn.bench.work.timing import PASSES
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
 
 RESULTS = "results.json"
 STATE, BODIES = "coordinates (q) and speeds (u)", "poses (q) and velocities (u) of all bodies"
 # Part of a budget that a reference may take.
 _OF_BUDGET = 1 / 3
-# A method that took longer than this for a run, s, is not asked for tighter tolerances.
-_SLOW = 2.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +36,7 @@ class Benchmark:
     operations      of one evaluation of the right-hand side, by formulation
     about           machine, compiler, version
     measure         of what errors are: STATE, or BODIES if formulations with different coordinates take part
+    timed           when this run began
     """
 
     name: str
@@ -57,12 +50,18 @@ class Benchmark:
     unfinished: str = ""
     fingerprint: str = ""
     measure: str = STATE
+    timed: str = ""
 
     def table(self) -> str:
         """Everything as text."""
         from symdyn.bench.work.table import table
 
         return table(self)
+
+    @property
+    def earlier(self) -> list[Row]:
+        """Rows with times of an earlier run, which this one went on with."""
+        return [row for row in self.rows if row.earlier and not row.message]
 
     def best(self, error: float, at: float | None = None, peer: bool | None = None) -> Row | None:
         """The row that gets below an error in the least time; None if there is none.
@@ -86,7 +85,7 @@ class Benchmark:
         """As plain data."""
         r = self.reference
         return {"name": self.name, "end": self.end, "at": list(self.at), "complete": not self.unfinished,
-                "unfinished": self.unfinished, "fingerprint": self.fingerprint, "about": self.about,
+                "unfinished": self.unfinished, "fingerprint": self.fingerprint, "about": self.about, "timed": self.timed,
                 "operations": self.operations, "measure": self.measure,
                 "reference": {"kind": r.kind, "digits": round(r.digits, 2), "how": r.how, "names": list(r.names),
                               "times": list(r.times), "x": [list(x) for x in r.x]},
@@ -107,10 +106,7 @@ class Benchmark:
 
     def store(self, folder: Path) -> None:
         """Write results.json, whole or not at all."""
-        folder.mkdir(parents=True, exist_ok=True)
-        partial = folder / f".{RESULTS}.tmp"
-        partial.write_text(json.dumps(self.record(), indent=1) + "\n", encoding="utf-8")
-        os.replace(partial, folder / RESULTS)
+        files.write(folder / RESULTS, self.record())
 
     def __str__(self) -> str:
         return self.table()
@@ -120,7 +116,8 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
         told: Callable[[str], None] = lambda text: None) -> Benchmark:
     """Measure a mechanism.
 
-    folder     rows that an unfinished run left there are kept; every row is written as soon as it is measured
+    folder     rows that an unfinished run left there are kept, and timed anew at the end where that is cheap; every row is
+               written as soon as it is measured
     progress   show a bar (needs tqdm);  told: called with what is going on
     Raises SymdynError where nothing can be measured.
     """
@@ -136,131 +133,41 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
     reference = find_reference(subject, _leading(first, formulations), patience, told)
     bodies = len({f.coordinates for f in (first, *formulations)}) > 1
     result = Benchmark(subject.name, subject.end, [], skipped, reference, asked.at,
-                       {f.name: f.operations for f in formulations}, _about(), "it was interrupted",
-                       _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE)
+                       {f.name: f.operations for f in formulations}, resume.about(), "it was interrupted",
+                       _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE, resume.now())
     kept = _kept(folder, result)
     # A reference that took longer than its part leaves the runs theirs.
     deadline = math.inf if asked.budget is None else max(begun + asked.budget,
                                                          clock.perf_counter() + asked.budget * (1 - _OF_BUDGET))
-    jobs = list(_jobs(formulations, asked, Yardstick(reference, first, bodies), result.skipped, subject))
-    bar = _bar(subject.name, len(jobs) * PASSES) if progress else None
-    left, given_up = 0, dict[tuple[str, str], str]()
-    try:
-        for job in jobs:
-            if bar is not None:
-                bar.update()
-            known, before = kept.get(job.key), _looser(job, result.rows)
-            if known is None and (job.key[:2] in given_up or before > _SLOW):
-                given_up.setdefault(job.key[:2], f"not at tighter tolerances: a run took {before:.2g} s")
-                continue
-            if known is None and clock.perf_counter() + 2 * before > deadline:
-                left += 1
-                continue
-            try:
-                row = known or job.run()
-            except ArgumentError as error:  # the method does not take the mechanism
-                given_up[job.key[:2]] = str(error)
-                continue
-            result.rows.append(row)
-            if folder is not None and known is None:
-                result.store(folder)
-        _time_again(result.rows, jobs, asked.repeats, deadline, bar)
-    finally:
+    with contextlib.ExitStack() as stack:
+        peers = Peers(formulations, asked, subject, deadline, stack)
+        jobs = list(jobs_of(formulations, asked, Yardstick(reference, first, bodies), peers))
+        bar = resume.bar(subject.name, len(jobs) * PASSES) if progress else None
         if bar is not None:
-            bar.close()
+            stack.callback(bar.close)
+        walked = Walk(jobs, result.rows, kept, deadline, bar)
         if folder is not None:
-            result.store(folder)
-    result.skipped.extend(Skipped(*line, why) for line, why in given_up.items())
-    why = f"{left} of {len(jobs)} runs were not made within the budget of {asked.budget:g} s" if left else ""
-    result = replace(result, rows=_sorted(result.rows, formulations, asked), unfinished=why)
+            stack.callback(result.store, folder)
+        walked.measure(lambda: result.store(folder) if folder is not None else None)
+        walked.time_again(asked.repeats)
+    result.skipped.extend([*peers.skipped, *[Skipped(*line, why) for line, why in walked.given_up.items()]])
+    result = replace(result, rows=_sorted(result.rows, formulations, asked),
+                     unfinished=_unfinished(walked.left, len(jobs), peers.late, asked.budget))
     if folder is not None:
         result.store(folder)
     return result
 
 
-@dataclass(frozen=True)
-class _Job:
-    """A row to be measured; key as that of the row."""
-
-    key: tuple[str, str, float | None, float | None]
-    measure: Callable[[Timing], Row]
-    timing: Timing = field(default_factory=Timing)
-
-    def run(self) -> Row:
-        return self.measure(self.timing)
-
-
-def _time_again(rows: list[Row], jobs: Sequence[_Job], repeats: int, deadline: float, bar: Any) -> None:
-    """Further passes over what was measured in this run."""
-    places = {row.key: k for k, row in enumerate(rows)}
-    for job in [job for _ in range(1, PASSES) for job in jobs]:
-        if bar is not None:
-            bar.update()
-        if job.timing.runs and job.key in places and not rows[places[job.key]].message and clock.perf_counter() < deadline:
-            rows[places[job.key]] = job.timing.again(rows[places[job.key]], repeats)
+def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None) -> str:
+    """Why rows are missing; empty if none is."""
+    told = [f"{left} of {total} runs were not made"] if left else []
+    if late:
+        told.append(f"{late[0]} was not ready" if len(late) == 1 else f"{len(late)} other programs were not ready")
+    return f"{' and '.join(told)} within the budget of {budget:.4g} s" if told and budget is not None else ""
 
 
 def _leading(first: Formulation, formulations: Sequence[Formulation]) -> list[Formulation]:
     return [first, *[f for f in formulations if f.name != first.name]]
-
-
-def _jobs(formulations: Sequence[Formulation], asked: Asked, yardstick: Yardstick, skipped: list[Skipped],
-          subject: Subject) -> Iterator[_Job]:
-    """All rows; a coarse grid of tolerances first, so that a short budget shows the whole range, and at each of them all
-    formulations and methods one after the other, so that they see the machine alike."""
-    lines = [(f, m) for f in formulations for m in asked.methods]
-    compared = list(_peers(formulations, asked, yardstick, skipped, subject))
-    for tolerance in _spread(asked.tolerances):
-        for f, m in lines:
-            yield _Job((f.name, m, tolerance, None),
-                       lambda timing, f=f, m=m, tolerance=tolerance: own(  # type: ignore[misc]
-                           f, m, tolerance, None, yardstick, asked.repeats, asked.at, timing))
-        for peer, f, runners in compared:
-            yield _Job((f.name, peer.name, tolerance, None),
-                       lambda timing, peer=peer, f=f, runners=runners, tolerance=tolerance: peer_row(  # type: ignore[misc]
-                           peer, f, runners, tolerance, yardstick, asked.repeats, timing))
-    for step in _spread(asked.steps or ()):
-        for f, m in lines:
-            if methods.takes_steps(m):
-                yield _Job((f.name, m, None, step),
-                           lambda timing, f=f, m=m, step=step: own(  # type: ignore[misc]
-                               f, m, None, step, yardstick, asked.repeats, asked.at, timing))
-
-
-def _peers(formulations: Sequence[Formulation], asked: Asked, yardstick: Yardstick, skipped: list[Skipped],
-           subject: Subject) -> Iterator[tuple[Peer, Formulation, list[tuple[float, Any]]]]:
-    """The other programs that can run the mechanism, on the formulation with the fewest operations."""
-    if not asked.against:
-        return
-    least = min(formulations, key=lambda f: f.operations)
-    module = least.module
-    end = float(yardstick.times[-1])
-    for name in asked.against:
-        for peer in against.peers(name):
-            there = peer.available()
-            if there is not True:
-                skipped.append(Skipped("", peer.name, str(there)))
-                continue
-            try:
-                runners = [(t, peer.prepare(least.equations, module.default_parameters, least.x0, t, least.system))
-                           for t in (*[t for t in asked.at if t < end], end)]
-            except Exception as error:  # Unfit, or whatever another program raises
-                skipped.append(Skipped("", peer.name, str(error) or type(error).__name__))
-                continue
-            yield peer, least, runners
-
-
-def _spread(values: Sequence[float]) -> list[float]:
-    """Every fourth first, then those between."""
-    order = [k for stride in (4, 2, 1) for k in range(0, len(values), stride)]
-    return [values[k] for k in dict.fromkeys(order)]
-
-
-def _looser(job: _Job, rows: Sequence[Row]) -> float:
-    """How long the same method took at looser tolerances or longer steps, s."""
-    name, method, tolerance, step = job.key
-    return max((r.least for r in rows if (r.formulation, r.method) == (name, method) and r.least > 0 and (
-        (r.tolerance or 0) > (tolerance or 0) or (r.step or 0) > (step or 0))), default=0.0)
 
 
 def _sorted(rows: Sequence[Row], formulations: Sequence[Formulation], asked: Asked) -> list[Row]:
@@ -277,40 +184,16 @@ def _sorted(rows: Sequence[Row], formulations: Sequence[Formulation], asked: Ask
 def _fingerprint(subject: Subject, first: Formulation, reference: Reference, bodies: bool) -> str:
     """What rows depend on besides their own names: numbers, times, and the code that runs."""
     text = "".join(emit(first.equations, "c", ("rhs",), standalone=False).files.values())
-    told = json.dumps([subject.name, subject.end, bodies, list(reference.times), reference.kind, first.x0.tolist(),
-                       first.module.default_parameters.tolist(), sorted(_about().items())])
-    return hashlib.sha256((told + text).encode()).hexdigest()[:16]
+    return resume.fingerprint(subject.name, subject.end, bodies, list(reference.times), reference.kind, first.x0.tolist(),
+                              first.module.default_parameters.tolist(), resume.about(), text)
 
 
-def _kept(folder: Path | None, result: Benchmark) -> dict[tuple[str, str, float | None, float | None], Row]:
-    """The rows of an unfinished run of the same in a folder."""
+def _kept(folder: Path | None, result: Benchmark) -> dict[Key, Row]:
+    """The rows of an unfinished run of the same in a folder, with when they were timed."""
     if folder is None:
         return {}
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):  # not there, or another's file
-        data = json.loads((folder / RESULTS).read_text(encoding="utf-8"))
-        if data["fingerprint"] == result.fingerprint and not data["complete"]:
-            rows = [Row.of(row) for row in data["rows"]]
-            return {row.key: row for row in rows}
+    with contextlib.suppress(KeyError, TypeError, AttributeError):  # another's file
+        data = resume.left_by(folder / RESULTS, result.fingerprint)
+        rows = [Row.of(row) for row in data.get("rows", ())]
+        return {row.key: replace(row, earlier=row.earlier or data.get("timed", "") or "an unknown time") for row in rows}
     return {}
-
-
-def _about() -> dict[str, str]:
-    compiler = find_compiler()
-    return {"symdyn": symdyn.__version__, "machine": platform.machine(), "processor": _processor(),
-            "compiler": f"{compiler.kind} {compiler.version}" if compiler else "none", "python": platform.python_version()}
-
-
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor()
-
-
-def _bar(name: str, total: int) -> Any:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=total, desc=name, unit="run", leave=False)

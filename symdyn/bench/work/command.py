@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from symdyn.bench.work import resume
 from symdyn.bench.work.asked import checked
-from symdyn.bench.work.benchmark import Benchmark
+from symdyn.bench.work.benchmark import RESULTS, Benchmark
 from symdyn.bench.work.benchmark import run as run_one
 from symdyn.bench.work.cases import CASES, subject
 from symdyn.bench.work.page import write_page
@@ -18,10 +19,11 @@ from symdyn.bench.work.subject import Subject
 from symdyn.errors import ArgumentError, MissingExtra, SymdynError
 
 FOLDER = Path("generated") / "bench"
+FILES = (RESULTS, "work_precision.png", "work_precision.svg", "report.html")
 
 
 def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None], Subject]) -> int:
-    """Measure what was asked for; returns how many mechanisms could not be measured.
+    """Measure what was asked for; returns how many mechanisms could not be measured, and at least 1 if nothing was.
 
     from_file   what is measured of a user's file
     Raises ArgumentError that lists everything that is wrong with what was asked for.
@@ -36,22 +38,23 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
     try:
         asked = checked(subjects, **options)
     except ArgumentError as error:
-        if not faults:
-            raise
         faults.append(str(error))
+    folder, begun = arguments.output or FOLDER, clock.perf_counter()
+    places = dict.fromkeys((folder, *(_place(folder, one, subjects) for one in subjects)))
+    faults += list(dict.fromkeys(why for place in places if (why := resume.unwritable(place, FILES))))
     if faults:
         raise ArgumentError("\n".join(faults))
-    folder, begun = arguments.output or FOLDER, clock.perf_counter()
     results: list[Benchmark] = []
     pictures: list[Path] = []
-    failed = 0
+    failed = measured = 0
     for k, one in enumerate(subjects):
         share = None
         if asked.budget is not None:
             left = asked.budget - (clock.perf_counter() - begun)
             if left <= 0:
-                print(f"the budget of {asked.budget:g} s is used up: {', '.join(s.name for s in subjects[k:])} were not begun; "
-                      "run it again with the same output folder to go on", file=sys.stderr)
+                rest = [s.name for s in subjects[k:]]
+                _tell(f"the budget of {asked.budget:g} s is used up: {', '.join(rest)} {'was' if len(rest) == 1 else 'were'} not "
+                      "begun; run it again with the same output folder to go on")
                 break
             share = left / (len(subjects) - k)
         try:
@@ -63,6 +66,10 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
             print(f"symdyn: {error}", file=sys.stderr)
             continue
         print(result.table(), end="\n\n", flush=True)
+        measured += any(not row.message for row in result.rows)
+        if all(row.message for row in result.rows):
+            failed += not result.unfinished
+            _tell(f"{result.name}: {nothing(result)}")
         try:
             written = result.save(_place(folder, one, subjects))
         except MissingExtra as error:
@@ -73,7 +80,15 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
         pictures.append(next(path for path in written if path.suffix == ".svg"))
     if len(subjects) > 1 and results:
         print(f"wrote {write_page(results, pictures, folder / 'report.html')}")
-    return failed
+    return failed or int(not measured)
+
+
+def nothing(result: Benchmark) -> str:
+    """Why no row has figures."""
+    if result.unfinished:
+        return f"nothing was measured: {result.unfinished}"
+    why = [*map(str, result.skipped), *[f"{row.formulation}, {row.method}, {row.setting}: {row.message}" for row in result.rows]]
+    return "nothing was measured, everything was left out or stopped:\n  - " + "\n  - ".join(why)
 
 
 def _subjects(names: Sequence[str], end: float | None, from_file: Callable[[Path, float | None], Subject]

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.extended import SPARE, Precise
+from symdyn.bench import quad
+from symdyn.bench.extended import MORE, SPARE, WITH, Precise
 from symdyn.bench.extrapolation import integrate
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation
 from symdyn.errors import SymdynError
 
-# Decimal digits of the local errors; the second run, which shows that they suffice, has four more.
+# Decimal digits of the local errors; the second run, which shows that they suffice, has more of them.
 DIGITS = 20
-MORE = 4
 # Evaluations that such a run takes for each that Dormand and Prince's method takes at the tightest tolerance of floats, on the
 # catalogue 1.3 to 3.1; both runs together.
 _EVALUATIONS = 6.0
@@ -31,8 +31,8 @@ class TooLong(SymdynError):
 class Exact(Precise):
     """The equations with the very floats of the compiled module as parameters and start."""
 
-    def __init__(self, formulation: Formulation, digits: int) -> None:
-        super().__init__(formulation.equations, digits)
+    def __init__(self, formulation: Formulation, digits: int, compiled: bool = False) -> None:
+        super().__init__(formulation.equations, digits, compiled)
         number, module = self.context.mpf, formulation.module
         given = {**dict(zip(module.metadata["parameters"], module.default_parameters, strict=True)),
                  **{n: module.metadata["initial"].get(n, 0.0) for n in module.metadata["inputs"]}}
@@ -46,13 +46,13 @@ class Exact(Precise):
 
 
 def states(formulation: Formulation, times: Sequence[float], digits: int, until: float = np.inf,
-           told: Callable[[float], None] = lambda t: None) -> list[list[Any]]:
+           told: Callable[[float], None] = lambda t: None, compiled: bool = False) -> list[list[Any]]:
     """The states at these times, numbers of an mpmath context; local errors of 10^-digits.
 
-    until   of time.perf_counter; told: called with the time reached
+    until   of time.perf_counter; told: called with the time reached; compiled: see Precise
     Raises TooLong past it; SymdynError where the equations cannot be evaluated or the steps vanish.
     """
-    precise = Exact(formulation, digits + SPARE)
+    precise = Exact(formulation, digits + SPARE, compiled)
     context, n_q, n_u = precise.context, precise.n_q, precise.n_u
     groups = [slice(0, n_q), slice(n_q, n_q + n_u), slice(n_q + n_u, None)]
 
@@ -70,9 +70,10 @@ def states(formulation: Formulation, times: Sequence[float], digits: int, until:
     for t in times:
         goal = context.mpf(float(t))
         try:
-            x = integrate(field, (now, goal), x, context.mpf(10) ** -digits, groups, context, corrected).x
+            x = integrate(field, (now, goal), x, context.mpf(10) ** -digits, groups, context, corrected,
+                          precise.rule()).x
         except ArithmeticError as error:  # of the integrator and of numbers
-            raise SymdynError(f"the motion at {digits} digits stops: {error}") from None
+            raise quad.TooRough(f"the motion at {digits} digits stops: {error}") from None
         now = goal
         found.append(x)
     return found
@@ -80,7 +81,7 @@ def states(formulation: Formulation, times: Sequence[float], digits: int, until:
 
 def expected_seconds(formulation: Formulation, end: float, digits: int = DIGITS) -> float:
     """About how long both runs of `converged` take, s."""
-    precise = Exact(formulation, digits + SPARE)
+    precise = Exact(formulation, digits + SPARE, quad.suits(digits + MORE))
     zero = precise.context.mpf(0)
     precise("rhs", zero, precise.start)
     begun = clock.perf_counter()
@@ -97,14 +98,13 @@ def converged(formulation: Formulation, times: Sequence[float], digits: int = DI
 
     Raises TooLong past `until` (of time.perf_counter), SymdynError where a run stops.
     """
-    coarse = states(formulation, times, digits, until, told)
-    fine = states(formulation, times, digits + MORE, until, told)
+    coarse, fine, compiled = quad.twice(lambda n, compiled: states(formulation, times, n, until, told, compiled), digits, MORE)
     differ = distance(coarse, fine, len(formulation.equations.symbols.coordinates), len(formulation.equations.symbols.speeds))
     kept = float(min(digits, -np.log10(max(differ, 1e-40))))
     if kept < 1:
         raise SymdynError(f"runs of tolerance 1e-{digits} and 1e-{digits + MORE} differ by {differ:.1e}, norm-wise relative")
     text = [[_text(v, max(17, round(kept) + 1)) for v in x] for x in fine]
-    how = (f"Gragg-Bulirsch-Stoer extrapolation of the compiled tape with mpmath; runs of tolerance 1e-{digits} and "
+    how = (f"Gragg-Bulirsch-Stoer extrapolation of the compiled tape {WITH[compiled]}; runs of tolerance 1e-{digits} and "
            f"1e-{digits + MORE} differ by {differ:.1e}")
     return Reference("extended", tuple(float(t) for t in times), [[float(v) for v in x] for x in fine], kept, how,
                      formulation.coordinates, True), text

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.work.against.peer import Peer, Runner
+from symdyn.bench.work.against.apart import Prepared, TooLong
+from symdyn.bench.work.against.peer import Peer
+from symdyn.bench.work.methods import AUTO
 from symdyn.bench.work.record import NAN, Row
 from symdyn.bench.work.subject import Formulation, Yardstick
-from symdyn.bench.work.timing import Timing, seconds_of
+from symdyn.bench.work.timing import Timing, one_pass, seconds_of
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 
 # Output times, besides those of the reference, at which energy and constraints are looked at.
@@ -36,11 +38,17 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
     end = float(yardstick.times[-1])
     timing = timing or Timing()
 
-    def run(until: float) -> tuple[float, int]:
+    def run(until: float, wanted: int) -> tuple[list[float], int]:
+        evaluations = [0]
+
+        def one() -> float:
+            timed = formulation.module.simulate(np.array([0.0, until]), **given)
+            evaluations[:] = [timed.nfev]
+            return seconds_of(timed)
+
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SimulationWarning)
-            timed = formulation.module.simulate(np.array([0.0, until]), **given)
-        return seconds_of(timed), timed.nfev
+            return one_pass(one, wanted), evaluations[0]
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # it is in the row
@@ -48,7 +56,7 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
             sol = formulation.module.simulate(_looks(yardstick.times), **given)
             if sol.success:
                 for t in dict.fromkeys((*at, end)):
-                    timing.add(_index(yardstick, t), lambda t=t: run(t), repeats)  # type: ignore[misc]
+                    timing.add(_index(yardstick, t), lambda wanted, t=t: run(t, wanted), repeats)  # type: ignore[misc]
             energy = _energy_error(formulation, sol, given)
         except ArgumentError:
             raise
@@ -61,26 +69,30 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
               error_u=float(u[-1]), errors=tuple(worse.tolist()), energy_error=energy,
               constraint_error=_constraint_error(formulation, sol), message="" if sol.success else sol.message)
     row = timing.told(row, len(yardstick.times)) if sol.success else row
+    if method == AUTO:
+        row = replace(row, chosen=sol.method, why=sol.why)
     return replace(row, operations=row.evaluations * formulation.operations)
 
 
-def peer_row(peer: Peer, formulation: Formulation, runners: Sequence[tuple[float, Runner]], tolerance: float,
+def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequence[float], tolerance: float,
              yardstick: Yardstick, repeats: int, timing: Timing | None = None) -> Row:
     """A row of another program.
 
-    runners   time and what runs the motion until then; the last one runs it to the end;  timing: filled, to go on with
+    ready   it, prepared to run the motion until each of the times `ends`, the last of which is the motion's
+    timing  filled, to go on with
+    Raises TooLong.
     """
     row = Row(formulation.name, peer.name, tolerance, None)
     errors = np.full((2, len(yardstick.times)), NAN)
     timing = timing or Timing()
     try:
-        for t, run in runners:
+        for place, t in enumerate(ends):
             states: list[np.ndarray] = []
 
-            def one(run: Runner = run, states: list[np.ndarray] = states) -> tuple[float, int]:
-                took, evaluations, x = run(tolerance)
+            def one(wanted: int, place: int = place, states: list[np.ndarray] = states) -> tuple[list[float], int]:
+                seconds, evaluations, x = ready.timed(place, tolerance, wanted)
                 states[:] = [x]
-                return took, evaluations
+                return seconds, evaluations
 
             index = _index(yardstick, t)
             timing.add(index, one, repeats)
@@ -88,6 +100,8 @@ def peer_row(peer: Peer, formulation: Formulation, runners: Sequence[tuple[float
             alone[index] = states[0]
             for k, part in enumerate(yardstick.errors(formulation, alone)):
                 errors[k, index] = part[index]
+    except TooLong:
+        raise
     except Exception as error:  # whatever another program raises is told as its own
         return Row(*row.key, peer=True, message=str(error) or type(error).__name__)
     worse = np.fmax(*errors)

@@ -8,11 +8,13 @@ from symdyn.runtime.methods import COMPILED, is_compiled
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA", "RK23")
 # Compiled methods with steps of one length, which they choose by the tolerance unless it is given.
 FIXED = ("gauss",)
+# Chooses one of them for every run; measured if it is named.
+AUTO = "auto"
 
 
 def names() -> list[str]:
     """Every method that can be asked for."""
-    return [*COMPILED, *SCIPY]
+    return [*COMPILED, AUTO, *SCIPY]
 
 
 def usual() -> list[str]:

@@ -12,7 +12,7 @@ import symdyn
 from symdyn.bench.work.benchmark import Benchmark
 from symdyn.bench.work.picture import title
 from symdyn.bench.work.record import DISTURBED, Row
-from symdyn.bench.work.table import LEVELS, figure, milliseconds
+from symdyn.bench.work.table import LEVELS, choices, earlier, figure, marked, milliseconds
 from symdyn.pages import page_environment, write_text
 
 
@@ -39,7 +39,7 @@ def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
             "measure": benchmark.measure, "digits": f"{benchmark.reference.digits:.3g}",
             "about": benchmark.about, "unfinished": benchmark.unfinished,
             "busy": f"{busy} of {len(benchmark.rows)}" if busy else "",
-            "disturbed": f"{DISTURBED:g}",
+            "disturbed": f"{DISTURBED:g}", "earlier": earlier(benchmark), "choices": choices(benchmark),
             "operations": [(title(name), n) for name, n in benchmark.operations.items()],
             "skipped": [(", ".join(filter(None, (s.formulation and title(s.formulation), s.method))), s.why)
                         for s in benchmark.skipped],
@@ -68,13 +68,13 @@ def _time(row: Row | None, index: int | None) -> str:
 def _which(row: Row | None) -> str:
     if row is None:
         return "none"
-    name = row.method if row.peer else f"{title(row.formulation)}, {row.method}"
+    name = row.method if row.peer else f"{title(row.formulation)}, {row.label}"
     return f"{name}, {row.setting}"
 
 
 def _row(row: Row, indices: Sequence[int]) -> dict[str, Any]:
-    return {"formulation": title(row.formulation), "method": row.method, "setting": row.setting, "message": row.message,
-            "ms": "" if math.isnan(row.seconds) else milliseconds(row.seconds) + "*" * row.disturbed,
+    return {"formulation": title(row.formulation), "method": row.label, "setting": row.setting, "message": row.message,
+            "ms": marked(row),
             "evaluations": row.evaluations or "–", "steps": row.steps or "–",
             "operations": f"{row.operations:.3g}" if row.operations else "–",
             "errors": [figure(row.error_q), figure(row.error_u), *[figure(row.error_at(k)) for k in indices], figure(row.worst)],

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
 import math
 import platform
 import sys
 import textwrap
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from symdyn.bench.work import against
+from symdyn.bench import kept as files
+from symdyn.bench.work import against, resume
 from symdyn.bench.work.published_cases import CASES, THRESHOLD, Case
 from symdyn.bench.work.published_lines import Line, Run, lines_of, search, time_all, worth
+from symdyn.bench.work.timing import PASSES
 from symdyn.errors import SimulationWarning, SymdynError
-from symdyn.pages import write_text
 from symdyn.runtime.compiler import require_compiler
 
+RESULTS = "published.json"
 LEGEND = f"""\
 ms: inside the integrator, to the end, least time of the runs, which are the same bit by bit; error: of all outputs, root mean
 square of differences relative to the exact value, or to {THRESHOLD:g} where that is larger; of A03 q the largest relative one.
@@ -69,7 +71,7 @@ class Result:
 
     def _told(self, bound: float) -> str:
         if self.unfinished:
-            return f"  within {bound:g}: not decided, the budget was used up before all programs were timed"
+            return f"  within {bound:g}: not decided, the budget was used up before all programs were looked at and timed"
         ours, theirs = self.least(bound, False), self.least(bound, True)
         first = "none of ours" if ours is None else f"{ours[0].program} {ours[1].time * 1e3:.4g} ms"
         if theirs is None:
@@ -82,37 +84,56 @@ class Result:
         """As plain data."""
         return {"name": self.case.name, "title": self.case.title, "bounds": self.case.bounds, "reference": self.reference,
                 "outputs": self.case.outputs, "published": self.case.published, "missed": self.missed(),
-                "unfinished": self.unfinished,
+                "unfinished": self.unfinished, "text": str(self),
                 "threshold": None if self.case.relative else THRESHOLD, "left out": self.left_out, "lines": [
                     {"program": line.program, "formulation": line.formulation.name, "peer": line.peer, "why": line.why,
+                     "searched": line.searched,
                      "runs": [{k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(run).items()}
                               for run in line.runs]} for line in self.lines]}
 
 
 def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, deadline: float = math.inf,
-            told: Callable[[str], None] = lambda text: None) -> Result:
+            told: Callable[[str], None] = lambda text: None, before: Mapping[str, Any] | None = None,
+            store: Callable[[Result], None] = lambda result: None, progress: bool = False) -> Result:
     """One mechanism.
 
     peers      default: all;  deadline: of time.perf_counter, after which nothing new is tried
     told       called with what is going on
+    before     the record of a run that was stopped: the tolerances that it found are timed anew, not looked for
+    store      called with what is known after every line;  progress: show a bar (needs tqdm)
     Raises SymdynError where there is no reference.
     """
-    formulations = case.formulations()
-    with warnings.catch_warnings():
+    peers = against.names() if peers is None else peers
+    found = {(line["program"], line["formulation"]): line for line in (before or {}).get("lines", ()) if line["searched"]}
+    with warnings.catch_warnings(), contextlib.ExitStack() as stack:
         warnings.simplefilter("ignore", SimulationWarning)  # where a run stops it is told
+        step: Callable[[], Any] = lambda: None
+        if progress:
+            bar = resume.bar(case.name, len(case.systems) * len(case.methods) + PASSES + sum(
+                len(against.peers(name)) for name in peers), "step")
+            stack.callback(bar.close)
+            step, told = bar.update, lambda text: bar.write(f"symdyn: {text}", file=sys.stderr)
+        formulations = case.formulations()
         exact, how = case.reference(formulations[0])
-        lines, left_out = list[Line](), dict[str, str]()
-        for line in lines_of(case, formulations, against.names() if peers is None else peers, left_out, deadline):
-            begun = clock.perf_counter()
-            search(line, case, exact, deadline)
-            told(f"{case.name}: {line.program}, {line.formulation.name}: {len(line.runs)} tolerances, "
-                 f"{clock.perf_counter() - begun:.1f} s")
+        lines, left_out, late = list[Line](), dict[str, str](), list[str]()
+        for line in lines_of(case, formulations, peers, left_out, late, deadline, stack):
+            begun, known = clock.perf_counter(), found.get(line.key)
+            if known is not None:
+                line.runs, line.why, line.searched = [Run.of(run) for run in known["runs"]], known["why"], True
+            else:
+                search(line, case, exact, deadline)
+                if line.runs:
+                    told(f"{case.name}: {line.program}, {line.formulation.name}: {len(line.runs)} tolerances, "
+                         f"{clock.perf_counter() - begun:.1f} s")
             lines.append(line)
+            store(Result(case, how, lines, left_out, True))
+            step()
         for line in lines:
             if not any(r.error <= case.bounds[0] for r in line.runs):
                 left_out[f"{line.program}, {line.formulation.name}"] = line.nearest()
-        time_all([(line, run) for line in lines for run in worth(line, case)], repeats, deadline)
-    return Result(case, how, lines, left_out, clock.perf_counter() > deadline)
+        time_all([(line, run) for line in lines for run in worth(line, case)], repeats, deadline, step)
+    unfinished = bool(late) or not all(line.searched for line in lines) or clock.perf_counter() > deadline
+    return Result(case, how, lines, left_out, unfinished)
 
 
 def _tell(text: str) -> None:
@@ -120,39 +141,69 @@ def _tell(text: str) -> None:
 
 
 def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, repeats: int = 5, budget: float | None = None,
-        folder: Path | None = None) -> int:
+        folder: Path | None = None, progress: bool = False) -> int:
     """Measure the named mechanisms (default: all) and print a table of each; returns of how many bounds ours is not
     the first, and how many mechanisms are not decided.
 
-    names   such as A03;  peers: other programs, default: all;  budget: s, after which nothing new is tried
-    folder  of published.json, written after every mechanism (default: generated/published)
+    names     such as A03;  peers: other programs, default: all;  budget: s, after which nothing new is tried
+    folder    of published.json, written as soon as anything is known (default: generated/published); what an unfinished run
+              left there is gone on with: mechanisms that were done stay, of others the tolerances that were found
+    progress  show a bar (needs tqdm)
     Raises SymdynError that lists everything that is wrong with what is asked for.
     """
     faults = [f"there is no published mechanism {name!r}; there are {', '.join(CASES)}" for name in names or ()
               if name not in CASES]
     faults += [f"there is no peer {name!r}; there are {', '.join(against.names())}" for name in peers or ()
-               if name not in against.names()]
+               if name not in [*against.names(), against.ALL]]
     if repeats < 1:
         faults.append(f"{repeats} repeats were asked for; pass 1 or more")
     if budget is not None and not budget > 0:
         faults.append(f"the budget is {budget!r}; pass a positive number of seconds")
+    folder = folder or Path("generated") / "published"
+    faults += filter(None, [resume.unwritable(folder, [RESULTS])])
     if faults:
         raise SymdynError("\n".join(faults))
-    folder, compiler = folder or Path("generated") / "published", require_compiler()
+    compiler = require_compiler()
     chosen = [CASES[name] for name in dict.fromkeys(names or CASES)]
+    programs = against.names() if peers is None else against.named(peers)
     deadline = math.inf if budget is None else clock.perf_counter() + budget
-    results: list[Result] = []
+    marks = {case.name: _fingerprint(case, programs, repeats) for case in chosen}
+    known = {r["name"]: r for r in resume.left_by(folder / RESULTS).get("mechanisms", ())
+             if r.get("fingerprint") == marks.get(r.get("name"), "")}
+
+    def store(result: Result | None = None) -> None:
+        if result is not None:
+            name = result.case.name
+            known[name] = {**result.record(), "fingerprint": marks[name], "timed": timed}
+        records = [known[case.name] for case in chosen if case.name in known]
+        done = len(records) == len(chosen) and not any(r["unfinished"] for r in records)
+        files.write(folder / RESULTS, {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats,
+                                              "complete": done, "mechanisms": records})
+
+    left, timed = [], resume.now()
     for case in chosen:
-        if clock.perf_counter() > deadline:
-            break
-        results.append(measure(case, peers, repeats, deadline, _tell))
-        print(results[-1], end="\n\n", flush=True)
-        data = {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats,
-                "mechanisms": [r.record() for r in results]}
-        write_text(folder / "published.json", json.dumps(data, indent=1) + "\n", "what was measured")
-    left = [case.name for case in chosen[len(results):]]
+        before = known.get(case.name)
+        if before is not None and not before["unfinished"]:
+            print(f"{before['text']}\n  all of it was measured in an earlier run, of {before['timed']}", end="\n\n", flush=True)
+        elif clock.perf_counter() > deadline:
+            left.append(case.name)
+        else:
+            result = measure(case, programs, repeats, deadline, _tell, before, store, progress)
+            store(result)
+            print(result, end="\n\n", flush=True)
+    store()
     if left:
-        print(f"the budget of {budget:g} s is used up: {', '.join(left)} were not begun\n")
+        print(f"the budget of {budget:g} s is used up: {', '.join(left)} {'was' if len(left) == 1 else 'were'} not begun\n")
     print(LEGEND)
-    print(f"wrote {folder / 'published.json'}")
-    return sum(len(r.missed()) for r in results) + sum(r.unfinished for r in results) + len(left)
+    print(f"wrote {folder / RESULTS}")
+    records = [known[case.name] for case in chosen if case.name not in left]
+    undecided = len(left) + sum(r["unfinished"] for r in records)
+    if undecided:
+        print("run it again with the same output folder to go on")
+    return sum(len(r["missed"]) for r in records) + undecided
+
+
+def _fingerprint(case: Case, peers: Sequence[str], repeats: int) -> str:
+    """What the results of a mechanism depend on: what is asked for, the machine, the version."""
+    return resume.fingerprint(case.name, case.end, case.outputs, case.bounds, case.methods, list(case.systems), list(peers),
+                              repeats, resume.about())

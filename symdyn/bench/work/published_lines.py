@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from symdyn.bench.work import against
+from symdyn.bench.work.against.apart import TooLong, prepared
 from symdyn.bench.work.published_cases import Case
 from symdyn.bench.work.subject import Formulation
 from symdyn.bench.work.timing import ENOUGH, PASSES, one_pass, seconds_of
@@ -21,6 +24,8 @@ _HALVINGS = 3
 # A line whose runs take longer than _SLOW, s, or whose search with all that it compiles takes longer than _PATIENCE, s, is not
 # asked for tighter tolerances.
 _SLOW, _PATIENCE = 10.0, 300.0
+# Part of what is left of a budget that may pass until a program is prepared.
+_FOR_NEXT = 1 / 4
 
 
 @dataclass
@@ -36,21 +41,34 @@ class Run:
         """s"""
         return min(self.seconds)
 
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Run:
+        """From plain data, not timed yet."""
+        return cls(data["tolerance"], math.nan if data["error"] is None else data["error"])
+
 
 @dataclass
 class Line:
     """A program, or a method of ours, on one formulation.
 
-    look   tolerance -> s inside the integrator, states at the case's times;  timed: tolerance -> s inside the integrator
+    look       tolerance -> s inside the integrator, states at the case's times
+    timed      tolerance, repeats, deadline -> s inside the integrator of the runs of one pass
+    searched   all tolerances that are of interest were tried: a later run need not
     """
 
     program: str
     formulation: Formulation
     peer: bool
     look: Callable[[float], tuple[float, np.ndarray]]
-    timed: Callable[[float], float]
+    timed: Callable[[float, int, float], list[float]]
     runs: list[Run] = field(default_factory=list)
     why: str = ""
+    searched: bool = False
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What tells lines apart."""
+        return self.program, self.formulation.name
 
     def within(self, bound: float) -> Run | None:
         """The fastest run within a bound."""
@@ -58,14 +76,19 @@ class Line:
 
     def nearest(self) -> str:
         """Why it is not within the bounds."""
+        if not self.runs:
+            return self.why
         errors = [r.error for r in self.runs if math.isfinite(r.error)]
         told = f"not within the bounds, its least error is {min(errors):.1e}" if errors else "no run reached the end"
         return f"{told}; {self.why}" if self.why else told
 
 
 def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[str], left_out: dict[str, str],
-           deadline: float) -> Iterator[Line]:
-    """Ours, then other programs, each on the first formulation that it takes; the others into left_out."""
+             late: list[str], deadline: float, stack: contextlib.ExitStack) -> Iterator[Line]:
+    """Ours, then other programs, each on the first formulation that it takes; the others into left_out.
+
+    late   takes those that were not ready in time;  stack: closes what was prepared
+    """
     for f in formulations:
         for method in case.methods:
             yield _own(case, f, method)
@@ -75,17 +98,22 @@ def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[st
             for f in formulations if there is True else ():
                 if f.name == "absolute":
                     continue
-                if clock.perf_counter() > deadline:
-                    why[f.name] = "not tried within the budget"
-                    continue
+                now = clock.perf_counter()
                 try:
-                    run = peer.prepare(f.equations, f.module.default_parameters, f.x0, case.end, f.system)
+                    ready = prepared(peer, (f.equations, f.module.default_parameters, f.x0, f.system), [case.end],
+                                     now + _FOR_NEXT * (deadline - now), deadline)
+                except TooLong as error:
+                    why[f.name] = str(error)
+                    late.append(peer.name)
+                    continue
                 except Exception as error:  # Unfit, or whatever another program raises
                     why[f.name] = str(error) or type(error).__name__
                     continue
                 taken = True
-                yield Line(peer.name, f, True, lambda tolerance, run=run: run(tolerance, case.times)[::2],  # type: ignore[misc]
-                           lambda tolerance, run=run: run(tolerance)[0])  # type: ignore[misc]
+                stack.callback(ready.close)
+                yield Line(peer.name, f, True, lambda tolerance, ready=ready: ready.states(  # type: ignore[misc]
+                    tolerance, case.times), lambda tolerance, repeats, deadline, ready=ready: ready.timed(  # type: ignore[misc]
+                        0, tolerance, repeats, deadline)[0])
                 break
             if not taken:
                 left_out[peer.name] = str(there) if there is not True else "; ".join(dict.fromkeys(why.values()))
@@ -98,14 +126,20 @@ def _own(case: Case, f: Formulation, method: str) -> Line:
             raise SymdynError(sol.message)
         return seconds_of(sol), np.asarray(sol.x[1:])
 
-    def timed(tolerance: float) -> float:
-        return seconds_of(f.module.simulate(np.array([0.0, case.end]), method=method, rtol=tolerance))
+    def timed(tolerance: float, repeats: int, deadline: float) -> list[float]:
+        return one_pass(lambda: seconds_of(f.module.simulate(np.array([0.0, case.end]), method=method, rtol=tolerance)), repeats,
+                        deadline)
 
     return Line(f"symdyn {method}", f, False, look, timed)
 
 
 def search(line: Line, case: Case, exact: np.ndarray, deadline: float) -> None:
-    """Look at looser and tighter tolerances until both bounds are kept."""
+    """Look at looser and tighter tolerances until both bounds are kept.
+
+    deadline   of time.perf_counter, after which nothing more is looked at
+    """
+    whole = [True]
+
     def look(tolerance: float) -> float:
         took, error = 0.0, math.nan
         try:
@@ -113,10 +147,14 @@ def search(line: Line, case: Case, exact: np.ndarray, deadline: float) -> None:
             error = case.error(case.history(line.formulation, case.times, states), exact)
         except Exception as failed:  # whatever another program raises is told as its own
             line.why = str(failed) or type(failed).__name__
+            whole[0] &= not isinstance(failed, TooLong)
         line.runs.append(Run(tolerance, error))
         return took
 
     last = min(deadline, clock.perf_counter() + _PATIENCE)
+    if clock.perf_counter() > deadline:
+        line.why = "not tried within the budget"
+        return
     for tolerance in TOLERANCES:
         took = look(tolerance)
         if line.runs[-1].error <= case.bounds[-1]:
@@ -130,6 +168,7 @@ def search(line: Line, case: Case, exact: np.ndarray, deadline: float) -> None:
         bad = min((r.tolerance for r in line.runs if r.tolerance > good), default=1.0)
         if math.isfinite(good) and clock.perf_counter() < last:
             look(math.sqrt(good * bad))
+    line.searched = whole[0] and clock.perf_counter() <= deadline
 
 
 def worth(line: Line, case: Case) -> list[Run]:
@@ -138,15 +177,18 @@ def worth(line: Line, case: Case) -> list[Run]:
     return [r for r in loose if any(r in [s for s in loose if s.error <= bound][:3] for bound in case.bounds)]
 
 
-def time_all(runs: Sequence[tuple[Line, Run]], repeats: int, deadline: float = math.inf) -> None:
+def time_all(runs: Sequence[tuple[Line, Run]], repeats: int, deadline: float = math.inf,
+             step: Callable[[], Any] = lambda: None) -> None:
     """Time all runs, one after the other, several times over, so that they see the machine alike.
 
-    deadline   of time.perf_counter, after which none is begun
+    deadline   of time.perf_counter, after which none is begun;  step: called after every pass
     """
-    for line, run in [both for _ in range(PASSES) for both in runs]:
-        if sum(run.seconds) >= ENOUGH:
-            continue
-        try:
-            run.seconds += one_pass(lambda line=line, run=run: line.timed(run.tolerance), repeats, deadline)  # type: ignore[misc]
-        except Exception as failed:  # whatever another program raises is told as its own
-            line.why = str(failed) or type(failed).__name__
+    for _ in range(PASSES):
+        for line, run in runs:
+            if sum(run.seconds) >= ENOUGH or clock.perf_counter() > deadline:
+                continue
+            try:
+                run.seconds += line.timed(run.tolerance, repeats, deadline)
+            except Exception as failed:  # whatever another program raises is told as its own
+                line.why = str(failed) or type(failed).__name__
+        step()

@@ -29,6 +29,9 @@ class Row:
     energy_error          see Solution.energy_error; not a number where the energy is not known
     constraint_error      largest residual relative to the mechanism's length, and of the norms of Euler parameters
     message               empty, or why the run stopped early
+    chosen, why           of "auto": the method that it took, and a sentence on why; empty of others
+    earlier               when it was timed, if that was in an earlier run that this one went on with, else empty
+    took                  all that it took to measure the row for the first time, s, with compilation
     """
 
     formulation: str
@@ -50,6 +53,10 @@ class Row:
     constraint_error: float = NAN
     peer: bool = False
     message: str = ""
+    chosen: str = ""
+    why: str = ""
+    earlier: str = ""
+    took: float = NAN
 
     @property
     def key(self) -> tuple[str, str, float | None, float | None]:
@@ -76,6 +83,11 @@ class Row:
     def line(self) -> str:
         """Name of the line in pictures that the row is a point of."""
         return self.method if self.peer else f"{self.formulation}, {self.method}"
+
+    @property
+    def label(self) -> str:
+        """The method, and of "auto" what it chose."""
+        return f"{self.method} ({self.chosen})" if self.chosen else self.method
 
     @property
     def setting(self) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import time as clock
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.bench import kept
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation
 from symdyn.errors import ArgumentError, EvaluationError, SymdynError
@@ -32,7 +32,7 @@ def find(name: str, formulation: Formulation, times: Sequence[float], until: flo
     name   of the mechanism in the package's store
     """
     packaged = stored().get(name)
-    for data in (packaged, _read(_cached(formulation, times))):
+    for data in (packaged, kept.read(_cached(formulation, times))):
         if data is not None:
             reference = _fitting(data, formulation, times)
             if reference is not None:
@@ -42,7 +42,7 @@ def find(name: str, formulation: Formulation, times: Sequence[float], until: flo
 
 def keep(formulation: Formulation, reference: Reference, text: Sequence[Sequence[str]]) -> None:
     """Put a reference into the cache folder."""
-    _write(_cached(formulation, reference.times), record(formulation, reference, text))
+    kept.write(_cached(formulation, reference.times), record(formulation, reference, text))
 
 
 def record(formulation: Formulation, reference: Reference, text: Sequence[Sequence[str]]) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def record(formulation: Formulation, reference: Reference, text: Sequence[Sequen
 
 def stored() -> dict[str, dict[str, Any]]:
     """The package's references, by name."""
-    return _read(STORE) or {}
+    return kept.read(STORE) or {}
 
 
 def _given(formulation: Formulation) -> dict[str, float]:
@@ -101,25 +101,11 @@ def _cached(formulation: Formulation, times: Sequence[float]) -> Path:
     return cache_dir() / "references" / f"{stem}-{hashlib.sha256(told.encode()).hexdigest()[:16]}.json"
 
 
-def _read(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # not there, or a damaged file, which is made again
-        return None
-
-
-def _write(path: Path, data: Any) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = re.sub(r"\[\s+([^\[\]{}]+?)\s+\]", lambda m: "[" + re.sub(r",\s+", ", ", m[1]) + "]", json.dumps(data, indent=1))
-    partial = path.with_name(f".{path.name}-{os.getpid()}.tmp")
-    partial.write_text(text + "\n", encoding="utf-8")
-    os.replace(partial, path)
-
-
-def run(names: Sequence[str] = (), digits: int | None = None) -> int:
-    """Make references anew and put them into the package; returns how many could not be made.
+def run(names: Sequence[str] = (), digits: int | None = None, file: Path | None = None) -> int:
+    """Make references anew and store them; returns how many could not be made.
 
     names   of the list of `symdyn bench --all` (default: all); digits: of the local errors (default: as many as usual)
+    file    to store them in beside what it holds (default: the package's)
     """
     from symdyn.bench.work.cases import CASES, subject
     from symdyn.bench.work.converged import DIGITS, converged
@@ -127,8 +113,8 @@ def run(names: Sequence[str] = (), digits: int | None = None) -> int:
 
     if digits is not None and digits < 1:
         raise ArgumentError(f"{digits} digits were asked for; pass 1 or more")
-    failed = 0
-    for about in [subject(name) for name in names or CASES]:
+    failed, subjects, file = 0, [subject(name) for name in names or CASES], kept.writable(file, STORE)
+    for about in subjects:
         begun = clock.perf_counter()
         first = about.first()
         try:
@@ -138,6 +124,6 @@ def run(names: Sequence[str] = (), digits: int | None = None) -> int:
             print(f"{about.name}: {error}", flush=True)
             continue
         made = record(first, reference, text)
-        _write(STORE, dict(sorted({**stored(), about.name: made}.items())))
+        kept.put(file, about.name, made)
         print(f"{about.name}: {reference}; {clock.perf_counter() - begun:.0f} s", flush=True)
     return failed

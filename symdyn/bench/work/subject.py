@@ -166,12 +166,21 @@ class Yardstick:
         t, x = self.times[:len(x)][there], x[there]
         given = np.array([float(module.metadata["initial"].get(n, 0.0)) for n in module.metadata["inputs"]])
         p = module.default_parameters
+        places = self._shared(formulation, beside or formulation)
         try:
-            frames = module.evaluate("frames", t, x, p, given).reshape(len(x), -1)
-            J = module.evaluate("J", t, x, p, given).reshape(len(x), -1, n_u)
+            frames = module.evaluate("frames", t, x, p, given).reshape(len(x), -1, 12)[:, places]
+            J = module.evaluate("J", t, x, p, given).reshape(len(x), len(module.metadata["bodies"]), -1, n_u)[:, places]
         except EvaluationError:
             return unknown, unknown
-        return _spread(frames, there), _spread(np.einsum("kij,kj->ki", J, x[:, n_q:n_q + n_u]), there)
+        velocities = np.einsum("kbij,kj->kbi", J, x[:, n_q:n_q + n_u])
+        return _spread(frames.reshape(len(x), -1), there), _spread(velocities.reshape(len(x), -1), there)
+
+    def _shared(self, formulation: Formulation, other: Formulation) -> list[int]:
+        """Where a formulation has the bodies that the reference's and the other one have: absolute coordinates may have more
+        bodies, which carry joints."""
+        names = formulation.module.metadata["bodies"]
+        both = set(other.module.metadata["bodies"])
+        return [names.index(name) for name in self.first.module.metadata["bodies"] if name in both]
 
 
 def _spread(rows: np.ndarray, places: np.ndarray) -> np.ndarray:

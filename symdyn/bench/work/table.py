@@ -37,6 +37,8 @@ def _lines(benchmark: Benchmark) -> Iterator[str]:
     indices = [benchmark.index(t) for t in benchmark.at]
     for row in benchmark.rows:
         yield _row(row, indices, widths)
+    yield from _wrapped(earlier(benchmark))
+    yield from _wrapped(choices(benchmark))
     yield from best(benchmark, None)
     for t in benchmark.at:
         yield from best(benchmark, t)
@@ -49,6 +51,21 @@ def _lines(benchmark: Benchmark) -> Iterator[str]:
     if benchmark.unfinished:
         yield f"unfinished: {benchmark.unfinished}; run it again with the same output folder to go on"
     yield f"{LEGEND}{benchmark.measure}"
+
+
+def earlier(benchmark: Benchmark) -> str:
+    """Which rows were timed in an earlier run; empty if none was."""
+    kept = benchmark.earlier
+    when = ", ".join(sorted({row.earlier for row in kept}))
+    return (f"{len(kept)} of {len(benchmark.rows)} rows, marked ^, were timed in an earlier run, of {when}: the machine may have "
+            "been quicker or slower then; to compare all times measure into another folder") if kept else ""
+
+
+def choices(benchmark: Benchmark) -> str:
+    """Why auto chose what it did; empty where it was not asked for."""
+    first = {(row.formulation, row.chosen): row for row in reversed(benchmark.rows) if row.chosen}
+    why = [f"{row.formulation} from {row.setting} {row.chosen}, {row.why}" for row in reversed(first.values())]
+    return f"auto chose by short trial runs, which are not in the times: {'; '.join(why)}" if why else ""
 
 
 def best(benchmark: Benchmark, at: float | None) -> Iterator[str]:
@@ -69,12 +86,20 @@ def best(benchmark: Benchmark, at: float | None) -> Iterator[str]:
 
 
 def _told(row: Row | None, index: int | None) -> str:
-    return "none" if row is None else f"{milliseconds(row.time_at(index))} ms  {row.line} at {row.setting}"
+    if row is None:
+        return "none"
+    chosen = f" ({row.chosen})" if row.chosen else ""
+    return f"{milliseconds(row.time_at(index))} ms  {row.line}{chosen} at {row.setting}"
 
 
 def milliseconds(seconds: float) -> str:
     """Three digits."""
     return f"{seconds * 1e3:.3g}" if seconds < 1 else f"{seconds * 1e3:.0f}"
+
+
+def marked(row: Row) -> str:
+    """The median, with what there is to say of it."""
+    return "" if math.isnan(row.seconds) else milliseconds(row.seconds) + "*" * row.disturbed + "^" * bool(row.earlier)
 
 
 def figure(value: float) -> str:
@@ -83,12 +108,12 @@ def figure(value: float) -> str:
 
 
 def _row(row: Row, indices: Sequence[int], widths: tuple[int, int]) -> str:
-    head = f"{row.formulation:{widths[0]}}{row.method:{widths[1]}}{row.setting:>9}"
+    head = f"{row.formulation:{widths[0]}}{row.label:{widths[1]}}{row.setting:>9}"
     if row.message:
         return f"{head}  stopped: {textwrap.shorten(row.message, 150)}"
     counts = "".join(f"{n or '-':>{w}}" for n, w in ((row.evaluations, 13), (row.steps, 9)))
     operations = f"{row.operations:.3g}" if row.operations else "-"
-    taken = milliseconds(row.seconds) + "*" * row.disturbed
+    taken = marked(row)
     return (f"{head}{taken:>10}{counts}{operations:>12}{figure(row.error_q):>9}{figure(row.error_u):>9}"
             + "".join(f"{figure(row.error_at(k)):>10}" for k in indices)
             + f"{figure(row.worst):>9}{figure(row.energy_error):>9}{figure(row.constraint_error):>9}")
@@ -99,8 +124,8 @@ def _at(t: float) -> str:
 
 
 def _widths(rows: Sequence[Row]) -> tuple[int, int]:
-    return (max([11, *[len(r.formulation) for r in rows]]) + 2, max([6, *[len(r.method) for r in rows]]) + 2)
+    return (max([11, *[len(r.formulation) for r in rows]]) + 2, max([6, *[len(r.label) for r in rows]]) + 2)
 
 
 def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, 150, subsequent_indent="    ") or [""]
+    return textwrap.wrap(text, 150, subsequent_indent="    ")

@@ -17,19 +17,19 @@ PASSES = 3
 # often as asked at most: on a machine with other work a median of few of them tells nothing.
 ENOUGH, MUCH, MOST = 2.0, 0.01, 8
 
-# s inside the integrator, evaluations of the right-hand side
-Run = Callable[[], tuple[float, int]]
+# repeats asked for in all passes together -> s inside the integrator of the runs of one pass, evaluations of the right-hand side
+Pass = Callable[[int], tuple[list[float], int]]
 
 
 @dataclass
 class Timing:
     """Runs until the times of a reference, each under its place there, the last to the end, and what they took so far."""
 
-    runs: dict[int, Run] = field(default_factory=dict)
+    runs: dict[int, Pass] = field(default_factory=dict)
     seconds: dict[int, list[float]] = field(default_factory=dict)
     evaluations: dict[int, int] = field(default_factory=dict)
 
-    def add(self, place: int, run: Run, repeats: int) -> None:
+    def add(self, place: int, run: Pass, repeats: int) -> None:
         """Time a run for the first time."""
         self.runs[place], self.seconds[place] = run, []
         self._repeat(place, repeats)
@@ -55,11 +55,8 @@ class Timing:
                        evaluations=self.evaluations[end], until=tuple(until))
 
     def _repeat(self, place: int, repeats: int) -> None:
-        def one() -> float:
-            took, self.evaluations[place] = self.runs[place]()
-            return took
-
-        self.seconds[place] += one_pass(one, repeats)
+        seconds, self.evaluations[place] = self.runs[place](repeats)
+        self.seconds[place] += seconds
 
 
 def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:

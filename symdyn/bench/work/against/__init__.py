@@ -6,6 +6,7 @@ A module here gives PEERS, a tuple of peers: one program may run with several in
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterable
 
 from symdyn.bench.work.against.peer import Peer
 
@@ -14,11 +15,17 @@ _HOME: dict[str, str] = {
     "scipy": "scipy_methods", "cvode": "cvode", "ida": "ida", "heyoka": "heyoka_taylor", "casadi": "casadi_cvodes",
     "pinocchio": "pinocchio_aba", "mujoco": "mujoco_rk4", "exudyn": "exudyn_solvers",
 }
+ALL = "all"
 
 
 def names() -> list[str]:
-    """What --against takes."""
+    """What --against takes, besides ALL for all of these."""
     return list(_HOME)
+
+
+def named(asked: Iterable[str]) -> list[str]:
+    """What was asked for, with all names in the place of ALL."""
+    return list(dict.fromkeys(name for one in asked for name in (names() if one == ALL else [one])))
 
 
 def peers(name: str) -> tuple[Peer, ...]:
