@@ -6,6 +6,7 @@ steps has an error in even powers of the step; order and step size are those of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -45,6 +46,7 @@ def integrate(field: Field, span: tuple[Any, Any], x: Sequence[Any], tolerance: 
     context     of mpmath; it should have ten digits more than the tolerance
     corrected   what is done to the state after every step
     rule        the midpoint rule of this field, where there is a faster one than `midpoint`
+    Raises ArithmeticError where x_dot is not finite, or no step is small enough.
     """
     rule = rule or partial(midpoint, field)
     t, end = span
@@ -53,6 +55,8 @@ def integrate(field: Field, span: tuple[Any, Any], x: Sequence[Any], tolerance: 
     while t < end:
         h = min(h, end - t)
         begin = field(t, x)
+        if not _finite(begin):
+            raise ArithmeticError(f"x_dot is not finite at t = {context.nstr(t, 10)}")
         step = _extrapolate(rule, t, x, begin, h, rows + 2, tolerance, groups, context)
         evaluations += 1 + sum(2 * k + 1 for k in range(len(step.errors) + 1))
         if step.good:
@@ -101,13 +105,17 @@ def midpoint(field: Field, t: Any, x: Sequence[Any], begin: Sequence[Any], h: An
 def _error(best: Sequence[Any], second: Sequence[Any], x: Sequence[Any], begin: Sequence[Any], h: Any,
            groups: Sequence[slice]) -> Any:
     """The largest difference relative to the size of its group."""
-    worst: Any = 0
-    for group in groups:
+    worst: Any = 0 if _finite(best) and _finite(second) else math.inf
+    for group in groups if not worst else ():
         size = max([*[abs(e) for e in x[group]], *[abs(e) for e in best[group]], *[abs(h * e) for e in begin[group]]], default=0)
         difference = max((abs(a - b) for a, b in zip(best[group], second[group], strict=True)), default=0)
         if difference:
             worst = max(worst, difference / size)
     return worst
+
+
+def _finite(values: Sequence[Any]) -> bool:
+    return all(v - v == 0 for v in values)
 
 
 def _next(errors: Sequence[Any], h: Any, rows: int, good: bool) -> tuple[Any, int]:

@@ -10,7 +10,6 @@ Source: Gear, Leimkuhler and Gupta, Automatic integration of Euler-Lagrange equa
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,10 +64,6 @@ class _Run(Run):
     def start(self) -> None:
         self.xs[0] = self.state = Projector(self.module, self.request.p)(self.here, self.request.x0)
         super().start()
-
-    def outcome(self, interrupted: bool) -> Outcome:
-        made = super().outcome(interrupted)
-        return replace(made, n_rejected=self.solver.n_rejected) if self.solver is not None else made
 
 
 class Stabilized:

@@ -116,7 +116,7 @@ class Run:
         self.here, self.state = request.span[0], request.x0
         self.ts, self.xs = [self.here], [self.state]
         self.pending = list(request.times[1:]) if request.times is not None else []
-        self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0), "", False
+        self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0, 0), "", False
         self.solver: Any = None
         self.dense: Any = None
 
@@ -265,17 +265,17 @@ class Run:
         t, x = np.array(self.ts[:n]), np.array(self.xs[:n])
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
-        evaluations, jacobians, factorizations = self._used()
-        return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, 0, evaluations,
+        rejected, evaluations, jacobians, factorizations = self._used()
+        return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, rejected, evaluations,
                        corrections=self.projector.corrections if self.projector is not None else Corrections(),
                        happened=self.locator.happened if self.locator is not None else (),
                        n_jacobians=jacobians, n_factorizations=factorizations)
 
-    def _used(self) -> tuple[int, int, int]:
-        """Evaluations, Jacobians and factorizations of all solvers so far."""
-        solver = self.solver
-        now = (0, 0, 0) if solver is None else (int(solver.nfev), int(solver.njev), int(solver.nlu))
-        return self.spent[0] + now[0], self.spent[1] + now[1], self.spent[2] + now[2]
+    def _used(self) -> tuple[int, int, int, int]:
+        """Rejected steps where the solver counts them, evaluations, Jacobians and factorizations, of all solvers so far."""
+        names = ("n_rejected", "nfev", "njev", "nlu")
+        a, b, c, d = (before + int(getattr(self.solver, name, 0)) for before, name in zip(self.spent, names, strict=True))
+        return a, b, c, d
 
     def through(self, bar: Any) -> Outcome:
         """To the end, or as far as it gets."""

@@ -13,6 +13,7 @@ from symdyn.bench import extended
 from symdyn.bench.extended import Precise, agreement, known, motion
 from symdyn.bench.extrapolation import integrate
 from symdyn.bench.loop_cases import REFERENCE
+from symdyn.bench.work.converged import distance
 from symdyn.cli import main
 from symdyn.runtime.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
@@ -47,6 +48,15 @@ def test_the_method_reaches_its_tolerance(context):
                         context.mpf(10)**-digits, [slice(0, 1), slice(1, 2)], context)
         assert relative(run.x, [context.sin(20), context.cos(20)]) <= 100 * context.mpf(10)**-digits
         assert run.n_evaluations < 6000
+
+
+def test_what_is_not_a_number_is_no_agreement(context):
+    """Two results that are not finite do not differ by zero."""
+    with pytest.raises(ArithmeticError, match=r"x_dot is not finite at t = 0\.5"):
+        integrate(lambda t, x: [1 if x[0] < 0.5 else context.nan], (context.mpf(0), context.mpf(1)), [context.mpf(0)],
+                  context.mpf(10)**-12, [slice(0, 1)], context)
+    assert distance([[context.nan]], [[context.nan]], 1, 0) == float("inf")
+    assert distance([[context.mpf(3)]], [[context.mpf(2)]], 1, 0) == 0.5
 
 
 def test_the_method_tells_where_it_cannot_go_on(context):

@@ -233,3 +233,5 @@ def test_reset_is_put_onto_the_constraints_whatever_keeps_the_steps_there(method
     exact = module.simulate((0, 1.2), rtol=1e-12)
     assert run.t[-1] == pytest.approx(exact.t[-1], abs=1e-7) and run.x[-1] == pytest.approx(exact.x[-1], abs=1e-6)
     assert len(run.events["half"].t) == 1 and "event half ended the motion" in run.message
+    if method == "ggl":  # those of the solver before the reset, too
+        assert module.simulate((0, 1.2), method=method, rtol=1e-6, first_step=0.6).n_rejected > 0

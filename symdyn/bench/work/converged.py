@@ -111,13 +111,14 @@ def converged(formulation: Formulation, times: Sequence[float], digits: int = DI
 
 
 def distance(a: Sequence[Sequence[Any]], b: Sequence[Sequence[Any]], n_q: int, n_u: int) -> float:
-    """The largest difference of coordinates and of speeds over all times, relative to their largest norm."""
+    """The largest difference of coordinates and of speeds over all times, relative to their largest norm; NaN differs by inf."""
     worst = 0.0
     for part in (slice(0, n_q), slice(n_q, n_q + n_u), slice(n_q + n_u, None)):
         size = max((sum(v * v for v in x[part]) for x in b), default=0) ** 0.5
         apart = max((sum((v - w) ** 2 for v, w in zip(x[part], y[part], strict=True)) for x, y in zip(a, b, strict=True)),
                     default=0) ** 0.5
-        worst = max(worst, float(apart / size) if size else 0.0)
+        far = float(apart / size) if size else 0.0
+        worst = max(worst, far if far == far else np.inf)
     return worst
 
 
