@@ -38,20 +38,29 @@ def put(path: Path, name: str, data: Mapping[str, Any]) -> None:
     write(path, dict(sorted({**(read(path) or {}), name: dict(data)}.items())))
 
 
+def closed(folder: Path) -> str:
+    """Why no file can be put into a folder, which need not be there yet; empty if one can: a file is made and goes at
+    once."""
+    there = folder
+    try:
+        there = next(place for place in (folder, *folder.absolute().parents) if place.exists() or place.is_symlink())
+        if not there.is_dir():
+            return f"{there} is a file, not a folder"
+        with tempfile.TemporaryFile(dir=there):
+            return ""
+    except OSError as error:
+        return f"{there} is closed to writing ({error.strerror})"
+
+
 def writable(asked: Path | None, own: Path) -> Path:
     """The file that is to be written: the one asked for, else the package's own; looked at before anything takes time.
 
     Raises ArgumentError where it cannot be written, or holds anything but entries.
     """
     path, which = (own, "the package's file of references") if asked is None else (asked, "the file of references")
-    try:
-        if path.is_dir():
-            raise IsADirectoryError(0, "it is a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise ArgumentError(f"{which} {path} cannot be written: {error.strerror}; pass another with --store FILE") from None
+    why = "it is a folder" if path.is_dir() else closed(path.parent)
+    if why:
+        raise ArgumentError(f"{which} {path} cannot be written: {why}; pass another with --store FILE")
     if path.exists() and path.stat().st_size:
         held = read(path)
         if not isinstance(held, dict) or not all(isinstance(entry, dict) for entry in held.values()):

@@ -63,6 +63,7 @@ def _folder(name: str) -> Option:
 
 _ONLY = _names("--only", "only", "some of the groups of figures", "GROUP")
 _TIMED = _number("--repeats", "repeats", "timed runs, of which the median counts (default: 5)")
+_LEAST = _number("--repeats", "repeats", "timed runs, of which the least time is compared (default: 5)")
 _BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
 _JSON = Option("to_json", "--json", {"metavar": "FILE", "type": Path, "help": "write everything that was measured into a file"})
 _STORE = Option("file", "--store", {"metavar": "FILE", "type": Path,
@@ -85,8 +86,9 @@ MEASUREMENTS: dict[str, Measurement] = {
     "published": Measurement(
         "symdyn.bench.work.published:run", "published mechanisms within their bounds, in the least time of all programs", (
             _names("--only", "names", "some of the mechanisms, such as A03"),
-            _names("--against", "peers", "other programs, as of symdyn bench"), _TIMED,
-            _number("--budget", "budget", "begin nothing new after this time; the same command goes on", float, "SECONDS"),
+            _names("--against", "peers", "other programs, as of symdyn bench"), _LEAST,
+            _number("--budget", "budget", "begin nothing new after this time, in which derivation, compilation and the "
+                    "search for tolerances count; the same command goes on", float, "SECONDS"),
             _folder("published"), Option("progress", "--progress", {"action": "store_true", "help": "show a bar (needs tqdm)"}))),
     "growth": Measurement(
         "symdyn.bench.growth:run", "how everything grows with the number of bodies: table and picture", (

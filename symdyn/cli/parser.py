@@ -191,8 +191,11 @@ def _add_bench(commands: Any) -> None:
     work.add_argument("--per-decade", metavar="N", type=int, default=1, help="tolerances to a decade (default: 1); with more "
                       "the least time below an error is told more sharply")
     work.add_argument("--end", metavar="TIME", type=float, help="s (default: the system's duration)")
-    work.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the median counts (default: 5)")
-    work.add_argument("--budget", metavar="SECONDS", type=float, help="begin no run after this time; the same command goes on")
+    work.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the least time is compared "
+                      "(default: 5)")
+    work.add_argument("--budget", metavar="SECONDS", type=float, help="begin no run after this time, in which derivation, "
+                      "references, compilation and what other programs prepare count; of several mechanisms each has its part; "
+                      "the same command goes on")
     work.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(work, "generated/bench; what an unfinished run left there is gone on with")
     for word, measurement in MEASUREMENTS.items():

@@ -7,18 +7,20 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symdyn.cli.messages import FAILED, Stop
+from symdyn.cli.messages import FAILED, INTERRUPTED, Stop, complain
 
 if TYPE_CHECKING:
+    from symdyn.stress.record import Row, StressReport
     from symdyn.stress.subject import Subject
 
 FILES = ("stress.json", "stress.txt", "stress.html")
 
 
 def stress(arguments: argparse.Namespace) -> int:
-    """Run the checks, print rows as they come, save the report; a row that failed is a failure."""
+    """Run the checks, print rows as they come, save the report, also of what was finished before an interrupt; a row that failed
+    is a failure."""
     from symdyn.bench.work.resume import check_writable
-    from symdyn.stress.record import HEAD, told
+    from symdyn.stress.record import HEAD, Interrupted, told
     from symdyn.stress.run import CHECKS
     from symdyn.stress.run import stress as run
 
@@ -31,15 +33,30 @@ def stress(arguments: argparse.Namespace) -> int:
     folder = arguments.output or Path("generated") / "stress"
     check_writable(folder, FILES)
     systems = [_subject(name) for name in arguments.systems] or None
-    print(HEAD)
-    report = run(systems, arguments.short, arguments.checks, arguments.progress, arguments.jobs or os.cpu_count() or 1,
-                 lambda row: print(told(row), flush=True))
+    shown: list[Row] = []
+
+    def show(row: Row) -> None:
+        if not shown:
+            print(HEAD)
+        shown.append(row)
+        print(told(row), flush=True)
+
+    try:
+        report = run(systems, arguments.short, arguments.checks, arguments.progress, arguments.jobs or os.cpu_count() or 1, show)
+    except Interrupted as stop:
+        _told_and_saved(stop.report, folder)
+        return complain(str(stop), INTERRUPTED)
+    _told_and_saved(report, folder)
+    return 0 if report.passed else FAILED
+
+
+def _told_and_saved(report: StressReport, folder: Path) -> None:
+    """What comes after the rows."""
     for text in report.left_out:
         print(f"left out: {text}")
     print(report.summary())
     for name in FILES:
         print(f"wrote {report.save(folder / name)}")
-    return 0 if report.passed else FAILED
 
 
 def _subject(name: str) -> str | Subject:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def masses(subject: Subject, short: bool) -> Iterator[Row]:
             yield Row("mass ratios", subject.name, done, None, None, "", DEGRADE, str(error))
             continue
         found = measured.compared(values, subject.backend)
-        every.append(found)
+        every.append(replace(found, name=f"{ratio:g}"))
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("mass ratios", subject.name, f"{done}: accelerations at {FEW} states, condition up to {finite.max():.2g}, "
                      f"{found.refused} refused", [found])
@@ -112,8 +113,8 @@ def masses(subject: Subject, short: bool) -> Iterator[Row]:
             yield Row("mass ratios", subject.name, f"{done}: {found.refused} states refused, condition from "
                       f"{found.least_refused:.2g}", None, None, "", FAIL, "well-conditioned states are refused")
     if every:
-        worst = max(every, key=lambda f: f.beyond)
-        yield from first_order_row(subject, f"accelerations at {len(every)} ratios of masses, {FEW} states each", [worst])
+        yield from first_order_row(subject, f"accelerations at {FEW} states for each ratio of masses", every, "ratios",
+                                   FEW * len(every))
 
 
 def inputs(subject: Subject, short: bool) -> Iterator[Row]:

@@ -77,21 +77,30 @@ def refusals(subject: Subject, label: str, found: Sequence[Finding], refused: in
                "states are refused whose equations are well-conditioned")
 
 
-def first_order_row(subject: Subject, label: str, found: Sequence[Finding]) -> Iterator[Row]:
-    """The row of errors against what rounding of every operation may do at most, at ordinary states."""
+def first_order_row(subject: Subject, label: str, found: Sequence[Finding], of: str = "functions",
+                    states: int = 0) -> Iterator[Row]:
+    """The row of errors against what rounding of every operation may do at most, at ordinary states.
+
+    of       what the findings are of;  states: how many there are in all where each has its own, 0 where all share them
+    """
     known = [f for f in found if f.beyond > -np.inf]
+    noise = ""
+    if any(f.unknown for f in found):
+        many = f"{sum(f.unknown for f in found)} of {states}" if states else f"up to {max(f.unknown for f in found)}"
+        noise = f"; none holds at {many} states, where a divisor loses all but one digit"
     if not known:
+        if noise:
+            yield Row("first order", subject.name, f"{label}: 0 of {len(found)} {of}{noise}", None, None, "", DEGRADE,
+                      "nothing can be said of errors: divisors are nothing but rounding error")
         return
     worst = max(known, key=lambda f: f.beyond)
     beyond = [f.name for f in known if f.beyond > 0]
     place = f"beyond it {', '.join(beyond)}" if beyond else f"nearest to it {worst.name}"
-    done = f"{label}: {len(known)} of {len(found)} functions; {place}"
-    if len(known) < len(found):
-        others = ", ".join(f.name for f in found if f not in known)
+    done = f"{label}: {len(known)} of {len(found)} {of}; {place}"
+    others = ", ".join(f.name for f in found if f.beyond == -np.inf and not f.unknown)
+    if others:
         done += f"; no bound is known of {others}, which run an algorithm with branches"
-    if any(f.unknown for f in known):
-        done += f"; none holds at up to {max(f.unknown for f in known)} states, where a divisor loses all but one digit"
-    yield within("first order", subject.name, done, worst.beyond, 0.0, BOUND, "errors are those of rounding",
+    yield within("first order", subject.name, done + noise, worst.beyond, 0.0, BOUND, "errors are those of rounding",
                  "errors are larger than rounding can make them")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from symdyn.runtime.solution import Solution
-from symdyn.stress.record import NotApplicable
+from symdyn.stress.record import MotionStops, NotApplicable
 from symdyn.stress.subject import RTOL, Subject
 
 # Intervals of the variational equations; more operations than this make no Jacobian to be compiled.
@@ -53,11 +53,11 @@ def path(subject: Subject, end: float, rtol: float = RTOL, resolved: bool = Fals
     """The usual motion until `end`, with tolerances in its own scales.
 
     resolved   at PER_STEP intervals a step, shortened to where MOST intervals are enough
-    Raises NotApplicable where it stops early.
+    Raises MotionStops where it stops early.
     """
     pilot = subject.run((0.0, end), rtol=1e-6, max_steps=MEASURED_AMONG)
     if not pilot.success and pilot.n_steps < MEASURED_AMONG:
-        raise NotApplicable(f"the usual motion stops early: {pilot.message}")
+        raise MotionStops(float(pilot.t[-1]), end, pilot.message)
     scales, intervals = scales_of(subject, pilot.x), INTERVALS
     if resolved:
         steps = subject.run((0.0, end), rtol=rtol, atol=rtol * scales, steps=True, max_steps=MOST // PER_STEP)
@@ -65,7 +65,7 @@ def path(subject: Subject, end: float, rtol: float = RTOL, resolved: bool = Fals
         intervals = max(INTERVALS, 2 * (PER_STEP * steps.n_steps // 2))
     sol = subject.run(np.linspace(0.0, end, 2 * intervals + 1), rtol=rtol, atol=rtol * scales)
     if not sol.success:
-        raise NotApplicable(f"the usual motion stops early: {sol.message}")
+        raise MotionStops(float(sol.t[-1]), end, sol.message)
     return Path(sol, scales, rtol, local_error(subject, end, rtol, scales))
 
 

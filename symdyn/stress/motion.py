@@ -9,7 +9,7 @@ import numpy as np
 
 from symdyn.runtime.solution import Solution
 from symdyn.stress.flow import Path, flow, growth_back, path
-from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
+from symdyn.stress.record import DEGRADE, FAIL, PASS, MotionStops, NotApplicable, Row, within
 from symdyn.stress.subject import EPS, RTOL, Subject
 
 # Magnifications up to here leave the digits to see an error by.
@@ -33,7 +33,7 @@ def energy(subject: Subject, short: bool) -> Iterator[Row]:
     end = float(motion.sol.t[-1])
     sol = subject.run(np.linspace(0.0, end, 401), rtol=RTOL, atol=RTOL * motion.scales, work=not conservative)
     if not sol.success:
-        raise NotApplicable(f"the usual motion stops early: {sol.message}")
+        raise MotionStops(float(sol.t[-1]), end, sol.message)
     steepest = energy_gradient(subject, sol, motion.scales)
     size, _ = sol.energy_scale
     if not size > 0:

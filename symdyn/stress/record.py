@@ -27,6 +27,14 @@ class NotApplicable(Exception):
     """A check has nothing to look at here; the message tells why."""
 
 
+class MotionStops(NotApplicable):
+    """The usual motion of a mechanism stops early, so that it cannot be looked at; t: when, of its end, s; told: its message."""
+
+    def __init__(self, t: float, end: float, told: str) -> None:
+        super().__init__(f"the usual motion stops early: {told}")
+        self.t, self.end, self.told = t, end, told
+
+
 @dataclass(frozen=True)
 class Row:
     """One finding.
@@ -58,11 +66,13 @@ def within(check: str, system: str, done: str, figure: float, bound: float, orig
 
 @dataclass
 class StressReport:
-    """All rows; prints as a table. left_out: what did not apply, as "check, system: why"."""
+    """All rows; prints as a table. left_out: what did not apply, as "check, system: why"; unfinished: what an interrupted one
+    has not done, "" if it is whole."""
 
     rows: list[Row] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    unfinished: str = ""
 
     @property
     def passed(self) -> bool:
@@ -84,7 +94,8 @@ class StressReport:
     def summary(self) -> str:
         """One line."""
         counted = ", ".join(f"{n} {verdict}" for verdict, n in self.count().items())
-        return f"{len(self.rows)} rows: {counted}; {len(self.left_out)} left out; {self.seconds:.0f} s"
+        begun = f"unfinished: {self.unfinished}; " if self.unfinished else ""
+        return f"{begun}{len(self.rows)} rows: {counted}; {len(self.left_out)} left out; {self.seconds:.0f} s"
 
     def save(self, path: object) -> Path:
         """Write .json (all of it), .txt (the table) or .html (one page); returns the path.
@@ -96,8 +107,8 @@ class StressReport:
             raise ArgumentError(f"cannot save to {file.name}: the ending must be .json, .txt or .html")
         file.parent.mkdir(parents=True, exist_ok=True)
         if file.suffix == ".json":
-            text = json.dumps({"seconds": self.seconds, "count": self.count(), "rows": [_plain(asdict(r)) for r in self.rows],
-                               "left_out": self.left_out}, indent=1) + "\n"
+            text = json.dumps({"seconds": self.seconds, "unfinished": self.unfinished, "count": self.count(),
+                               "rows": [_plain(asdict(r)) for r in self.rows], "left_out": self.left_out}, indent=1) + "\n"
         elif file.suffix == ".html":
             from symdyn.stress.page import page
 
@@ -112,6 +123,14 @@ class StressReport:
 
     def __repr__(self) -> str:
         return f"<StressReport: {self.summary()}>"
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user stopped it; report: what was finished before."""
+
+    def __init__(self, report: StressReport) -> None:
+        super().__init__(f"interrupted; {report.unfinished}")
+        self.report = report
 
 
 HEAD = f"{'verdict':8}{'check':19}{'system':35}{'figure':>10}{'bound':>10}"

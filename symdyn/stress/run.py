@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
+import multiprocessing
+import signal
 import time as clock
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +19,15 @@ from symdyn.errors import ArgumentError, MissingExtra
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
-from symdyn.stress.record import DEGRADE, FAIL, NotApplicable, Row, StressReport
+from symdyn.stress.record import DEGRADE, FAIL, Interrupted, MotionStops, NotApplicable, Row, StressReport
 from symdyn.stress.subject import Subject
 from symdyn.systems import get
 from symdyn.systems import names as catalogue
 
 # In the short form, where the whole catalogue would take too long.
 SHORT = ("cart_pole", "pendulum_absolute")
+# The check of a row that tells why a motion was not looked at.
+USUAL = "usual motion"
 
 
 @dataclass(frozen=True)
@@ -70,23 +75,34 @@ def stress(system: Any = None, short: bool = False, checks: Sequence[str] | None
     show       called with every row as soon as it is there
 
     Returns a StressReport; `passed` is False if a row failed. A check that crashes is such a row.
-    Raises ArgumentError for an unknown check or something that is no mechanism, SymdynError for an unknown name.
+    Raises ArgumentError for an unknown check or something that is no mechanism, SymdynError for an unknown name; Interrupted, a
+    KeyboardInterrupt with the report of what is finished.
     """
+    if isinstance(jobs, bool) or not isinstance(jobs, Integral) or jobs < 1:
+        raise ArgumentError(f"jobs is {jobs!r}; pass a number of processes, 1 or more")
     tasks = _tasks(system, short, _chosen(checks))
     report, begun = StressReport(), clock.perf_counter()
-    bar = _bar(sum(len(names) for _, names, _ in tasks)) if progress else None
+    total, done = sum(len(names) for _, names, _ in tasks), 0
+    bar = _bar(total) if progress else None
     many = jobs > 1 and all(isinstance(task[0], str) for task in tasks)
-    for rows, left_out, n in _spread(tasks, jobs) if many else _in_turn(tasks):
-        report.rows += rows
-        report.left_out += left_out
+    try:
+        with contextlib.closing(_spread(tasks, int(jobs)) if many else _in_turn(tasks)) as results:
+            for rows, left_out, n in results:
+                report.rows += rows
+                report.left_out += left_out
+                done += n
+                if bar is not None:
+                    bar.update(n)
+                if show is not None:
+                    for row in rows:
+                        show(row)
+    except KeyboardInterrupt:
+        report.unfinished = f"{done} of {total} checks were done"
+        raise Interrupted(report) from None
+    finally:
+        report.seconds = clock.perf_counter() - begun
         if bar is not None:
-            bar.update(n)
-        if show is not None:
-            for row in rows:
-                show(row)
-    if bar is not None:
-        bar.close()
-    report.seconds = clock.perf_counter() - begun
+            bar.close()
     return report
 
 
@@ -125,13 +141,15 @@ def _chosen(names: Sequence[str] | None) -> list[Check]:
     return [CHECKS[name] for name in names]
 
 
-def _in_turn(tasks: Sequence[Task]) -> Iterator[Result]:
-    """One check after the other."""
+def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
+    """One check after the other. That the motion stops is told by the first one that looks at it."""
     for system, names, short in tasks:
         subject: Any = system
+        told = False
         for name in names:
             rows, left_out, subject = _one(subject, name, short)
-            yield rows, left_out, 1
+            yield [row for row in rows if not (told and row.check == USUAL)], left_out, 1
+            told = told or any(row.check == USUAL for row in rows)
         if isinstance(subject, Subject) and subject.lacking:
             yield [Row("numbers", subject.name, f"nothing was run: {', '.join(subject.lacking)} without a number", None, None, "",
                        DEGRADE, "give every parameter a number in the system's `defaults`")], [], 0
@@ -150,6 +168,9 @@ def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any
         for row in check.run(system, short) if check.of_system else check.run(short):
             rows.append(row)
     except NotApplicable as reason:
+        if isinstance(reason, MotionStops):
+            rows.append(Row(USUAL, str(label), f"the usual motion stops at t = {reason.t:.9g} s, before {reason.end:g} s: "
+                            f"{reason.told}", None, None, "", DEGRADE, "checks that need the whole of it are left out"))
         return rows, [f"{name}, {label}: {reason}"], system
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
@@ -169,10 +190,13 @@ def _whole(task: Task) -> Result:
     return rows, left_out, len(task[1])
 
 
-def _spread(tasks: Sequence[Task], jobs: int) -> Iterator[Result]:
-    """Several tasks at a time."""
-    with ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(_whole, task): task for task in tasks}
+def _spread(tasks: Sequence[Task], jobs: int) -> Generator[Result]:
+    """Several tasks at a time. Interrupted, the processes end at once, and silently."""
+    before = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), multiprocessing.get_context("spawn"), _silent)
+    try:
+        with _held():
+            waiting = {pool.submit(_whole, task): task for task in tasks}
         for done in as_completed(waiting):
             system, names, _ = waiting[done]
             try:
@@ -180,6 +204,32 @@ def _spread(tasks: Sequence[Task], jobs: int) -> Iterator[Result]:
             except Exception as error:  # the process itself died
                 died = Row(", ".join(names), str(system) or "-", "its process", None, None, "", FAIL, f"it died: {error}"[:400])
                 yield [died], [], len(names)
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _held() -> Iterator[None]:
+    """An interrupt comes after this; processes that are started here have it held, too, until `_silent`."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _silent() -> None:
+    """In a process of a pool: an interrupt ends it without a word; the one that started it tells what is to be told."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _bar(total: int) -> Any:

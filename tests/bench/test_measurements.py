@@ -37,6 +37,15 @@ def test_a_word_is_in_help_and_takes_what_its_function_takes(word: str, capsys: 
     assert needed == {o.parameter for o in measurement.options if o.told.get("nargs") == "+" and not o.flag}
 
 
+@pytest.mark.parametrize("arguments", [["bench"], ["bench", "published"]])
+def test_help_tells_what_is_compared_and_what_a_budget_counts(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([*arguments, "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "of which the least time is compared" in said and "median" not in said
+    assert re.search(r"after this time, in which derivation,.* compilation .*count", said)
+
+
 def test_help_has_every_word_and_no_mechanism_is_called_like_one(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["bench", "--help"])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from symdyn import systems
+from symdyn.bench import extended
 from symdyn.bench.loop_cases import REFERENCE
-from symdyn.bench.work import against, published, published_lines
+from symdyn.bench.work import against, published, published_lines, resume
 from symdyn.bench.work.against.mechanism import calibrated
 from symdyn.bench.work.against.peer import Failed
 from symdyn.bench.work.published import Result, measure
@@ -180,7 +181,7 @@ def test_a_stopped_run_goes_on_where_it_was(monkeypatch, tmp_path, capsys):
     with pytest.raises(KeyboardInterrupt):
         published.run(None, [], 1, None, tmp_path)
     data = json.loads((tmp_path / "published.json").read_text())
-    assert not data["complete"] and [m["unfinished"] for m in data["mechanisms"]] == [False, True]
+    assert [(m["complete"], m["unfinished"]) for m in data["mechanisms"]] == [(True, False), (False, True)]
     assert data["mechanisms"][0]["text"] in capsys.readouterr().out
     looked[:] = []
     assert published.run(None, [], 1, None, tmp_path, progress=True) == 0
@@ -188,7 +189,7 @@ def test_a_stopped_run_goes_on_where_it_was(monkeypatch, tmp_path, capsys):
     assert looked == [("second", "symdyn bs54")] and told.out.count("all of it was measured in an earlier run, of 2") == 1
     assert "second:" in told.err and "0/5" in told.err  # two lines, three passes
     whole = json.loads((tmp_path / "published.json").read_text())
-    assert whole["complete"] and whole["mechanisms"][0] == data["mechanisms"][0]
+    assert all(m["complete"] for m in whole["mechanisms"]) and whole["mechanisms"][0] == data["mechanisms"][0]
     before, after = ([(r["tolerance"], r["error"]) for r in m["mechanisms"][1]["lines"][0]["runs"]] for m in (data, whole))
     assert before == after and any(r["seconds"] for r in whole["mechanisms"][1]["lines"][0]["runs"])
     looked[:] = []
@@ -198,6 +199,62 @@ def test_a_stopped_run_goes_on_where_it_was(monkeypatch, tmp_path, capsys):
     with pytest.raises(KeyboardInterrupt):  # other repeats: nothing of it is taken
         published.run(None, [], 2, None, tmp_path)
     assert len(looked) == 3
+
+
+def test_mechanisms_that_are_not_named_stay(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(published, "CASES", {name: _short(name=name, methods=("dop853",)) for name in ("first", "second")})
+    kept = lambda: {m["name"]: m for m in json.loads((tmp_path / "published.json").read_text())["mechanisms"]}
+    assert published.run(["second"], [], 1, None, tmp_path) == 0
+    second = kept()["second"]
+    assert published.run(["first"], [], 1, 1e-9, tmp_path) == 1 and kept() == {"second": second}
+    assert published.run(["first"], [], 2, None, tmp_path) == 0
+    assert list(kept()) == ["first", "second"] and kept()["second"] == second and kept()["first"]["repeats"] == 2
+    capsys.readouterr()
+    assert published.run(None, [], 1, None, tmp_path) == 0  # of the second it is known
+    assert capsys.readouterr().out.count("was measured in an earlier run") == 1 and kept()["second"] == second
+    assert kept()["first"]["repeats"] == 1
+
+
+@pytest.mark.parametrize("damage", [
+    lambda record: 3, lambda record: {k: v for k, v in record.items() if k != "lines"}, lambda record: {**record, "lines": [3]},
+    lambda record: {**record, "lines": [{**record["lines"][0], "runs": [{"tolerance": "x", "error": 0.0}]}]},
+    lambda record: {**record, "text": None}, lambda record: {**record, "name": ["first"]}])
+def test_damaged_records_are_not_there(monkeypatch, tmp_path, capsys, damage):
+    monkeypatch.setattr(published, "CASES", {name: _short(name=name, methods=("dop853",)) for name in ("first", "second")})
+    monkeypatch.setattr(published, "measure", lambda case, *_: Result(case, "", [_line("other", False, (1e-3, 1e-4, [1.0]))], {}))
+    published.run(["first"], [], 1, None, tmp_path)
+    record, = json.loads((tmp_path / "published.json").read_text())["mechanisms"]
+    (tmp_path / "published.json").write_text(json.dumps({"complete": False, "mechanisms": [damage(record)]}))
+    capsys.readouterr()
+    published.run(None, [], 1, None, tmp_path)
+    assert "earlier run" not in capsys.readouterr().out
+    (tmp_path / "published.json").write_text(json.dumps({"complete": False, "mechanisms": [record]}))
+    published.run(None, [], 1, None, tmp_path)
+    assert "earlier run" in capsys.readouterr().out
+    for data in ([1], {"mechanisms": 3}, {"mechanisms": {"a": 1}}):
+        (tmp_path / "published.json").write_text(json.dumps(data))
+        assert published.run(["second"], [], 1, None, tmp_path) == 0
+
+
+def test_fingerprint_has_the_programs_that_are_there_and_the_code(monkeypatch):
+    class Other:
+        name = "other"
+
+        def available(self):
+            return there[0]
+
+    there = [True]
+    monkeypatch.setattr(against, "peers", lambda name: (Other(),))
+    marks = [published._fingerprint(_short(), ["other"], 5)]
+    there[0] = "it is not installed"
+    marks.append(published._fingerprint(_short(), ["other"], 5))
+    monkeypatch.setattr(resume, "code", lambda: "another")
+    marks.append(published._fingerprint(_short(), ["other"], 5))
+    assert len(set(marks)) == 3 and marks[2] == published._fingerprint(_short(), ["other"], 5)
+
+
+def test_digits_of_the_stored_motion_are_told():
+    assert CASES["A03 q"].reference(None)[1] == f"extended precision, {extended.known('andrews_squeezer')['digits']} digits"
 
 
 class _Slow:

@@ -13,16 +13,18 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.work import against, picture, plan, resume
+from symdyn.bench import kept
+from symdyn.bench.work import against, benchmark, picture, plan, resume
 from symdyn.bench.work.against.apart import TooLong, prepared
 from symdyn.bench.work.against.peer import Failed, Unfit
 from symdyn.bench.work.asked import checked, grid
-from symdyn.bench.work.benchmark import Benchmark, run
+from symdyn.bench.work.benchmark import Benchmark, finished, run
 from symdyn.bench.work.cases import CASES, from_maker, subject
 from symdyn.bench.work.command import nothing
 from symdyn.bench.work.picture import COLORS, styles_of
-from symdyn.bench.work.plan import spread
+from symdyn.bench.work.plan import Job, Walk, spread
 from symdyn.bench.work.record import Reference, Row
+from symdyn.bench.work.reference import agreement
 from symdyn.bench.work.subject import Subject, Yardstick
 from symdyn.bench.work.timing import Timing, one_pass
 from symdyn.cli import main
@@ -211,10 +213,127 @@ def test_results_of_another_motion_are_not_gone_on_with(tmp_path):
     assert run(other, tight, tmp_path).rows == []
 
 
+@pytest.mark.parametrize("damaged", [{"until": [["x", "y"]]}, {"tolerance": "1e-5"}, {"seconds": "long"}, {"until": [3]},
+                                     {"errors": 3}, 3, {"method": None}])
+def test_damaged_results_are_not_there(tmp_path, damaged):
+    about = subject("pendulum", end=2.0)
+    tight = checked([about], ["embedding"], **{**ASKED, "tolerances": [1e-5]}, budget=1e-9)
+    run(about, tight, tmp_path)
+    data = json.loads((tmp_path / "results.json").read_text())
+    row = Row("embedding", "dop853", 1e-5, seconds=1.0).record()
+    data["rows"] = [{**row, **damaged} if isinstance(damaged, dict) else damaged]
+    (tmp_path / "results.json").write_text(json.dumps(data))
+    assert run(about, tight, tmp_path).rows == []
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """A command that measures two mechanisms, and the folder of its results."""
+    folder = tmp_path_factory.mktemp("pair")
+    return ["bench", "pendulum", "double_pendulum", "--formulations", "embedding", "--methods", "dop853", "--rtol", "1e-4",
+            "--repeats", "1", "--end", "1", "--output", str(folder)], folder
+
+
+def test_what_was_done_before_a_stop_is_kept(pair, drawn, monkeypatch, capsys):
+    arguments, folder = pair
+    made, original = [], plan.own
+
+    def own(formulation, *others):
+        if len(made) == limit[0]:
+            raise KeyboardInterrupt
+        made.append(formulation.equations.name)
+        return original(formulation, *others)
+
+    limit = [1]
+    monkeypatch.setattr(plan, "own", own)
+    main(arguments)
+    first, second = folder / "pendulum" / "results.json", folder / "double_pendulum" / "results.json"
+    before = first.read_text()
+    assert made == ["pendulum"] and json.loads(before)["complete"] and not json.loads(second.read_text())["complete"]
+    second.unlink()  # not begun at all
+    limit[:], made[:] = [9], []
+    capsys.readouterr()
+    assert main([*arguments, "--budget", "1e-9"]) == 0  # nothing new; what there is is shown
+    told = capsys.readouterr()
+    when = json.loads(before)["timed"]
+    assert f"all of it was measured in an earlier run, of {when}; to have it measured anew delete {first}" in told.out
+    assert made == [] and "double_pendulum was not begun" in told.err and first.read_text() == before
+    assert main(arguments) == 0
+    told = capsys.readouterr().out
+    assert made == ["double_pendulum"] and told.count("all of it was measured in an earlier run") == 1
+    assert first.read_text() == before and json.loads(second.read_text())["complete"]
+    page = (folder / "report.html").read_text()
+    assert "pendulum" in page and "double_pendulum" in page
+    made[:] = []
+    main(arguments)  # all of it was done: measured anew
+    assert made == ["pendulum", "double_pendulum"] and "earlier run" not in capsys.readouterr().out
+    # Something else is asked for, or the code is another: nothing of it is taken.
+    second.unlink()
+    made[:] = []
+    main([one if one != "1e-4" else "1e-5" for one in arguments])
+    assert made == ["pendulum", "double_pendulum"]
+    main(arguments)
+    second.unlink()
+    made[:] = []
+    monkeypatch.setattr(resume, "code", lambda: "another")
+    main(arguments)
+    assert made == ["pendulum", "double_pendulum"]
+
+
+def test_finished_results_that_are_damaged_are_not_there(tmp_path, measured):
+    about = subject("pendulum", end=2.0)
+    asked = checked([about], ["embedding", "augmented", "absolute"], at=[0.4], **ASKED)
+    data = {**measured[0].record(), "command": "this"}
+    for change, there in (({}, True), ({"rows": [3]}, False), ({"reference": None}, False), ({"command": "other"}, False),
+                          ({"fingerprint": "x"}, False), ({"complete": False}, False)):
+        (tmp_path / "results.json").write_text(json.dumps({**data, **change}))
+        found = finished(about, asked, tmp_path, "this")
+        assert (found is not None) == there
+        if found is not None:
+            assert found.record() == json.loads((tmp_path / "results.json").read_text())
+            assert found.table() == measured[0].table()
+    (tmp_path / "results.json").write_text("[3]")
+    assert finished(about, asked, tmp_path, "this") is None and finished(about, asked, tmp_path / "none", "") is None
+
+
+def test_code_of_every_method_is_in_the_fingerprint(tmp_path, monkeypatch):
+    template = tmp_path / "dop853.c.jinja"
+    template.write_text("one")
+    before = resume.digest({"dop853": template})
+    template.write_text("two")
+    assert resume.digest({"dop853": template}) != before
+    seen = {}
+    monkeypatch.setattr(resume, "digest", lambda files: seen.update(files) or "")
+    resume.code.__wrapped__()
+    methods = {"backend/methods/taylor.py", "backend/methods/radau.py", "backend/methods/bs54.py", "runtime/methods.py"}
+    assert methods < set(seen) and any(name.endswith(".jinja") for name in seen) and "cli/parser.py" not in seen
+
+
+def test_a_budget_counts_from_the_beginning(monkeypatch):
+    about = subject("pendulum", end=2.0)
+    original = benchmark.find_reference
+
+    def slow(*given):
+        time.sleep(0.3)
+        return original(*given)
+
+    monkeypatch.setattr(benchmark, "find_reference", slow)
+    result = run(about, checked([about], ["embedding"], budget=0.25, **ASKED))
+    assert result.rows == [] and re.fullmatch(
+        r"3 of 3 runs were not made within the budget of 0\.25 s, which derivation, compilation and reference used up: they took "
+        r"0\.\d+ s", result.unfinished)
+
+
+def test_two_runs_that_agree_are_all_there_is_time_for():
+    formulation, = subject("pendulum", end=1.0).formulated(["embedding"])[0]
+    quick = agreement([formulation], [1.0], "late", 0.0)
+    assert quick.how.startswith("embedding with dop853 at 1e-12 and embedding with Radau at 1e-12 differ by ")
+
+
 def test_budget_is_honoured_and_told(tmp_path):
     about = subject("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding"], budget=1e-9, **ASKED))
-    assert result.rows == [] and result.unfinished == "3 of 3 runs were not made within the budget of 1e-09 s"
+    assert result.rows == [] and result.unfinished.startswith("3 of 3 runs were not made within the budget of 1e-09 s, which ")
     assert "unfinished: 3 of 3 runs" in result.table()
 
 
@@ -238,6 +357,24 @@ def test_a_method_that_does_not_fit_is_left_out(monkeypatch):
     monkeypatch.setattr(plan, "own", unfit)
     result = run(about, checked([about], ["embedding"], **ASKED))
     assert result.rows == [] and str(result.skipped[-1]) == "embedding, dop853: pendulum: the method takes no pendulums"
+
+
+def test_slow_tolerances_leave_steps_and_slow_steps_leave_tolerances():
+    def job(tolerance, step, took):
+        key = ("embedding", "gauss", tolerance, step)
+        return Job(key, lambda timing: Row(*key, seconds=took, least=took, error=1e-3, repeats=1))
+
+    def measured(jobs, kept=()):
+        walk = Walk(jobs, [], {row.key: row for row in kept}, math.inf)
+        walk.measure()
+        return [row.key[2:] for row in walk.rows[len(kept):]], [s.why for s in walk.skipped]
+
+    jobs = [job(1e-3, None, 0.1), job(1e-9, None, 3.0), job(1e-12, None, 9.0), job(None, 0.1, 0.01), job(None, 0.01, 4.0),
+            job(None, 0.001, 9.0)]
+    assert measured(jobs) == ([(1e-3, None), (1e-9, None), (None, 0.1), (None, 0.01)],
+                              ["not at tighter tolerances: a run took 3 s", "not with shorter steps: a run took 4 s"])
+    slow = Row("embedding", "gauss", None, 0.001, seconds=3.0, least=3.0)
+    assert measured([job(None, 0.001, 3.0), job(1e-3, None, 0.1)], [slow]) == ([(1e-3, None)], [])
 
 
 def test_slow_methods_are_not_asked_for_more(monkeypatch):
@@ -408,10 +545,23 @@ def test_a_folder_that_cannot_be_written_is_refused_before(tmp_path, monkeypatch
     told = capsys.readouterr().err
     assert "the tolerance 3.0" in told and "is a file, not a folder" in told
     assert resume.unwritable(tmp_path / "new" / "deep") == "" and not (tmp_path / "new").exists()
-    monkeypatch.setattr(os, "access", lambda path, mode: path.name != "report.html")
-    (tmp_path / "report.html").write_text("")
-    assert resume.unwritable(tmp_path, ["report.html"]).endswith("report.html is closed to writing; name another one")
-    assert resume.unwritable(tmp_path, ["results.json"]) == ""
+    (tmp_path / "report.html").mkdir()
+    assert "report.html is closed to writing (Is a directory); name another one" in resume.unwritable(tmp_path, ["report.html"])
+    assert resume.unwritable(tmp_path, ["results.json"]) == "" and {p.name for p in tmp_path.iterdir()} == {"file", "report.html"}
+
+    def full(*given, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("symdyn.bench.kept.tempfile.TemporaryFile", full)
+    assert f"{tmp_path} is closed to writing (No space left on device)" in resume.unwritable(tmp_path / "new")
+
+
+@pytest.mark.skipif(not LINUX, reason="there is no /proc")
+def test_what_no_one_may_write_into_is_refused_to_root_too(tmp_path):
+    assert "/proc is closed to writing" in resume.unwritable(Path("/proc/none"), ["results.json"])
+    with pytest.raises(ArgumentError, match=r"references /proc/none/own.json cannot be written: /proc is closed to writing"):
+        kept.writable(Path("/proc/none/own.json"), tmp_path / "own.json")
+    assert kept.writable(tmp_path / "new" / "own.json", tmp_path) and not (tmp_path / "new").exists()
 
 
 def test_command_that_measures_nothing_fails(tmp_path, capsys, drawn):
@@ -507,6 +657,22 @@ def test_command_tells_all_faults(capsys):
     assert "no mechanism 'nothing_of_the_kind'" in told and "no method 'none'" in told and "the tolerance 3.0" in told
     assert main(["bench"]) == 2
     assert "nothing is named" in capsys.readouterr().err
+    assert main(["bench", "nothing_of_the_kind", "--formulations", "recursive"]) == 2
+    assert "formulation" not in capsys.readouterr().err  # what it has is not known
+
+
+def test_parameters_without_values_are_told_with_what_to_do(tmp_path, capsys):
+    (tmp_path / "mine.py").write_text("import symdyn as sd\n\n\ndef system():\n    found = sd.systems.get('pendulum')\n"
+                                      "    found.defaults = dict(list(found.defaults.items())[1:])\n    return found\n")
+    assert main(["bench", str(tmp_path / "mine.py"), "--rtol", "3", "--output", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "mine: parameters: no value for m, which has no default; give every parameter a number in the system's `de" in told
+    assert "the tolerance 3.0" in told and not (tmp_path / "out").exists()
+    system = sd.systems.get("pendulum")
+    system.defaults = {}
+    for lacking in (system, system.embedding()):
+        with pytest.raises(ArgumentError, match=r"no value for .*, which have no defaults; give every parameter a number"):
+            sd.bench(lacking)
 
 
 def test_reference_prints():

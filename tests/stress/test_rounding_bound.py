@@ -234,6 +234,15 @@ def test_rows_tell_what_is_beyond_the_bound() -> None:
     assert list(first_order_row(Named, "C", [Finding("rhs", -1.0, -1.0)])) == []  # type: ignore[arg-type]
 
 
+def test_states_without_a_bound_are_counted_over_all() -> None:
+    gentle = [Finding(f"{r}", -1.0, -1.0, beyond=b, unknown=n) for r, b, n in ((1, -0.1, 0), (10, -0.9, 5), (100, -0.5, 2))]
+    lost = Finding("1000", -1.0, -1.0, unknown=8)
+    row, = first_order_row(Named, "C", [*gentle, lost], "ratios", 32)  # type: ignore[arg-type]
+    assert row.done.startswith("C: 3 of 4 ratios; nearest to it 1; none holds at 15 of 32 states") and "branches" not in row.done
+    row, = first_order_row(Named, "C", [lost], "ratios", 8)  # type: ignore[arg-type]
+    assert (row.verdict, row.figure) == (DEGRADE, None) and "0 of 1 ratios; none holds at 8 of 8 states" in row.done
+
+
 @pytest.mark.parametrize("place", ["near", "singular"])
 def test_states_that_are_set_aside_are_told_and_judged(place: str) -> None:
     def rows(**told: Any) -> list:

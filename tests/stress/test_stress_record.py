@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import symdyn as sd
 from symdyn.cli import main
 from symdyn.stress import run as stress_run
-from symdyn.stress.record import DEGRADE, FAIL, LEGEND, PASS, NotApplicable, Row, StressReport, within
+from symdyn.stress.record import DEGRADE, FAIL, LEGEND, PASS, Interrupted, NotApplicable, Row, StressReport, within
 
 
 def row(verdict: str = PASS, check: str = "energy") -> Row:
@@ -82,6 +88,8 @@ def test_unknown_check_is_told_with_near_ones() -> None:
 def test_what_is_no_mechanism_or_no_list_is_told() -> None:
     for arguments, told in (({"system": 3}, "stress was given 3; pass a System"), ({"system": ["pendulum", "nope"]},
                              "no system 'nope'"),
+                            ({"system": "pendulum", "jobs": "x"}, "jobs is 'x'; pass a number of processes, 1 or more"),
+                            ({"jobs": 0}, "jobs is 0"), ({"jobs": True}, "jobs is True"), ({"jobs": 1.5}, "jobs is 1.5"),
                             ({"checks": 3}, "checks is 3; pass a list of names"), ({"checks": "units"}, "checks is 'units'")):
         with pytest.raises(sd.SymdynError, match=told):
             sd.stress(**arguments)
@@ -120,3 +128,59 @@ def test_list_names_every_check(capsys: Any) -> None:
     assert main(["stress", "--list"]) == 0
     told = capsys.readouterr().out
     assert all(name in told for name in stress_run.CHECKS) and "any mechanism" in told
+
+
+def test_a_question_that_is_wrong_is_told_before_the_table(tmp_path: Path, capsys: Any) -> None:
+    for asked, why in ((["--checks", "zork"], "there is no check 'zork'"), (["pendulum", "--checks", "flips"], "of their own")):
+        assert main(["stress", *asked, "--output", str(tmp_path)]) == 2
+        told = capsys.readouterr()
+        assert told.out == "" and why in told.err
+
+
+def test_what_is_finished_is_kept_when_interrupted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any) -> None:
+    def stops(short: bool) -> Iterator[Row]:
+        raise KeyboardInterrupt
+        yield row()
+
+    checks = {"a": stress_run.Check("a", lambda short: iter([row()])), "b": stress_run.Check("b", stops)}
+    monkeypatch.setattr(stress_run, "CHECKS", checks)
+    with pytest.raises(Interrupted, match="interrupted; 1 of 2 checks were done") as caught:
+        sd.stress()
+    report = caught.value.report
+    assert report.rows == [row()] and report.summary().startswith("unfinished: 1 of 2 checks were done; ")
+    assert main(["stress", "--jobs", "1", "--output", str(tmp_path)]) == 130
+    told = capsys.readouterr()
+    assert "pass    energy" in told.out and told.err == "symdyn: interrupted; 1 of 2 checks were done\n"
+    stored = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))
+    assert stored["unfinished"] == "1 of 2 checks were done" and len(stored["rows"]) == 1
+    for name in ("stress.txt", "stress.html"):
+        assert "unfinished: 1 of 2 checks were done" in (tmp_path / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="there are no groups of processes")
+def test_processes_end_silently_when_interrupted(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "symdyn", "stress", "--short", "--jobs", "2", "--checks", "denormals", "chaos", "--output",
+               str(tmp_path)]
+    started = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert started.stdout is not None and started.stdout.readline().startswith("verdict")
+    os.killpg(started.pid, signal.SIGINT)  # as the key does
+    out, err = started.communicate(timeout=20)
+    assert started.returncode == 130 and re.fullmatch(r"symdyn: interrupted; \d of 3 checks were done\n", err)
+    assert "unfinished: " in out and (tmp_path / "stress.html").exists()
+
+
+def test_a_motion_that_stops_is_told_once() -> None:
+    def fails(v: np.ndarray) -> np.ndarray:
+        return np.where(v > 0.5, np.nan, 1.0)
+
+    system = sd.System("stopping", planar=True)
+    x = sd.coordinates("x")
+    system.add_joint(sd.Prismatic("way", system.ground, system.add_body("block", mass=1, inertia=1), x))
+    system.add_joint_force("way", sd.External("fails", ["v"], python=fails, c="""
+static int fails(const double *in, double *out) { out[0] = in[0] > 0.5 ? 0.0/0.0 : 1.0; return 0; }""")(x.dot))
+    system.duration = 5
+    report = sd.stress(system, short=True, checks=["condition", "energy", "reversal"])
+    (told,) = report.rows
+    assert (told.check, told.system, told.verdict) == ("usual motion", "stopping", DEGRADE)
+    assert told.done.startswith("the usual motion stops at t = 0.5") and "fails failed or gave what is not finite" in told.done
+    assert [text.split(",")[0] for text in report.left_out] == ["condition", "energy", "reversal"]

@@ -41,8 +41,9 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
               per_decade: Any = 1) -> list[str]:
     """Everything that is wrong with what is asked for, a sentence each."""
     known = list(dict.fromkeys(name for subject in subjects for name in subject.names))
-    faults = [*_unknown(formulations, known, "formulation"), *_unknown(method_names, methods.names(), "method"),
-              *_unknown(peers, [*against.names(), against.ALL], "peer")]
+    # Where nothing was found that could be measured, nothing is known of its formulations.
+    faults = [*(_unknown(formulations, known, "formulation") if known else ()),
+              *_unknown(method_names, methods.names(), "method"), *_unknown(peers, [*against.names(), against.ALL], "peer")]
     for value in tolerances or ():
         if not (_is_number(value) and TIGHTEST <= value <= LARGEST):
             faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and {LARGEST:g}")
@@ -67,6 +68,11 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
     for subject in subjects:
         if not (math.isfinite(subject.end) and subject.end > 0):
             faults.append(f"the end {subject.end!r} of {subject.name} must be a positive time, s")
+        lacking = subject.lacking
+        if lacking:
+            faults.append(f"{subject.name}: parameters: no value for {', '.join(lacking)}, which "
+                          f"{'has no default' if len(lacking) == 1 else 'have no defaults'}; give every parameter a number in "
+                          "the system's `defaults`")
     return faults
 
 
@@ -113,5 +119,5 @@ def _unknown(names: Any, known: Sequence[str], what: str) -> list[str]:
         if name not in known:
             near = difflib.get_close_matches(str(name), known, 3)
             faults.append(f"there is no {what} {name!r}; " + (f"did you mean {' or '.join(near)}?" if near else
-                                                              f"there {'are ' + ', '.join(known) if known else 'is none'}"))
+                                                              f"there are {', '.join(known)}"))
     return faults

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,8 @@ from symdyn.pipeline import emit
 
 RESULTS = "results.json"
 STATE, BODIES = "coordinates (q) and speeds (u)", "poses (q) and velocities (u) of all bodies"
-# Part of a budget that a reference may take.
-_OF_BUDGET = 1 / 3
+# Part of a budget that a reference may be expected to take, with derivation, and after which no run for it is begun.
+_OF_BUDGET, _AT_MOST = 1 / 3, 2 / 3
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Benchmark:
     operations      of one evaluation of the right-hand side, by formulation
     about           machine, compiler, version
     measure         of what errors are: STATE, or BODIES if formulations with different coordinates take part
-    timed           when this run began
+    timed           when this run began; command: what tells the command that it belongs to, if that measures several mechanisms
     """
 
     name: str
@@ -51,6 +51,7 @@ class Benchmark:
     fingerprint: str = ""
     measure: str = STATE
     timed: str = ""
+    command: str = ""
 
     def table(self) -> str:
         """Everything as text."""
@@ -86,10 +87,20 @@ class Benchmark:
         r = self.reference
         return {"name": self.name, "end": self.end, "at": list(self.at), "complete": not self.unfinished,
                 "unfinished": self.unfinished, "fingerprint": self.fingerprint, "about": self.about, "timed": self.timed,
+                "command": self.command,
                 "operations": self.operations, "measure": self.measure,
                 "reference": {"kind": r.kind, "digits": round(r.digits, 2), "how": r.how, "names": list(r.names),
                               "times": list(r.times), "x": [list(x) for x in r.x]},
                 "skipped": [vars(s) for s in self.skipped], "rows": [row.record() for row in self.rows]}
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Benchmark:
+        """From plain data. Raises KeyError, TypeError, ValueError or AttributeError for what is none of a benchmark."""
+        r = data["reference"]
+        reference = Reference(r["kind"], tuple(r["times"]), r["x"], float(r["digits"]), r["how"], tuple(r["names"]))
+        return cls(data["name"], float(data["end"]), [Row.of(row) for row in data["rows"]],
+                   [Skipped(**skipped) for skipped in data["skipped"]], reference, tuple(data["at"]), dict(data["operations"]),
+                   dict(data["about"]), data["unfinished"], data["fingerprint"], data["measure"], data["timed"], data["command"])
 
     def save(self, folder: Any) -> list[Path]:
         """Write results.json, work_precision.png and .svg and report.html into a folder, made if absent; returns their paths.
@@ -113,32 +124,28 @@ class Benchmark:
 
 
 def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bool = False,
-        told: Callable[[str], None] = lambda text: None) -> Benchmark:
+        told: Callable[[str], None] = lambda text: None, command: str = "") -> Benchmark:
     """Measure a mechanism.
 
     folder     rows that an unfinished run left there are kept, and timed anew at the end where that is cheap; every row is
                written as soon as it is measured
-    progress   show a bar (needs tqdm);  told: called with what is going on
+    progress   show a bar (needs tqdm);  told: called with what is going on;  command: see Benchmark
     Raises SymdynError where nothing can be measured.
     """
     begun = clock.perf_counter()
     subject = replace(subject, at=asked.at)
-    formulations, skipped = subject.formulated(asked.formulations)
-    if not formulations:
-        raise SymdynError(f"{subject.name}: none of the formulations that were asked for fits:\n  - "
-                          + "\n  - ".join(map(str, skipped)))
-    patience = PATIENCE if asked.budget is None else asked.budget * _OF_BUDGET
-    # What errors are measured by is of the first formulation there is, whatever was asked for.
-    first = formulations[0] if asked.formulations is None else subject.first()
-    reference = find_reference(subject, _leading(first, formulations), patience, told)
-    bodies = len({f.coordinates for f in (first, *formulations)}) > 1
+    formulations, skipped, first = _formulated(subject, asked)
+    budget = math.inf if asked.budget is None else asked.budget
+    now = clock.perf_counter()
+    reference = find_reference(subject, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), told,
+                               begun + budget * _AT_MOST)
+    bodies = _differ(first, formulations)
+    waited = clock.perf_counter() - begun
     result = Benchmark(subject.name, subject.end, [], skipped, reference, asked.at,
                        {f.name: f.operations for f in formulations}, resume.about(), "it was interrupted",
-                       _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE, resume.now())
+                       _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE, resume.now(), command)
     kept = _kept(folder, result)
-    # A reference that took longer than its part leaves the runs theirs.
-    deadline = math.inf if asked.budget is None else max(begun + asked.budget,
-                                                         clock.perf_counter() + asked.budget * (1 - _OF_BUDGET))
+    deadline = begun + budget
     with contextlib.ExitStack() as stack:
         peers = Peers(formulations, asked, subject, deadline, stack)
         jobs = list(jobs_of(formulations, asked, Yardstick(reference, first, bodies), peers))
@@ -150,20 +157,52 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
             stack.callback(result.store, folder)
         walked.measure(lambda: result.store(folder) if folder is not None else None)
         walked.time_again(asked.repeats)
-    result.skipped.extend([*peers.skipped, *[Skipped(*line, why) for line, why in walked.given_up.items()]])
+    result.skipped.extend([*peers.skipped, *walked.skipped])
     result = replace(result, rows=_sorted(result.rows, formulations, asked),
-                     unfinished=_unfinished(walked.left, len(jobs), peers.late, asked.budget))
+                     unfinished=_unfinished(walked.left, len(jobs), peers.late, asked.budget, waited))
     if folder is not None:
         result.store(folder)
     return result
 
 
-def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None) -> str:
-    """Why rows are missing; empty if none is."""
+def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None, waited: float) -> str:
+    """Why rows are missing; empty if none is. waited: s before anything could be run."""
     told = [f"{left} of {total} runs were not made"] if left else []
     if late:
         told.append(f"{late[0]} was not ready" if len(late) == 1 else f"{len(late)} other programs were not ready")
-    return f"{' and '.join(told)} within the budget of {budget:.4g} s" if told and budget is not None else ""
+    if budget is None or not told:
+        return ""
+    why = f", which derivation, compilation and reference used up: they took {waited:.2g} s" if waited > budget else ""
+    return f"{' and '.join(told)} within the budget of {budget:.4g} s{why}"
+
+
+def finished(subject: Subject, asked: Asked, folder: Path, command: str) -> Benchmark | None:
+    """What an earlier run of the same command left in a folder, if it was done and the motion is the same; else None."""
+    data = resume.whole(folder / RESULTS, command)
+    subject = replace(subject, at=asked.at)
+    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError, SymdynError):  # damaged, or nothing can be derived
+        found = Benchmark.of(data)
+        formulations, _, first = _formulated(subject, asked)
+        if found.fingerprint == _fingerprint(subject, first, found.reference, _differ(first, formulations)):
+            return found
+    return None
+
+
+def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation]:
+    """Formulations, those left out, and the first there is, whatever was asked for: errors are measured by its motion.
+
+    Raises SymdynError if there is none.
+    """
+    formulations, skipped = subject.formulated(asked.formulations)
+    if not formulations:
+        raise SymdynError(f"{subject.name}: none of the formulations that were asked for fits:\n  - "
+                          + "\n  - ".join(map(str, skipped)))
+    return formulations, skipped, formulations[0] if asked.formulations is None else subject.first()
+
+
+def _differ(first: Formulation, formulations: Sequence[Formulation]) -> bool:
+    """Whether formulations have different coordinates."""
+    return len({f.coordinates for f in (first, *formulations)}) > 1
 
 
 def _leading(first: Formulation, formulations: Sequence[Formulation]) -> list[Formulation]:
@@ -185,14 +224,14 @@ def _fingerprint(subject: Subject, first: Formulation, reference: Reference, bod
     """What rows depend on besides their own names: numbers, times, and the code that runs."""
     text = "".join(emit(first.equations, "c", ("rhs",), standalone=False).files.values())
     return resume.fingerprint(subject.name, subject.end, bodies, list(reference.times), reference.kind, first.x0.tolist(),
-                              first.module.default_parameters.tolist(), resume.about(), text)
+                              first.module.default_parameters.tolist(), resume.about(), resume.code(), text)
 
 
 def _kept(folder: Path | None, result: Benchmark) -> dict[Key, Row]:
     """The rows of an unfinished run of the same in a folder, with when they were timed."""
     if folder is None:
         return {}
-    with contextlib.suppress(KeyError, TypeError, AttributeError):  # another's file
+    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError):  # another's file
         data = resume.left_by(folder / RESULTS, result.fingerprint)
         rows = [Row.of(row) for row in data.get("rows", ())]
         return {row.key: replace(row, earlier=row.earlier or data.get("timed", "") or "an unknown time") for row in rows}

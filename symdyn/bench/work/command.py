@@ -6,12 +6,12 @@ import argparse
 import sys
 import time as clock
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from symdyn.bench.work import resume
-from symdyn.bench.work.asked import checked
-from symdyn.bench.work.benchmark import RESULTS, Benchmark
+from symdyn.bench.work.asked import Asked, checked
+from symdyn.bench.work.benchmark import RESULTS, Benchmark, finished
 from symdyn.bench.work.benchmark import run as run_one
 from symdyn.bench.work.cases import CASES, subject
 from symdyn.bench.work.page import write_page
@@ -28,6 +28,7 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
     from_file   what is measured of a user's file
     Raises ArgumentError that lists everything that is wrong with what was asked for.
     """
+    begun = clock.perf_counter()
     names = list(dict.fromkeys([*arguments.systems, *(CASES if arguments.all else ())]))
     subjects, faults = _subjects(names, arguments.end, from_file)
     if not names:
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
         asked = checked(subjects, **options)
     except ArgumentError as error:
         faults.append(str(error))
-    folder, begun = arguments.output or FOLDER, clock.perf_counter()
+    folder = arguments.output or FOLDER
     places = dict.fromkeys((folder, *(_place(folder, one, subjects) for one in subjects)))
     faults += list(dict.fromkeys(why for place in places if (why := resume.unwritable(place, FILES))))
     if faults:
@@ -47,18 +48,27 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
     results: list[Benchmark] = []
     pictures: list[Path] = []
     failed = measured = 0
+    command = _fingerprint(subjects, asked)
+    done = [one for one in subjects if resume.whole(_place(folder, one, subjects) / RESULTS, command)]
+    done = done if len(done) < len(subjects) else []  # all of it was done: it begins anew
+    late: list[str] = []
     for k, one in enumerate(subjects):
-        share = None
+        share, place = None, _place(folder, one, subjects)
+        earlier = finished(one, asked, place, command) if one in done else None
+        if earlier is not None:
+            print(f"{earlier.table()}\n  all of it was measured in an earlier run, of {earlier.timed}; to have it measured anew "
+                  f"delete {place / RESULTS}", end="\n\n", flush=True)
+            measured += any(not row.message for row in earlier.rows)
+            _save(earlier, place, results, pictures)
+            continue
         if asked.budget is not None:
             left = asked.budget - (clock.perf_counter() - begun)
             if left <= 0:
-                rest = [s.name for s in subjects[k:]]
-                _tell(f"the budget of {asked.budget:g} s is used up: {', '.join(rest)} {'was' if len(rest) == 1 else 'were'} not "
-                      "begun; run it again with the same output folder to go on")
-                break
-            share = left / (len(subjects) - k)
+                late.append(one.name)
+                continue
+            share = left / sum(other is one or other not in done for other in subjects[k:])
         try:
-            result = run_one(one, replace(asked, budget=share), _place(folder, one, subjects), arguments.progress, _tell)
+            result = run_one(one, replace(asked, budget=share), place, arguments.progress, _tell, command)
         except (ArgumentError, MissingExtra):
             raise
         except SymdynError as error:
@@ -70,17 +80,32 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
         if all(row.message for row in result.rows):
             failed += not result.unfinished
             _tell(f"{result.name}: {nothing(result)}")
-        try:
-            written = result.save(_place(folder, one, subjects))
-        except MissingExtra as error:
-            print(f"symdyn: {error}", file=sys.stderr)
-            continue
-        print("\n".join(f"wrote {path}" for path in written), flush=True)
-        results.append(result)
-        pictures.append(next(path for path in written if path.suffix == ".svg"))
+        _save(result, place, results, pictures)
+    if late:
+        _tell(f"the budget of {asked.budget:g} s is used up: {', '.join(late)} {'was' if len(late) == 1 else 'were'} not begun; "
+              "run it again with the same output folder to go on")
     if len(subjects) > 1 and results:
         print(f"wrote {write_page(results, pictures, folder / 'report.html')}")
     return failed or int(not measured)
+
+
+def _save(result: Benchmark, place: Path, results: list[Benchmark], pictures: list[Path]) -> None:
+    """Write its files, and take it and its picture to those of the page of all."""
+    try:
+        written = result.save(place)
+    except MissingExtra as error:
+        print(f"symdyn: {error}", file=sys.stderr)
+        return
+    print("\n".join(f"wrote {path}" for path in written), flush=True)
+    results.append(result)
+    pictures.append(next(path for path in written if path.suffix == ".svg"))
+
+
+def _fingerprint(subjects: Sequence[Subject], asked: Asked) -> str:
+    """What tells commands apart that measure several mechanisms; empty of one."""
+    plain = asdict(replace(asked, budget=None))
+    return resume.fingerprint(sorted(one.name for one in subjects), plain, resume.installed(asked.against)) if len(
+        subjects) > 1 else ""
 
 
 def nothing(result: Benchmark) -> str:

@@ -50,6 +50,7 @@ class Walk:
 
     rows       what was measured; kept: of an earlier run;  deadline: of time.perf_counter
     left       how many runs were not made in time; given_up: lines whose other runs are not made, with the reason
+    slow       the same of rows with tolerances alone (False), or with steps (True)
     """
 
     jobs: Sequence[Job]
@@ -59,6 +60,7 @@ class Walk:
     bar: Any = None
     left: int = 0
     given_up: dict[tuple[str, str], str] = field(default_factory=dict)
+    slow: dict[tuple[str, str, bool], str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.rows += [self.kept[job.key] for job in self.jobs if job.key in self.kept]
@@ -72,8 +74,12 @@ class Walk:
                 continue
             before = _looser(job, rows)
             self.left += job.key[:2] in late
-            if job.key[:2] in self.given_up or before > _SLOW:
-                self.given_up.setdefault(job.key[:2], f"not at tighter tolerances: a run took {before:.2g} s")
+            steps = job.key[3] is not None
+            kind = (*job.key[:2], steps)
+            if job.key[:2] in self.given_up or kind in self.slow:
+                continue
+            if before > _SLOW:
+                self.slow[kind] = f"not {'with shorter steps' if steps else 'at tighter tolerances'}: a run took {before:.2g} s"
                 continue
             expected = max(2 * before, _last(job, rows) if job.peer else 0.0)
             if clock.perf_counter() + expected > self.deadline:
@@ -90,6 +96,12 @@ class Walk:
                 self.given_up[job.key[:2]] = str(error)
                 continue
             store()
+
+    @property
+    def skipped(self) -> list[Skipped]:
+        """What was not measured, with the reasons."""
+        slow = [Skipped(name, method, why) for (name, method, _), why in self.slow.items()]
+        return [*[Skipped(*line, why) for line, why in self.given_up.items()], *slow]
 
     def time_again(self, repeats: int) -> None:
         """Further passes; rows of an earlier run first get the one that the others had, if there is time for all of them."""
@@ -202,7 +214,8 @@ def spread(values: Sequence[float]) -> list[float]:
 
 
 def _looser(job: Job, rows: Sequence[Row]) -> float:
-    """How long the same method took at looser tolerances or longer steps, s."""
+    """How long the same method took at looser tolerances, of a job with a step with longer ones, s."""
     name, method, tolerance, step = job.key
     return max((r.least for r in rows if (r.formulation, r.method) == (name, method) and r.least > 0 and (
-        (r.tolerance or 0) > (tolerance or 0) or (r.step or 0) > (step or 0))), default=0.0)
+        (step is None and r.step is None and (r.tolerance or 0) > (tolerance or 0)) or (
+            step is not None and r.step is not None and r.step > step))), default=0.0)

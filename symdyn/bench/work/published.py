@@ -84,7 +84,7 @@ class Result:
         """As plain data."""
         return {"name": self.case.name, "title": self.case.title, "bounds": self.case.bounds, "reference": self.reference,
                 "outputs": self.case.outputs, "published": self.case.published, "missed": self.missed(),
-                "unfinished": self.unfinished, "text": str(self),
+                "unfinished": self.unfinished, "complete": not self.unfinished, "text": str(self),
                 "threshold": None if self.case.relative else THRESHOLD, "left out": self.left_out, "lines": [
                     {"program": line.program, "formulation": line.formulation.name, "peer": line.peer, "why": line.why,
                      "searched": line.searched,
@@ -147,7 +147,8 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
 
     names     such as A03;  peers: other programs, default: all;  budget: s, after which nothing new is tried
     folder    of published.json, written as soon as anything is known (default: generated/published); what an unfinished run
-              left there is gone on with: mechanisms that were done stay, of others the tolerances that were found
+              left there is gone on with: mechanisms that were done stay, of others the tolerances that were found; those that
+              are not named stay in the file as they are
     progress  show a bar (needs tqdm)
     Raises SymdynError that lists everything that is wrong with what is asked for.
     """
@@ -163,22 +164,24 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
     faults += filter(None, [resume.unwritable(folder, [RESULTS])])
     if faults:
         raise SymdynError("\n".join(faults))
+    deadline = math.inf if budget is None else clock.perf_counter() + budget
     compiler = require_compiler()
     chosen = [CASES[name] for name in dict.fromkeys(names or CASES)]
     programs = against.names() if peers is None else against.named(peers)
-    deadline = math.inf if budget is None else clock.perf_counter() + budget
     marks = {case.name: _fingerprint(case, programs, repeats) for case in chosen}
-    known = {r["name"]: r for r in resume.left_by(folder / RESULTS).get("mechanisms", ())
-             if r.get("fingerprint") == marks.get(r.get("name"), "")}
+    stored = _stored(folder / RESULTS)
+    known = {name: r for name, r in stored.items() if name in marks and _sound(r) and r["fingerprint"] == marks[name]}
+    if all(name in known and not known[name]["unfinished"] for name in marks):
+        known = {}  # all of it was done: it is measured anew
+    about = {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats}
 
     def store(result: Result | None = None) -> None:
         if result is not None:
             name = result.case.name
-            known[name] = {**result.record(), "fingerprint": marks[name], "timed": timed}
-        records = [known[case.name] for case in chosen if case.name in known]
-        done = len(records) == len(chosen) and not any(r["unfinished"] for r in records)
-        files.write(folder / RESULTS, {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats,
-                                              "complete": done, "mechanisms": records})
+            known[name] = {**result.record(), **about, "fingerprint": marks[name], "timed": timed}
+        # Mechanisms that were not asked for stay as they are.
+        kept = {**{name: r for name, r in stored.items() if name not in marks}, **known}
+        files.write(folder / RESULTS, {"mechanisms": [kept[name] for name in dict.fromkeys((*CASES, *kept)) if name in kept]})
 
     left, timed = [], resume.now()
     for case in chosen:
@@ -204,6 +207,27 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
 
 
 def _fingerprint(case: Case, peers: Sequence[str], repeats: int) -> str:
-    """What the results of a mechanism depend on: what is asked for, the machine, the version."""
+    """What the results of a mechanism depend on: what is asked for, which programs are there, the machine, the code of ours."""
     return resume.fingerprint(case.name, case.end, case.outputs, case.bounds, case.methods, list(case.systems), list(peers),
-                              repeats, resume.about())
+                              resume.installed(peers), repeats, resume.about(), resume.code())
+
+
+def _stored(path: Path) -> dict[str, dict[str, Any]]:
+    """The records of a file by name; none where it is damaged or another's."""
+    data = files.read(path)
+    records = data.get("mechanisms") if isinstance(data, dict) else None
+    return {r["name"]: r for r in (records if isinstance(records, list) else ())
+            if isinstance(r, dict) and isinstance(r.get("name"), str)}
+
+
+def _sound(record: Mapping[str, Any]) -> bool:
+    """Whether a record is as it was written."""
+    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError):
+        for line in record["lines"]:
+            for run in line["runs"]:
+                math.isfinite(Run.of(run).tolerance + Run.of(run).error)
+        told = [record["text"], record["timed"], record["fingerprint"]]
+        told += [line[k] for line in record["lines"] for k in ("program", "formulation", "why")]
+        return (all(isinstance(text, str) for text in told) and isinstance(record["missed"], list)
+                and isinstance(record["unfinished"], bool) and all("searched" in line for line in record["lines"]))
+    return False

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import ellipj, ellipk
@@ -85,7 +86,7 @@ class Case:
         """What is compared with, (n_t, n_y), and a sentence on how it was made."""
         times = self.times
         if self.closed is not None:
-            return self.closed(times), "closed form" if not self.relative else "extended precision, 22 digits"
+            return self.closed(times), f"extended precision, {_precise()['digits']} digits" if self.relative else "closed form"
         runs = [first.module.simulate(np.r_[0.0, times], method=method, rtol=_REFERENCE_RTOL) for method in self.pair]
         for run, method in zip(runs, self.pair, strict=True):
             if not run.success:
@@ -150,10 +151,15 @@ def windows(n: int) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _andrews(t: np.ndarray) -> np.ndarray:
+    return np.array([_precise()["q"]], dtype=float)
+
+
+def _precise() -> Mapping[str, Any]:
+    """The stored end of Andrews' motion. Raises SymdynError where it is not there."""
     precise = known("andrews_squeezer")
     if precise is None:
         raise SymdynError("the motion of andrews_squeezer with more digits is not there; install symdyn anew")
-    return np.array([precise["q"]], dtype=float)
+    return precise
 
 
 # -- the mechanisms

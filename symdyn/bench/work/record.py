@@ -10,6 +10,9 @@ from typing import Any
 NAN = math.nan
 # A median this many times the least time tells of other work on the machine.
 DISTURBED = 1.25
+# Types of figures -> what they may be in a file.
+_PLAIN: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "bool": (bool,), "float": (int, float),
+                                       "float | None": (int, float, type(None))}
 
 
 @dataclass(frozen=True)
@@ -117,12 +120,16 @@ class Row:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Row:
-        """From plain data."""
+        """From plain data. Raises TypeError, ValueError or AttributeError for what is none of a row."""
         known = {f.name: f for f in fields(cls)}
         may_be_none = ("tolerance", "step")
         values: dict[str, Any] = {k: NAN if v is None and k not in may_be_none else v for k, v in data.items() if k in known}
         values["errors"] = tuple(NAN if e is None else float(e) for e in data.get("errors", ()))
         values["until"] = tuple((NAN if s is None else float(s), int(n)) for s, n in data.get("until", ()))
+        for name, value in values.items():
+            wanted = _PLAIN.get(str(known[name].type))
+            if wanted is not None and not isinstance(value, wanted):
+                raise TypeError(f"{name} of a row is {value!r}")
         return cls(**values)
 
 

@@ -32,9 +32,10 @@ def default_times(subject: Subject) -> list[float]:
 
 
 def find_reference(subject: Subject, formulations: Sequence[Formulation], seconds: float = PATIENCE,
-                   told: Callable[[str], None] = lambda text: None) -> Reference:
+                   told: Callable[[str], None] = lambda text: None, until: float = math.inf) -> Reference:
     """The best reference that there is, or that can be made within about so many seconds.
 
+    until  of time.perf_counter, after which no run is begun but for the two that must agree
     told   is called with what is going on
     Raises SymdynError where nothing gives a reference.
     """
@@ -51,23 +52,24 @@ def find_reference(subject: Subject, formulations: Sequence[Formulation], second
             why = f"a run with more digits would take about {expected:.0f} s"
         else:
             told(f"a reference with more digits is made, about {expected:.0f} s; it is kept")
-            reference, text = converged(first, times, until=clock.perf_counter() + 2 * seconds)
+            reference, text = converged(first, times, until=min(until, clock.perf_counter() + 2 * seconds))
             store.keep(first, reference, text)
             return reference
     except SymdynError as error:
         why = str(error)
     told(f"{why}: taken are the two tightest runs that agree")
-    return agreement(formulations, times, why)
+    return agreement(formulations, times, why, until)
 
 
-def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: str) -> Reference:
+def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: str, until: float = math.inf) -> Reference:
     """Of tight runs of different formulations or methods the two that agree best: the second of them, with the digits of the
     agreement.
 
+    until   as of find_reference
     Raises SymdynError if there are no two.
     """
     first = formulations[0]
-    runs = []
+    runs: list[tuple[Formulation, str, float, np.ndarray]] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)
         for formulation in formulations:
@@ -76,6 +78,9 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
                 if method != "dop853" and clock.perf_counter() - begun > _SECONDS_OF_SCIPY:
                     continue
                 for rtol in _TIGHT if method == "dop853" else _TIGHT[:1]:
+                    made = {(f.coordinates, other) for f, other, *_ in runs}
+                    if clock.perf_counter() > until and (len(made) > 1 or (formulation.coordinates, method) in made):
+                        continue
                     try:
                         sol = formulation.module.simulate(np.r_[0.0, times], rtol=rtol, method=method)
                     except SymdynError:

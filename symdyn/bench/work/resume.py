@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
-import os
 import platform
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import symdyn
 from symdyn.bench import kept
+from symdyn.bench.work import against
 from symdyn.errors import ArgumentError, MissingExtra
 from symdyn.runtime.compiler import find_compiler
+
+# Folders of the package that shape neither the code that runs nor how it is measured.
+_BESIDE = ("cli", "comparison", "lecture", "report", "stress")
 
 
 def about() -> dict[str, str]:
@@ -35,6 +39,27 @@ def fingerprint(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
 
+@functools.cache
+def code() -> str:
+    """Changes with every file that shapes the code that runs, of whatever method, or how it is measured."""
+    package = Path(symdyn.__file__).parent
+    # In a checkout the templates lie beside the package, in an installation inside it.
+    folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
+    return digest({path.relative_to(folder).as_posix(): path for folder in folders
+                   for ending in ("*.py", "*.jinja", "*.toml") for path in folder.rglob(ending)
+                   if path.relative_to(folder).parts[0] not in _BESIDE})
+
+
+def digest(files: Mapping[str, Path]) -> str:
+    """Of what files hold, each under a name."""
+    return fingerprint(*[(name, hashlib.sha256(files[name].read_bytes()).hexdigest()) for name in sorted(files)])
+
+
+def installed(names: Sequence[str]) -> list[tuple[str, bool]]:
+    """Other programs, and whether they can run here."""
+    return [(peer.name, peer.available() is True) for name in names for peer in against.peers(name)]
+
+
 def left_by(path: Path, mark: str | None = None) -> dict[str, Any]:
     """What an unfinished run wrote, if its fingerprint is this one (None: any); else nothing."""
     with contextlib.suppress(KeyError, TypeError):  # not there, or another's file
@@ -44,19 +69,29 @@ def left_by(path: Path, mark: str | None = None) -> dict[str, Any]:
     return {}
 
 
+def whole(path: Path, command: str) -> dict[str, Any]:
+    """What a run of this very command wrote, if it was done with it; else nothing."""
+    with contextlib.suppress(KeyError, TypeError):
+        data = kept.read(path)
+        if command and data["complete"] and data["command"] == command:
+            return data  # type: ignore[no-any-return]
+    return {}
+
+
 def unwritable(folder: Path, names: Sequence[str] = ()) -> str:
-    """Why results cannot be written into a folder, which need not be there yet; empty if they can. Nothing is written.
+    """Why results cannot be written into a folder, which need not be there yet; empty if they can. Nothing stays there.
 
     names   of files whose old versions would be written over
     """
-    there = next(place for place in (folder, *folder.absolute().parents) if place.exists() or place.is_symlink())
-    if not there.is_dir():
-        return f"results cannot be written into {folder}: {there} is a file, not a folder; name another one"
-    closed = [place for place in (there, *(folder / name for name in names)) if place.exists() and not os.access(
-        place, os.W_OK | (os.X_OK if place.is_dir() else 0))]
-    if closed:
-        return f"results cannot be written into {folder}: {closed[0]} is closed to writing; name another one"
-    return ""
+    why = kept.closed(folder)
+    for path in (folder / name for name in names) if not why else ():
+        try:
+            with contextlib.suppress(FileNotFoundError), path.open("r+b"):
+                pass
+        except OSError as error:
+            why = f"{path} is closed to writing ({error.strerror})"
+            break
+    return f"results cannot be written into {folder}: {why}; name another one" if why else ""
 
 
 def check_writable(folder: Path, names: Sequence[str] = ()) -> None:

@@ -81,6 +81,15 @@ class Subject:
         others = list(self.variants)[1:]
         return [*BASIC, *[f"{name}:{variant}" for variant in others for name in BASIC[:3]]]
 
+    @property
+    def lacking(self) -> list[str]:
+        """Parameters without a number; none of a description with faults, which are told when it is derived."""
+        try:
+            given: list[Any] = [self.given.symbols] if self.given is not None else [s.check() for s in self.variants.values()]
+        except SymdynError:
+            return []
+        return list(dict.fromkeys(str(p.name) for one in given for p in one.parameters if p not in one.defaults))
+
     def formulated(self, asked: Sequence[str] | None) -> tuple[list[Formulation], list[Skipped]]:
         """The formulations of these names, default: all; those that the mechanism does not have are skipped with the reason."""
         if self.given is not None:

@@ -1,6 +1,8 @@
 """Other programs prepared for a motion: in this process, or, where time is short, each in one of its own that can be ended.
 
-A program's compiler cannot be stopped from within, and may take minutes for a long right-hand side; its process can.
+A program's compiler cannot be stopped from within, and may take minutes for a long right-hand side; its process can. Should this
+process end before, by a signal that lets it do nothing any more, a guard of a shell ends the other one: that may be in a library
+that lets no thread of Python run.
 """
 
 from __future__ import annotations
@@ -10,10 +12,12 @@ import math
 import multiprocessing
 import os
 import signal
+import subprocess
 import tempfile
 import time as clock
 import warnings
 from collections.abc import Sequence
+from multiprocessing.connection import wait
 from typing import Any
 
 import numpy as np
@@ -25,6 +29,10 @@ from symdyn.runtime.compiler import LINUX
 
 # What is done for the first time, such as compiling for a tolerance, may take this part of what is left, s, and at least so many.
 _PART, _LEAST = 1 / 4, 1.0
+# s that a process whose pipe is closed may take to end by itself, so that its code is known.
+_DYING = 5.0
+# Waits until the other end of its input is closed, then ends a group of processes and removes a folder.
+_GUARD = 'read -r _; kill -s KILL -- "-$1"; rm -rf -- "$2"'
 # s of every run of a pass, evaluations of the last one, its state (n_x,)
 Timed = tuple[list[float], int, np.ndarray]
 
@@ -76,6 +84,9 @@ class Apart:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which this package does not start
             self.process.start()
+        with contextlib.suppress(OSError):  # it did so itself, or has ended
+            os.setpgid(self.process.pid, self.process.pid)
+        self.guard = _guard(self.process.pid, self.folder.name)
         theirs.close()
         try:
             self._answer(until - clock.perf_counter(), "its preparation", Unfit)
@@ -108,8 +119,10 @@ class Apart:
         try:
             good, found = self.pipe.recv()
         except (EOFError, ConnectionResetError):
-            self.process.join()
-            raise self._end(fault(f"its process died with code {self.process.exitcode}")) from None
+            wait([self.process.sentinel], _DYING)
+            self._end(TooLong("its process was ended"))
+            self.gone = fault(f"its process died with code {self.process.exitcode}")
+            raise self.gone from None
         if not good:
             raise fault(found)
         return found
@@ -121,14 +134,21 @@ class Apart:
     def _end(self, reason: SymdynError) -> SymdynError:
         if self.gone is None:
             self.gone = reason
-            if self.process.exitcode is None:
-                with contextlib.suppress(ProcessLookupError):  # it has no group of its own yet
-                    os.killpg(self.process.pid, signal.SIGKILL)
-                self.process.kill()
+            # Also where it died: what it started lives on. Before `join`, after which its number may be that of another process.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+            self.guard.kill()
+            self.guard.communicate()
             self.process.join()
             self.pipe.close()
             self.folder.cleanup()
         return self.gone
+
+
+def _guard(group: int, folder: str) -> subprocess.Popen[bytes]:
+    """A process that ends a group and removes a folder as soon as this process has ended, however it did."""
+    return subprocess.Popen(["/bin/sh", "-c", _GUARD, "sh", str(group), folder], stdin=subprocess.PIPE,
+                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 Prepared = Here | Apart
