@@ -25,7 +25,8 @@ from symdyn.ensembles.portable import PortableModule
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
-from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped, MissingExtra
+from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped
+from symdyn.progress import bar as progress_bar
 from symdyn.runtime.batch import UNIT
 from symdyn.runtime.module import Module
 
@@ -248,8 +249,4 @@ def _whole(value: Any, what: str, module: Module) -> int | None:
 
 
 def _bar(name: str, count: int, before: int) -> Any:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=count, initial=before, desc=name, unit=" samples")
+    return progress_bar(total=count, initial=before, desc=name, unit=" samples")

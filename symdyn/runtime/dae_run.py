@@ -110,10 +110,9 @@ class Stabilized:
         polynomials = self.solver.dense_output()
         return lambda t: np.asarray(polynomials(t)[0][:self.n_x])
 
-    @property
-    def t(self) -> float:
-        """s"""
-        return float(self.solver.t)
+    def __getattr__(self, name: str) -> Any:
+        """Whatever else is asked for, such as the direction and what was counted, is the solver's own."""
+        return getattr(self.solver, name)
 
     @property
     def y(self) -> np.ndarray:
@@ -121,31 +120,11 @@ class Stabilized:
         return np.asarray(self.solver.y[:self.n_x])
 
     @property
-    def direction(self) -> float:
-        """1, or -1 backward."""
-        return float(self.solver.direction)
-
-    @property
     def step_size(self) -> float:
         """Of the latest step, s."""
-        return abs(self.t - float(self.solver.t_old))
-
-    @property
-    def nfev(self) -> int:
-        """Evaluations of the residual."""
-        return int(self.solver.nfev)
+        return abs(float(self.t - self.solver.t_old))
 
     @property
     def n_rejected(self) -> int:
         """Steps given up."""
         return int(self.solver.nrejct)
-
-    @property
-    def njev(self) -> int:
-        """Jacobians."""
-        return int(self.solver.njev)
-
-    @property
-    def nlu(self) -> int:
-        """Factorizations."""
-        return int(self.solver.nlu)

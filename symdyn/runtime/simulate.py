@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
+from symdyn.progress import bar as progress_bar
 from symdyn.runtime.arguments import take
 from symdyn.runtime.automatic import automatic
 from symdyn.runtime.charts import CHARTS, warn_near_lock
@@ -203,9 +204,5 @@ def checked_positive(module: Module, value: Any, what: str) -> float:
 
 
 def _bar(module: Module, span: tuple[float, float]) -> Any:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s",
-                bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")
+    return progress_bar(total=round(abs(span[1] - span[0]), 9), desc=module.name, unit="s",
+                        bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s")

@@ -15,9 +15,10 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from symdyn.errors import ArgumentError, MissingExtra
+from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
+from symdyn.progress import bar as progress_bar
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
 from symdyn.stress.record import DEGRADE, FAIL, Interrupted, MotionStops, NotApplicable, Row, StressReport
 from symdyn.stress.subject import Subject
@@ -233,8 +234,4 @@ def _silent() -> None:
 
 
 def _bar(total: int) -> Any:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=total, desc="stress", unit="check")
+    return progress_bar(total=total, desc="stress", unit="check")

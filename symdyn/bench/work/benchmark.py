@@ -20,6 +20,7 @@ from symdyn.bench.work.subject import Formulation, Subject, Yardstick
 from symdyn.bench.work.timing import PASSES
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
+from symdyn.progress import bar as progress_bar
 
 RESULTS = "results.json"
 STATE, BODIES = "coordinates (q) and speeds (u)", "poses (q) and velocities (u) of all bodies"
@@ -149,7 +150,7 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
     with contextlib.ExitStack() as stack:
         peers = Peers(formulations, asked, subject, deadline, stack)
         jobs = list(jobs_of(formulations, asked, Yardstick(reference, first, bodies), peers))
-        bar = resume.bar(subject.name, len(jobs) * PASSES) if progress else None
+        bar = progress_bar(desc=subject.name, total=len(jobs) * PASSES, unit="run", leave=False) if progress else None
         if bar is not None:
             stack.callback(bar.close)
         walked = Walk(jobs, result.rows, kept, deadline, bar)

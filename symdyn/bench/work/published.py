@@ -20,6 +20,7 @@ from symdyn.bench.work.published_cases import CASES, THRESHOLD, Case
 from symdyn.bench.work.published_lines import Line, Run, lines_of, search, time_all, worth
 from symdyn.bench.work.timing import PASSES
 from symdyn.errors import SimulationWarning, SymdynError
+from symdyn.progress import bar as progress_bar
 from symdyn.runtime.compiler import require_compiler
 
 RESULTS = "published.json"
@@ -109,8 +110,8 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
         warnings.simplefilter("ignore", SimulationWarning)  # where a run stops it is told
         step: Callable[[], Any] = lambda: None
         if progress:
-            bar = resume.bar(case.name, len(case.systems) * len(case.methods) + PASSES + sum(
-                len(against.peers(name)) for name in peers), "step")
+            bar = progress_bar(desc=case.name, total=len(case.systems) * len(case.methods) + PASSES + sum(
+                len(against.peers(name)) for name in peers), unit="step", leave=False)
             stack.callback(bar.close)
             step, told = bar.update, lambda text: bar.write(f"symdyn: {text}", file=sys.stderr)
         formulations = case.formulations()

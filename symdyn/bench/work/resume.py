@@ -15,7 +15,7 @@ from typing import Any
 import symdyn
 from symdyn.bench import kept
 from symdyn.bench.work import against
-from symdyn.errors import ArgumentError, MissingExtra
+from symdyn.errors import ArgumentError
 from symdyn.runtime.compiler import find_compiler
 
 # Folders of the package that shape neither the code that runs nor how it is measured.
@@ -60,11 +60,11 @@ def installed(names: Sequence[str]) -> list[tuple[str, bool]]:
     return [(peer.name, peer.available() is True) for name in names for peer in against.peers(name)]
 
 
-def left_by(path: Path, mark: str | None = None) -> dict[str, Any]:
-    """What an unfinished run wrote, if its fingerprint is this one (None: any); else nothing."""
+def left_by(path: Path, mark: str) -> dict[str, Any]:
+    """What an unfinished run wrote, if its fingerprint is this one; else nothing."""
     with contextlib.suppress(KeyError, TypeError):  # not there, or another's file
         data = kept.read(path)
-        if not data["complete"] and (mark is None or data["fingerprint"] == mark):
+        if not data["complete"] and data["fingerprint"] == mark:
             return data  # type: ignore[no-any-return]
     return {}
 
@@ -99,15 +99,6 @@ def check_writable(folder: Path, names: Sequence[str] = ()) -> None:
     why = unwritable(folder, names)
     if why:
         raise ArgumentError(why)
-
-
-def bar(name: str, total: int, unit: str = "run") -> Any:
-    """A progress bar. Raises MissingExtra without tqdm."""
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise MissingExtra("a progress bar needs tqdm: pip install 'symdyn[progress]', or leave out progress=True") from None
-    return tqdm(total=total, desc=name, unit=unit, leave=False)
 
 
 def _processor() -> str:

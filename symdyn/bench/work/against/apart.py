@@ -96,20 +96,21 @@ class Apart:
 
     def timed(self, place: int, tolerance: float, repeats: int, deadline: float = math.inf) -> Timed:
         """As of Here."""
-        return self._asked("timed", place, tolerance, repeats, deadline)  # type: ignore[no-any-return]
+        return self._asked("timed", (place, tolerance), place, tolerance, repeats, deadline)  # type: ignore[no-any-return]
 
     def states(self, tolerance: float, times: np.ndarray) -> tuple[float, np.ndarray]:
         """As of Here."""
-        return self._asked("states", -1, tolerance, times)  # type: ignore[no-any-return]
+        return self._asked("states", (-1, tolerance), tolerance, times)  # type: ignore[no-any-return]
 
-    def _asked(self, name: str, place: int, tolerance: float, *others: Any) -> Any:
+    def _asked(self, name: str, key: tuple[int, float], *arguments: Any) -> Any:
+        """What the method of Here of this name gives; key: place and tolerance, for which something may be done once."""
         if self.gone is not None:
             raise self.gone
-        rest, key = self.deadline - clock.perf_counter(), (place, tolerance)
+        rest = self.deadline - clock.perf_counter()
         with contextlib.suppress(BrokenPipeError):  # that it died is told below
-            self.pipe.send((name, (tolerance, *others) if name == "states" else (place, tolerance, *others)))
+            self.pipe.send((name, arguments))
         allowed = max(_LEAST, rest if key in self.done else _PART * rest)
-        found = self._answer(allowed, f"what it does for a tolerance of {tolerance:g}", Failed)
+        found = self._answer(allowed, f"what it does for a tolerance of {key[1]:g}", Failed)
         self.done.add(key)
         return found
 
