@@ -6,6 +6,7 @@ import gc
 import os
 import shlex
 import shutil
+import signal
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,13 @@ from typing import Any
 import pytest
 
 GC_THRESHOLD = (200_000, 20, 50)  # equations are many small objects that stay; looking for garbage took a sixth of the time
+# Set before NumPy and SymPy are imported here, and inherited by workers, notebooks and commands.
+QUICKLY = {
+    "OPENBLAS_NUM_THREADS": "1",  # the matrices are small: threads would wait for each other, on the cores of other workers
+    "SYMPY_CACHE_SIZE": "20000",  # results that SymPy keeps of each function: a thousand are not enough for many mechanisms
+}
+for _name, _value in QUICKLY.items():
+    os.environ.setdefault(_name, _value)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -23,12 +31,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: takes more than ten seconds")
     gc.set_threshold(*GC_THRESHOLD)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell: tests that press Ctrl-C would wait
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput"):  # the workers of pytest-xdist inherit the environment
         folder = tempfile.mkdtemp(prefix="symdyn-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ["SYMDYN_CACHE_DIR"] = folder
         compile_quickly()
         prepare_notebooks(Path(folder, "ipython"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_unconfigure() -> None:
+    """What is left at the end need not be looked through for garbage, which pytest and Python do several times."""
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

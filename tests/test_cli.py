@@ -393,6 +393,37 @@ def test_faults_of_a_users_file_are_told_as_its_own(name: str, here: Path, capsy
     assert all(part in said for part in expected) and str(Path("symdyn", "cli")) not in said
 
 
+RAISING = """
+import symdyn as sd
+
+
+def push(v):
+    if np.any(np.abs(v) > 1.5):
+        raise RuntimeError("the table ends at 1.5 m/s")
+    return 0.5 * v
+
+
+def system(start=0.0):
+    x = sd.coordinates("x")
+    s = sd.System("falling", gravity=[0, -10])
+    body = s.add_body("body", mass=1)
+    s.add_joint(sd.Prismatic("way", s.ground, body, x, axis=[0, 1]))
+    s.add_joint_force("way", sd.External("push", ["v"], python=push)(x.dot))
+    s.initial = {x.dot: start}
+    return s
+"""
+
+
+def test_what_a_users_function_raises_is_told_with_its_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "mine.py").write_text(RAISING, encoding="utf-8")
+    for start, t in (("0.0", "0.1"), ("2.0", "0: ")):
+        told = refused(capsys, "simulate", "mine.py", "--backend", "numpy", "--no-picture", "--option", f"start={start}", code=3)
+        assert f"symdyn: falling: stopped at t = {t}" in told
+        assert "the function push(v) raised RuntimeError: the table ends at 1.5 m/s" in told
+        assert told.endswith('\n  mine.py, line 7: raise RuntimeError("the table ends at 1.5 m/s")\n')
+    assert (here / "generated" / "falling" / "falling.npz").is_file()
+
+
 # -- what is asked wrongly
 
 
@@ -424,7 +455,9 @@ def test_simulate_tells_how_constraints_are_kept(here: Path, capsys: pytest.Capt
 @pytest.mark.parametrize("kept", [[], ["q1", "q1_dot"]])
 def test_simulate_begins_with_a_consistent_state(kept: list[str], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["simulate", "four_bar", "--t", "0.1", "--no-picture", "--backend", "numpy", "--q", "q1=0.5", "--u", "q1_dot=1"]
-    assert "begin with the nearest consistent state" in refused(capsys, *arguments)
+    told = refused(capsys, *arguments)
+    assert "the initial positions violate " in told and "begin with the nearest consistent state by --consistent" in told
+    assert "module.consistent" not in told
     assert main([*arguments, "--consistent", *(["--keep", *kept] if kept else [])]) == 0
     said = capsys.readouterr().out
     assert "four_bar: the start is made consistent: " in said and "q2 from " in said and "q2_dot from 0 to " in said

@@ -1,11 +1,15 @@
 """What the README shows is what happens."""
 
+import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from symdyn.cli import main
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 
@@ -52,9 +56,32 @@ def test_pontoon_prints_what_is_shown(tmp_path):
 
 
 def test_all_snippets_run_one_after_the_other(printed):
-    _, outputs = printed
-    assert outputs[-1][1].endswith(block("base parameters"))
+    folder, outputs = printed
+    assert any(output.endswith(block("base parameters")) for _, output in outputs)
     assert dict(outputs)[block("loop")] == block("loop printed")
+    assert (folder / "four_bar" / "report.html").is_file()
+
+
+def test_mechanism_in_a_file_is_measured(tmp_path, monkeypatch, capsys):
+    """The commands as they are shown, but for options that leave most of the work out."""
+    (tmp_path / "my_mechanism.py").write_text(block("own file"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path / "cache"))
+    less = {"bench": ["--methods", "dop853", "--rtol", "1e-6", "1e-9", "--repeats", "1"], "stress": ["--short"],
+            "report": ["--budget", "5", "--no-verify"]}
+    said = {}
+    for line in block("own file commands").splitlines():
+        words = shlex.split(line, comments=True)
+        assert words[0] == "symdyn"
+        assert main([*words[1:], *less[words[1]]]) == 0, line
+        said[words[1]] = capsys.readouterr().out
+    assert set(said) == set(less)
+    page = Path("generated/my_mechanism/report.html").read_text(encoding="utf-8")
+    assert "swing" in page and Path("generated/bench/my_mechanism/report.html").is_file()
+    # It swings, so that there are errors to compare and energy that goes back and forth.
+    rows = json.loads(Path("generated/bench/my_mechanism/results.json").read_text(encoding="utf-8"))["rows"]
+    assert rows and all(1e-16 < row["error"] < 1e-3 for row in rows)
+    assert re.search(r"\d+ rows: \d+ pass, \d+ degrade, 0 fail", said["stress"])
 
 
 def test_example_is_short():

@@ -4,20 +4,6 @@ not tests; times depend on the machine.
 `symdyn.bench` is a package and, called, the function `symdyn.bench.work.bench`.
 """
 
-from __future__ import annotations
+from symdyn.callable_package import make_callable
 
-import sys
-from types import ModuleType
-from typing import Any
-
-
-class _Callable(ModuleType):
-    """A package that is called as the function of the same name."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        from symdyn.bench.work import bench
-
-        return bench(*arguments, **options)
-
-
-sys.modules[__name__].__class__ = _Callable
+make_callable(__name__, "symdyn.bench.work:bench")

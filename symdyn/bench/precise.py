@@ -9,8 +9,9 @@ from typing import Any
 
 from mpmath import libmp
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import EvaluationError, SymdynError
 from symdyn.tape.evaluate import functions_of
+from symdyn.tape.external import UserFunction
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.tape import Tape
 
@@ -84,7 +85,7 @@ class _Writer:
         if node.op == "item":
             return [f"{own} = {self._name(args[0])}[{args[1]}]"]
         if node.op == "call":
-            self.known[f"k{node.index}"] = args[0].precise
+            self.known[f"k{node.index}"] = args[0]
             return [f"{own} = call(k{node.index}, {', '.join(self._name(a) for a in args[1:])})"]
         if node.op in ("sin", "cos") and args[0] in self.both:
             pair = {n.op: n for n in self.tape.steps if n.op in ("sin", "cos") and n.args[0] is args[0]}
@@ -111,8 +112,16 @@ class _Writer:
             value = self.context.nan
         return value if isinstance(value, bool) else self.context.convert(value)._mpf_
 
-    def _call(self, kernel: Callable[..., Any], *args: Any) -> list[Any]:
-        return [value._mpf_ for value in kernel(self.context, [self._number(a) for a in args])]
+    def _call(self, kernel: Any, *args: Any) -> list[Any]:
+        given = [self._number(a) for a in args]
+        try:
+            return [value._mpf_ for value in kernel.precise(self.context, given)]
+        except Exception as error:
+            if isinstance(error, SymdynError) or not isinstance(kernel, UserFunction):
+                raise
+            at = ", ".join(self.context.nstr(value, 6) for value in given)
+            raise EvaluationError(f"the Python text of {kernel.signature} raised {type(error).__name__} at ({at}): "
+                                  f"{error}") from error
 
     def _number(self, value: Any) -> Any:
         return self.context.make_mpf(value) if isinstance(value, tuple) else value

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symdyn.cli.measurements import MEASUREMENTS
-from symdyn.cli.messages import FAILED, Stop
+from symdyn.cli.mechanism import find_subject
+from symdyn.cli.messages import FAILED, INTERRUPTED, Stop, complain
+from symdyn.cli.options import options_of
+from symdyn.errors import ArgumentError
 
 if TYPE_CHECKING:
     from symdyn.bench.work.subject import Subject
@@ -20,7 +21,19 @@ def work(arguments: argparse.Namespace) -> int:
     from symdyn.bench.work.command import run
 
     _look_for_words(arguments.systems)
-    return FAILED if run(arguments, from_file) else 0
+    options = options_of(arguments)
+
+    def find(name: str) -> Subject:
+        """Raises ArgumentError, so that what is wrong with several names, and besides, is told at once."""
+        try:
+            return find_subject(name, options, arguments.end)
+        except Stop as stop:
+            raise ArgumentError(str(stop)) from None
+
+    try:
+        return FAILED if run(arguments, find) else 0
+    except KeyboardInterrupt:
+        return complain("interrupted; what was measured is kept, the same command goes on", INTERRUPTED)
 
 
 def _look_for_words(names: Sequence[str]) -> None:
@@ -36,15 +49,3 @@ def _look_for_words(names: Sequence[str]) -> None:
         if any(word in MEASUREMENTS for word in near):
             raise Stop(f"there is no mechanism and no measurement {name!r}; did you mean symdyn bench {' or '.join(near)}? "
                        "symdyn bench --help lists measurements, symdyn list mechanisms")
-
-
-def from_file(path: Path, end: float | None) -> Subject:
-    """What is measured of a user's file; if its system() has an option `orientation`, in angles and in parameters."""
-    from symdyn.bench.work.cases import file_name
-    from symdyn.bench.work.subject import Subject
-    from symdyn.cli import userfile
-
-    systems = {"": userfile.from_file(path, {})}
-    with contextlib.suppress(Stop):  # it has no such option
-        systems["parameters"] = userfile.from_file(path, {"orientation": "parameters"})
-    return Subject(file_name(path.stem), systems, float(end or systems[""].duration))

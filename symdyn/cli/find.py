@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,12 +33,16 @@ def find_system(name: str, options: Mapping[str, Any]) -> System:
         raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
 
 
-def find_equations(arguments: argparse.Namespace) -> MotionEquations:
+def find_equations(arguments: argparse.Namespace,
+                   find: Callable[[str, Mapping[str, Any]], System] = find_system) -> MotionEquations:
     """The equations of the system with its options, in the formulation that was asked for; where none is named, the embedding,
-    for closed loops and constraints the augmented one."""
+    for closed loops and constraints the augmented one.
+
+    find   gives the system of a name and options
+    """
     from symdyn.choice import formulated
 
-    system = find_system(arguments.system, options_of(arguments))
+    system = find(arguments.system, options_of(arguments))
     tied = system.loops or system.constraints or arguments.coordinates != "relative"
     formulation = arguments.formulation or ("augmented" if tied else "embedding")
     return formulated(system, formulation, getattr(arguments, "tune", False), arguments.coordinates)

@@ -98,9 +98,10 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="END or START END, s (default: the system's)")
     parser.add_argument("--rtol", type=float, default=1e-8, help="relative tolerance of a step (default: 1e-8)")
     parser.add_argument("--atol", type=float, help="absolute tolerance of a step (default: as rtol)")
-    parser.add_argument("--method", help="compiled: dop853 (default), bs54 (loose tolerances), taylor (fine ones), gauss (long "
-                        "conservative motion), radau (stiff), auto (chosen among these); RK23, RK45, DOP853, Radau, BDF, LSODA "
-                        "of SciPy; with constraints also ggl (pip install 'symdyn[dae]')")
+    parser.add_argument("--method", help="compiled: dop853 (default), bs54 (loose tolerances), taylor (fine ones), radau "
+                        "(stiff), radau5 (stiff, loose tolerances), gauss (long conservative motion); auto (one of dop853, "
+                        "bs54, taylor, radau, without a compiler of DOP853, Radau); RK23, RK45, DOP853, Radau, BDF, LSODA of "
+                        "SciPy; with constraints also ggl (pip install 'symdyn[dae]')")
     parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
     for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1"),
                        ("--u", "initial speeds, such as q1_dot=1"), ("--z", "initial extra states"),
@@ -176,10 +177,13 @@ def _add_bench(commands: Any) -> None:
     work.add_argument("systems", metavar="NAME", nargs="*", help="a system of the catalogue, with its first option such as "
                       "'n_link_pendulum(5)', one of lagrange_top, heavy_top, torque_free_body, or a Python file that defines "
                       "system()")
+    work.add_argument("--option", metavar="KEY=VALUE", nargs="+", action="extend", default=[], help="options of the systems, "
+                      "such as n=5")
     work.add_argument("--all", action="store_true", help="sixteen mechanisms from the pendulum to the floating turbine")
     for flag, what in (("--formulations", "embedding, recursive, augmented, absolute, absolute:angles, and with Euler "
                         "parameters embedding:parameters and the like (default: all that there are)"),
-                       ("--methods", "compiled ones, SciPy's, auto (default: all compiled ones)"),
+                       ("--methods", "compiled ones, SciPy's, auto (default: all compiled ones; without a compiler RK45, DOP853, "
+                        "Radau, LSODA)"),
                        ("--against", "other programs in the same run: scipy cvode ida heyoka casadi pinocchio mujoco exudyn; "
                         "or all")):
         work.add_argument(flag, metavar="NAME", nargs="+", help=what)
@@ -207,9 +211,12 @@ def _add_bench(commands: Any) -> None:
 
 def _add_stress(parser: argparse.ArgumentParser) -> None:
     parser.epilog = "Exit codes: 0 nothing failed; 1 a check failed; 2 it was asked wrongly."
-    parser.add_argument("systems", metavar="NAME", nargs="*", help="a system of the catalogue, or a Python file that defines "
-                        "system()")
-    parser.add_argument("--short", action="store_true", help="fewer states and systems, shorter runs: less than half a minute")
+    parser.add_argument("systems", metavar="NAME", nargs="*", help="as of symdyn bench: a system of the catalogue, such as "
+                        "\"n_link_pendulum(3)\", or a Python file that defines system()")
+    parser.add_argument("--option", metavar="KEY=VALUE", nargs="+", action="extend", default=[], help="options of the systems, "
+                        "such as n=5")
+    parser.add_argument("--short", action="store_true", help="fewer states, systems and ratios, shorter runs, rounding of C code "
+                        "at -O0 only, and of checks that are not named those that need no long time: less than half a minute")
     parser.add_argument("--checks", metavar="CHECK", nargs="+", help="some of the checks, by name")
     parser.add_argument("--list", action="store_true", help="list the checks and do nothing else")
     parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the work (default: one a processor)")

@@ -6,7 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from symdyn.cli.find import find_equations, find_system
+from symdyn.cli.find import find_equations
+from symdyn.cli.mechanism import find_mechanism, is_file, title_of
 from symdyn.cli.messages import Stop
 from symdyn.cli.options import options_of
 
@@ -20,7 +21,7 @@ def report(arguments: argparse.Namespace) -> int:
     for flag, value in (("--budget", arguments.budget), ("--output", arguments.output)):
         if value is not None:
             raise Stop(f"{flag} goes with --full; without it the report is printed")
-    equations = find_equations(arguments)
+    equations = find_equations(arguments, find_mechanism)
     print(equations.compile().report())
     if not arguments.no_verify:
         print()
@@ -30,14 +31,12 @@ def report(arguments: argparse.Namespace) -> int:
 
 def _full(arguments: argparse.Namespace) -> int:
     """Write the page, saying on the way what is going on."""
-    from symdyn import systems
     from symdyn.report.full import BUDGET, full_report
 
     options = options_of(arguments)
-    system = find_system(arguments.system, options)
-    by_name = arguments.system in systems.names() and not options  # what is known of it, such as closed forms, is found by name
-    name = arguments.system if by_name else Path(arguments.system).stem
-    folder = arguments.output or Path("generated") / name
+    system = find_mechanism(arguments.system, options)
+    by_name = not options and not is_file(arguments.system)  # what is known of it, such as closed forms, is found by name
+    folder = arguments.output or Path("generated") / title_of(arguments.system, options)
     written = full_report(arguments.system if by_name else system, folder / PAGE,
                           BUDGET if arguments.budget is None else arguments.budget, arguments.formulation,
                           arguments.coordinates, arguments.tune, not arguments.no_verify, _tell)

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symdyn.cli.find import find_module
-from symdyn.cli.messages import INTERRUPTED, STOPPED, Stop, complain
+from symdyn.cli.messages import FAILED, INTERRUPTED, STOPPED, Stop, complain
 from symdyn.cli.save import save
 from symdyn.cli.summary import summarize
+from symdyn.cli.users_line import users_line
 from symdyn.cli.values import numbers
 
 if TYPE_CHECKING:
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
 def simulate(arguments: argparse.Namespace) -> int:
     """Simulate, tell, save; what was computed until an early stop is kept."""
-    from symdyn.errors import SimulationInterrupted, SimulationWarning
+    from symdyn.errors import EvaluationError, SimulationInterrupted, SimulationWarning
+    from symdyn.runtime.consistent import NotConsistent
 
     if arguments.t is not None and len(arguments.t) > 2:
         raise Stop(f"--t takes END or START END, found {len(arguments.t)} times")
@@ -43,9 +45,14 @@ def simulate(arguments: argparse.Namespace) -> int:
                                    progress=arguments.progress, stabilization=arguments.stabilization)
     except SimulationInterrupted as stop:
         solution, code = stop.solution, INTERRUPTED  # type: ignore[assignment]
+    except NotConsistent as error:
+        raise Stop(f"{error.found}; begin with the nearest consistent state by --consistent, which tells what it changes (--keep "
+                   "NAME leaves some as they are)") from None
+    except EvaluationError as error:
+        raise Stop(f"{error}{users_line(Path(arguments.system), error.__cause__)}", FAILED) from None
     if not solution.success:
         code = code or STOPPED
-        complain(solution.message, code)
+        complain(f"{solution.message}{users_line(Path(arguments.system), solution.cause)}", code)
     summarize(solution)
     save(solution, folder, picture=not arguments.no_picture, film=arguments.gif)
     if arguments.report is not None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symdyn.cli.messages import FAILED, INTERRUPTED, Stop, complain
+from symdyn.cli.options import options_of
 
 if TYPE_CHECKING:
+    from symdyn.model.system import System
     from symdyn.stress.record import Row, StressReport
-    from symdyn.stress.subject import Subject
 
 FILES = ("stress.json", "stress.txt", "stress.html")
 
@@ -32,7 +34,10 @@ def stress(arguments: argparse.Namespace) -> int:
         raise Stop(f"--jobs must be 1 or more, found {arguments.jobs}")
     folder = arguments.output or Path("generated") / "stress"
     check_writable(folder, FILES)
-    systems = [_subject(name) for name in arguments.systems] or None
+    options = options_of(arguments)
+    if options and not arguments.systems:
+        raise Stop("--option goes with names of systems; there are none")
+    systems = [_system(name, options) for name in arguments.systems] or None
     shown: list[Row] = []
 
     def show(row: Row) -> None:
@@ -59,17 +64,9 @@ def _told_and_saved(report: StressReport, folder: Path) -> None:
         print(f"wrote {report.save(folder / name)}")
 
 
-def _subject(name: str) -> str | Subject:
-    """A name of the catalogue, or a user's mechanism. Raises Stop for parameters without values: nothing could be run."""
-    from symdyn.cli.find import find_system
-    from symdyn.stress.subject import Subject
-    from symdyn.systems import names
+def _system(name: str, options: Mapping[str, Any]) -> str | System:
+    """A name, which a process can be given, or the system of a file or of options. Raises Stop for a name that there is not."""
+    from symdyn.cli.mechanism import find_mechanism, is_file
 
-    if name in names():
-        return name
-    subject = Subject(find_system(name, {}))
-    if subject.lacking:
-        raise Stop(f"{subject.name}: parameters: no value for {', '.join(subject.lacking)}, which "
-                   f"{'has no default' if len(subject.lacking) == 1 else 'have no defaults'}; give every parameter a number in "
-                   "the system's `defaults`")
-    return subject
+    system = find_mechanism(name, options)
+    return system if options or is_file(name) else name

@@ -53,8 +53,7 @@ def _constraints(solution: Solution) -> str:
 def _energy(solution: Solution) -> str:
     """The energy error where energy is kept, else how it changed."""
     module = solution.module
-    kept = "power" in module.functions and not module.evaluate("power", solution.t, solution.x, solution.params,
-                                                               solution.inputs).any()
+    kept = "power" in module.functions and not solution.rows("power").any()
     if kept:
         # Loads that could do work did none: energy_error() would ask for the work in their case.
         scale, rests = solution.energy_scale

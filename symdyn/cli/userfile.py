@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,19 +19,27 @@ if TYPE_CHECKING:
 
 def from_file(path: Path, options: Mapping[str, Any]) -> System:
     """What system() of a user's file returns."""
-    def make(module: Any) -> Any:
-        function = getattr(module, "system", None)
-        if not callable(function):
-            raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
+    return maker(path)(**options)
+
+
+def maker(path: Path) -> Callable[..., System]:
+    """system() of a user's file, which is run once; what it raises, now or when it is called, is told as the user's fault."""
+    function = _run(path, lambda module: getattr(module, "system", None))
+    if not callable(function):
+        raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
+
+    @functools.wraps(function)
+    def make(**options: Any) -> System:
+        from symdyn.model.system import System
+
         check_options(f"system() of {path}", function, options)
-        return function(**options)
+        with _told(path):
+            result = function(**options)
+        if not isinstance(result, System):
+            raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
+        return result
 
-    result = _run(path, make)
-    from symdyn.model.system import System
-
-    if not isinstance(result, System):
-        raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
-    return result
+    return make
 
 
 def cases_from_file(path: Path) -> list[Case]:
@@ -53,12 +63,19 @@ def _run(path: Path, take: Callable[[Any], Any]) -> Any:
         raise Stop(f"{path} is not a Python file; its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    try:
+    with _told(path):
         spec.loader.exec_module(module)
         return take(module)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Whatever a user's program raises becomes a Stop, which tells it as its own."""
+    try:
+        yield
     except Stop:
         raise
-    except (Exception, SystemExit) as error:  # whatever the user's program raises is told as its own
+    except (Exception, SystemExit) as error:
         raise Stop(_users_fault(error, path)) from None
 
 

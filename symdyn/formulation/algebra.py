@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,9 @@ class TapeAlgebra:
 
     leaves   symbol -> node, for coordinates, speeds, states, inputs, parameters, t and the derivatives of speeds
     """
+
+    # A difference of terms of size 1 that is below this is rounding error alone: 64 units of the last place of doubles.
+    rounding: Any = Fraction(1, 2**46)
 
     def __init__(self, recorder: Recorder, leaves: dict[sp.Basic, Any]) -> None:
         self.recorder = recorder

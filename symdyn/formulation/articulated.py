@@ -9,8 +9,9 @@ p^a = p^A + U D^-1 u is the joint's own force, and its acceleration is found tog
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from symdyn.formulation.composite import Factors, factorize, own_inertias
 from symdyn.formulation.flexible import FlexibleLink
 from symdyn.formulation.link_motion import Wrench
+from symdyn.formulation.locking import behind, felt
 from symdyn.formulation.lumping import coordinate_axis
 from symdyn.formulation.tree import GROUND, Link, Tree
 from symdyn.spatial.inertia import ArticulatedInertia, Inertia
@@ -49,10 +51,11 @@ class Articulated:
 
     reasons   place of each joint speed that accelerates freely (the others follow given functions of time) -> what it
               means if its pivot is not positive
+    lockable  those of these places whose pivot vanishes at some positions (see locking)
     pivots    (place, pivot) of these speeds
     """
 
-    def __init__(self, tree: Tree, reasons: Mapping[int, str]) -> None:
+    def __init__(self, tree: Tree, reasons: Mapping[int, str], lockable: Container[int] = ()) -> None:
         self.tree = tree
         self.pivots: list[tuple[int, Any]] = []
         algebra, links = tree.algebra, tree.links
@@ -62,8 +65,13 @@ class Articulated:
             link = links[k]
             with algebra.section(f"link {link.name}: articulated inertia"):
                 places = tuple(place for place in link.speeds if place in reasons)
-                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, places, [reasons[p] for p in places],
-                                                    tree.elastic(k))
+                S = link.S[:, [place - link.speeds.start for place in places]]
+                locking = [column for column, place in enumerate(places) if place in lockable]
+                factorized = partial(factorize, algebra, reasons=[reasons[p] for p in places],
+                                     least=dict.fromkeys(locking, algebra.rounding),
+                                     sizes={c: behind(tree, k, S[:, c], lambda child: (IA[child].A, IA[child].M))
+                                            for c in locking if not felt(tree, k, S[:, c])})
+                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, places, S, factorized, tree.elastic(k))
                 self.pivots += zip(places, joint.D.D, strict=True)
                 if link.parent == GROUND or any(is_zero(pivot) for pivot in joint.D.D):
                     continue
@@ -106,14 +114,13 @@ class Articulated:
         return w_dot
 
 
-def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, places: tuple[int, ...],
-             reasons: Sequence[str], elastic: FlexibleLink | None) -> Released:
+def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, places: tuple[int, ...], S: np.ndarray,
+             factorized: Callable[[np.ndarray], Factors], elastic: FlexibleLink | None) -> Released:
     """U = I^A S and the factors of D = S^T I^A S.
 
     Elastic coordinates also move the mass between the ends of their body: D = S^T I^A S + M_e, and U = I^A S + N with N the
     wrench that their accelerations need at the clamped end, carried to the link at the free end.
     """
-    S = link.S[:, [place - link.speeds.start for place in places]]
     k = len(places)
     U = algebra.name(f"U{number}", IA.matrix() @ S) if places else zeros(6, 0)
     D = zeros(k, k)
@@ -123,8 +130,8 @@ def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, plac
     if elastic is not None:
         U = algebra.name(f"N{number}", U + np.column_stack([_outwards(link, elastic.coupling(column)) for column in range(k)]))
         D = D + elastic.Me
-        return Released(places, S, U, factorize(algebra, D, reasons), (), None)
-    factors = factorize(algebra, D, reasons)
+        return Released(places, S, U, factorized(D), (), None)
+    factors = factorized(D)
     directions = [coordinate_axis(S[:, column]) for column in range(k)]
     axes = tuple(axis for column, axis in enumerate(directions) if axis is not None and abs(S[axis, column]) == 1)
     single = k == 1 and len(axes) == 1

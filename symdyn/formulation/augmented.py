@@ -46,6 +46,9 @@ class ConstrainedTree(Constrained, TreeQuantities):
         self.kernel = kernel
         self.independent = independent
         self.pivots = pivots
+        self.locking = tree.locking
+        perhaps = [f"{self.speeds[p]}{self.remarks[self.speeds[p]]}" for p in self.locking]
+        self.unheld += f"; perhaps {', '.join(perhaps)}" if perhaps else ""
         if self.gathered.trivial:
             self.notes.append(f"constraints {', '.join(self.gathered.trivial)}: they hold by structure")
 

@@ -6,17 +6,19 @@ and 6.5 (L^T D L, which keeps the zeros that branches of the tree leave in the m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from symdyn.formulation.link_motion import Wrench
+from symdyn.formulation.locking import behind, felt
 from symdyn.formulation.tree import GROUND, Tree
 from symdyn.spatial.inertia import ArticulatedInertia, Inertia, total
-from symdyn.spatial.vectors import cross, dot, zeros
-from symdyn.tape.node import Node, is_zero
+from symdyn.spatial.vectors import cross, dot, identity, zeros
+from symdyn.tape.node import is_zero
 
 
 def mass_matrix(tree: Tree) -> np.ndarray:
@@ -40,6 +42,26 @@ def mass_matrix(tree: Tree) -> np.ndarray:
                 composite[link.parent] = total(composite[link.parent], composite[i].moved(link.R, link.r))
                 _name(algebra, link.parent + 1, composite[link.parent])
     return M
+
+
+def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
+    """What the pivots of lockable speeds are compared with whose own link has no mass along them, so that the diagonal entry may
+    be rounding, too."""
+    unfelt = [(i, column, place) for i, link in enumerate(tree.links) for column, place in enumerate(link.speeds)
+              if tree.plain and place in tree.lockable and not felt(tree, i, link.S[:, column])]
+    if not unfelt:
+        return {}
+    composite = own_inertias(tree)
+    for i in reversed(range(len(tree.links))):
+        link = tree.links[i]
+        if link.parent != GROUND:
+            composite[link.parent] = total(composite[link.parent], composite[i].moved(link.R, link.r))
+
+    def blocks(child: int) -> tuple[np.ndarray, np.ndarray]:
+        whole = composite[child]
+        return (whole.I, whole.m * identity()) if isinstance(whole, Inertia) else (whole.A, whole.M)
+
+    return {place: behind(tree, i, tree.links[i].S[:, column], blocks) for i, column, place in unfelt}
 
 
 def own_inertias(tree: Tree) -> list[Inertia | ArticulatedInertia]:
@@ -110,22 +132,26 @@ class Factors:
         return x
 
 
-def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str], letters: str = "", least: Any = 0) -> Factors:
+def factorize(algebra: Any, M: np.ndarray, reasons: Sequence[str], letters: str = "", least: Mapping[int, Any] | None = None,
+              sizes: Mapping[int, Any] | None = None) -> Factors:
     """L^T D L of a symmetric positive definite matrix, from the last row to the first.
 
-    reasons   what it means if the pivot of a row is not positive when the code runs
+    reasons   what it means if the pivot of a row is not positive, or not above its `least`, when the code runs
     letters   put before the names of the factors
-    least     a pivot must be above this part of the diagonal entry that it came from
+    least     of some rows, the part of its size that a pivot must be above; of the others it must be above 0
+    sizes     of some rows, what a pivot is compared with; by default the diagonal entry that it came from
     """
+    least, sizes = least or {}, sizes or {}
     n = len(M)
     A = np.array(M, dtype=object)
     L = zeros(n, n)
     inverse: list[Any] = [0] * n
     for k in reversed(range(n)):
         pivot = algebra.name(f"{letters}D{k + 1}", A[k, k])
-        if least and isinstance(pivot, Node) and pivot is not M[k, k]:
-            pivot = algebra.divisor(pivot, least * M[k, k], reasons[k])
-        algebra.positive(pivot, reasons[k])
+        size = sizes.get(k, M[k, k])
+        if k in least and not isinstance(pivot, (int, Fraction)) and pivot is not size:
+            pivot = algebra.divisor(pivot, least[k] * size, reasons[k])
+        pivot = algebra.positive(pivot, reasons[k])
         inverse[k] = 0 if is_zero(pivot) else algebra.name(f"i{letters}D{k + 1}", 1 / pivot)
         for i in range(k):
             L[k, i] = algebra.name(f"{letters}L{k + 1}_{i + 1}", A[k, i] * inverse[k])

@@ -6,7 +6,7 @@ Systems, section 6.5 (mass-orthogonal).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -29,7 +29,6 @@ BAUMGARTE = "(baumgarte)"
 POWERS = {"rad": 0, "m": 1, "m^2": 2, "m^3": 3}
 # Rows with derivatives smaller than this, lengths by lengths, are left to the numeric algorithm.
 VANISHING = Fraction(1, 1000)
-UNHELD = "a speed is held neither by mass nor by a constraint"
 
 
 class Constrained(Motion):
@@ -40,12 +39,16 @@ class Constrained(Motion):
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows
     pivots        (row, column) of C_r in the order in which dependent speeds are eliminated; None: by the Schur complement
+    locking       speeds without which others move all that they move at some positions, and these others (see locking)
+    unheld        what it means if the numeric algorithm fails
     """
 
     rows: list[Row]
     kernel = False
     independent: tuple[int, ...] | None = None
     pivots: tuple[tuple[int, int], ...] | None = None
+    locking: Mapping[int, Collection[int]] = {}
+    unheld = "a speed is held neither by mass nor by a constraint"
 
     @cached_property
     def length(self) -> Any:
@@ -114,7 +117,7 @@ class Constrained(Motion):
 
     def _solver(self, smoothed: float) -> SaddleSolver:
         if self.kernel:
-            return KernelSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), UNHELD,
+            return KernelSolver(self.algebra, self.recall("M_tilde"), self.C_r(), self.C_scale(), self._columns(), self.unheld,
                                 smoothed)
         kept = list(range(len(self.rows)) if self.independent is None else self.independent)
         C_r, names = self.C_r()[kept], [self.rows[k].name for k in kept]
@@ -123,7 +126,7 @@ class Constrained(Motion):
             mixed = len(set(self.angular)) > 1
             columns = self._columns() if mixed else [1] * len(self.speeds)
             solver: SaddleSolver = NullSpaceSolver(self.algebra, self.recall("M_tilde"), C_r, pivots, names, self.speeds,
-                                                   [self._least(k, mixed) for k in kept], columns)
+                                                   [self._least(k, mixed) for k in kept], columns, self.locking)
         else:
             solver = RangeSolver(self.algebra, self.recall("solver"), C_r, names, [self._least(k) for k in kept])
         return solver if self.independent is None else SubsetSolver(solver, kept, len(self.rows))
@@ -161,7 +164,7 @@ class Constrained(Motion):
         """Multipliers, (n_c,); where rows depend on the others those of least norm after scaling."""
         if self.independent is not None:
             left = -self.recall("bias") - self.recall("M_tilde") @ self.accelerations()
-            return least_multipliers(self.algebra.recorder, self.C_r(), self.C_scale(), self._columns(), left, UNHELD)
+            return least_multipliers(self.algebra.recorder, self.C_r(), self.C_scale(), self._columns(), left, self.unheld)
         return self.recall("solution")[1]  # type: ignore[no-any-return]
 
     def matrix(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
@@ -28,11 +28,13 @@ class Motion:
 
     A formulation adds `M_tilde`, `bias` (k_tilde - F_tilde) and `inverse_dynamics`; one that needs no mass matrix for the
     accelerations has its own `solver` and `accelerations`.
-    remarks   speed -> what else to say where the mass matrix is singular along it
-    rows      of constraints
+    remarks    speed -> what else to say where the mass matrix is singular along it
+    rows       of constraints
+    lockable   places of the speeds whose pivot of the mass matrix vanishes at some positions (see locking)
     """
 
     rows: Sequence[Any] = ()
+    lockable: Collection[int] = ()
 
     def __init__(self, algebra: TapeAlgebra, coordinates: Sequence[sp.Symbol], speeds: Sequence[sp.Symbol],
                  rates: Sequence[Any], states: Sequence[tuple[sp.Symbol, sp.Expr]], inputs: Sequence[sp.Symbol],
@@ -76,11 +78,16 @@ class Motion:
         """What it means, speed by speed, if a pivot of the mass matrix is not positive."""
         return [f"the mass matrix is not positive definite at {u}{self.remarks.get(u, '')}" for u in self.speeds]
 
+    def sizes_of_pivots(self) -> Mapping[int, Any]:
+        """What pivots of lockable speeds are compared with; those left out with their diagonal entries."""
+        return {}
+
     def solver(self) -> Solver:
         """The mass matrix, factorized."""
         M = self.recall("M_tilde")
         with self.algebra.section("factors of the mass matrix, L^T D L"):
-            return factorize(self.algebra, M, self.reasons())
+            least = dict.fromkeys(self.lockable, self.algebra.rounding)
+            return factorize(self.algebra, M, self.reasons(), least=least, sizes=self.sizes_of_pivots() if least else {})
 
     def accelerations(self) -> np.ndarray:
         """u_dot, (n_u,)."""

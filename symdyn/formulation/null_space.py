@@ -7,7 +7,7 @@ Source: Benzi, Golub and Liesen, Numerical solution of saddle point problems, Ac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -32,10 +32,12 @@ class NullSpaceSolver:
     pivots   (row, column) of C in the order of elimination; names: of the rows
     least    squares of what the rows are compared with where they are small as a whole, (m,); default 0
     columns  factors by which columns in other units compare, (n,); default 1
+    locking  speeds without which others move what they move at some positions, and these others (see locking)
     """
 
     def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],
-                 speeds: Sequence[Any], least: Sequence[Any] = (), columns: Sequence[Any] = ()) -> None:
+                 speeds: Sequence[Any], least: Sequence[Any] = (), columns: Sequence[Any] = (),
+                 locking: Mapping[int, Collection[int]] | None = None) -> None:
         self.algebra, self.M, self.C = algebra, M, C
         self.least = least or [0] * len(C)
         self.columns = vector(*(columns or [1] * C.shape[1]))
@@ -53,7 +55,20 @@ class NullSpaceSolver:
             reduced = congruence(M, self.Z)
             algebra.name("Mi", reduced)
             reasons = [f"the mass matrix under the constraints is not positive definite at {speeds[k]}" for k in self.i]
-            self.factors = factorize(algebra, reduced, reasons, "i")
+            sizes = self._sizes(reduced, locking or {})
+            self.factors = factorize(algebra, reduced, reasons, "i", dict.fromkeys(sizes, algebra.rounding), sizes)
+
+    def _sizes(self, reduced: np.ndarray, locking: Mapping[int, Collection[int]]) -> dict[int, Any]:
+        """What pivots of the reduced mass matrix are compared with: those of the first independent speed of a motion that may
+        have no kinetic energy. Where other speeds of it are dependent, the entry that the pivot comes from may vanish itself."""
+        sizes: dict[int, Any] = {}
+        for first, others in locking.items():
+            dependent = any(k in self.d for k in (first, *others))
+            for k in (first,) if first in self.i else others:
+                if k in self.i:
+                    place = self.i.index(k)
+                    sizes[place] = reduced[place, place] + (self.M[k, k] if dependent else 0)
+        return sizes
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         g = zeros(len(f))

@@ -129,8 +129,11 @@ class RecursiveTree(TreeQuantities):
 
     def reasons(self) -> list[str]:
         """What it means, speed by speed, if S^T I^A S is not positive."""
-        return super().reasons() if self.own is None else [
-            f"{massless(self.model, u)} (S^T I^A S is not positive){self.remarks.get(u, '')}" for u in self.speeds]
+        if self.own is None:
+            return super().reasons()
+        return [f"the articulated inertia S^T I^A S is not positive along {u}{self.remarks[u]}" if k in self.lockable else
+                f"{massless(self.model, u)} (S^T I^A S is not positive){self.remarks.get(u, '')}"
+                for k, u in enumerate(self.speeds)]
 
     def articulated(self) -> Articulated:
         """Articulated inertias of the links, recorded once."""
@@ -139,7 +142,7 @@ class RecursiveTree(TreeQuantities):
     def _articulated(self) -> Articulated:
         assert self.own is not None
         reasons = dict(zip(self.own, self.reasons(), strict=True))
-        return Articulated(self.tree, reasons)
+        return Articulated(self.tree, reasons, {self.own[k] for k in self.lockable})
 
     def solver(self) -> Solver:
         return super().solver() if self.own is None else _InSpeeds(self.articulated(), self.own)

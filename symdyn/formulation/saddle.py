@@ -55,7 +55,7 @@ class RangeSolver:
                 if isinstance(S[k, k], Node) and any(isinstance(e, Node) and e.mask & ~PARAMETER for e in C[k]):
                     margin = inner(C[k], C[k]) - bound
                     S[k, k] = algebra.recorder.guard(S[k, k], margin, f"constraint {names[k]} holds nothing here")
-            self.S = factorize(algebra, S[np.ix_(order, order)], reasons, "S", SMALLEST_PIVOT)
+            self.S = factorize(algebra, S[np.ix_(order, order)], reasons, "S", dict.fromkeys(range(len(C)), SMALLEST_PIVOT))
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         inwards = self.factors.inwards(f)

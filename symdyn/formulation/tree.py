@@ -7,8 +7,9 @@ the links are turned instead, by the sum of the angles, and nothing has to be tu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from symdyn.formulation.algebra import TapeAlgebra, add_rates
 from symdyn.formulation.axes import along_coordinate_axis
 from symdyn.formulation.flexible import FlexibleLink
+from symdyn.formulation.locking import lockable
 from symdyn.formulation.lumping import coordinate_axis, unmoved
 from symdyn.formulation.water import of_load
 from symdyn.model.elements import AddedMass
@@ -79,6 +81,8 @@ class Tree:
     added      added mass: number of a link, and that of the water it moves along, about its origin, link axes
     flexible   what elastic coordinates add to the links
     parallel   number of links whose frames are kept parallel to their parents'
+    lockable   generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds after
+               it that may then move what it moves (see locking)
     """
 
     model: Model
@@ -94,11 +98,17 @@ class Tree:
     added: tuple[tuple[int, ArticulatedInertia], ...] = ()
     flexible: tuple[FlexibleLink, ...] = ()
     parallel: int = 0
+    lockable: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
     @property
     def plain(self) -> bool:
         """Whether the joint speeds are the generalized speeds themselves."""
         return self.D.shape[0] == self.D.shape[1] and bool(np.all(np.asarray(np.eye(len(self.w), dtype=int) == self.D)))
+
+    @cached_property
+    def locking(self) -> Mapping[int, frozenset[int]]:
+        """Those of the lockable speeds that then move no link with mass, nor a constraint between such links."""
+        return lockable(self, solid=True)
 
     @property
     def rigid(self) -> bool:
@@ -128,7 +138,8 @@ def build(model: Model, algebra: TapeAlgebra, aligned: bool = False, grouped: bo
     aligned   parallel frames where axes stay parallel
     grouped   False: `effective` inertias are the links' own, to measure what grouping is worth
     """
-    return _Builder(model, algebra, aligned, grouped).tree()
+    tree = _Builder(model, algebra, aligned, grouped).tree()
+    return replace(tree, lockable=lockable(tree))
 
 
 @dataclass

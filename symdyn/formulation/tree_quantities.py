@@ -33,9 +33,11 @@ class TreeQuantities(Motion):
     def __init__(self, tree: Tree) -> None:
         model = tree.model
         super().__init__(tree.algebra, model.coordinates, model.speeds, tree.rates,
-                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters, _gimbal_remarks(model))
+                         [(z.symbol, z.rate) for z in model.states], model.inputs, model.parameters,
+                         {**_locking_remarks(tree), **_gimbal_remarks(model)})
         self.tree = tree
         self.model = model
+        self.lockable = tree.lockable
         self.kinematics = Kinematics(tree)
         self.loads = Loads(tree, self.kinematics)
         self.identification = Identification(tree, self.speed_rates)
@@ -79,6 +81,9 @@ class TreeQuantities(Motion):
             return self.algebra.name("M_tilde", M)
         with self.algebra.section("mass matrix in the generalized speeds"):
             return self.algebra.name("M_tilde", congruence(M, self.tree.D))
+
+    def sizes_of_pivots(self) -> dict[int, Any]:
+        return composite.sizes_of_pivots(self.tree)
 
     def bias(self) -> np.ndarray:
         """k_tilde - F_tilde in one pass: the weight as acceleration of the base."""
@@ -247,6 +252,15 @@ class TreeQuantities(Motion):
     def project(self, tau: np.ndarray) -> np.ndarray:
         """D^T tau: from the joints' speeds to the generalized ones."""
         return tau if self.tree.plain else self.tree.D.T @ tau if len(tau) else zeros(len(self.speeds))
+
+
+def _locking_remarks(tree: Tree) -> dict[Any, str]:
+    """For speeds that may lose what they move to others: to which."""
+    speeds = tree.model.speeds
+    others = {p: ", ".join(str(speeds[k]) for k in sorted(after)) for p, after in tree.lockable.items()}
+    return {speeds[p]: ": at this position it moves nothing that " + (
+        f"{others[p]} {'does' if len(after) == 1 else 'do'} not move already" if after else "has mass")
+        for p, after in tree.lockable.items()}
 
 
 def _gimbal_remarks(model: Model) -> dict[Any, str]:

@@ -24,9 +24,10 @@ from symdyn.pages import page_environment, write_text
 from symdyn.report import full_condition, full_equations, full_pictures, full_work
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.run_tables import facts
+from symdyn.stress.flow import stands_still
 from symdyn.stress.record import number
 from symdyn.stress.run import stress
-from symdyn.stress.subject import Subject
+from symdyn.stress.subject import Subject, named
 
 if TYPE_CHECKING:
     from symdyn.report.text import Report
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 BUDGET = 20.0
 # What parts warn of is told in them, so many of each.
 WARNINGS, MOST = (SimulationWarning, EvaluationWarning, ModelWarning), 3
+STILL = ("The motion stands still, so that there is one state only to look at; set system.initial to a start from which it "
+         "moves, such as {q: 0.5, q.dot: 1}.")
 Told = Callable[[str], None]
 
 
@@ -41,7 +44,7 @@ def full_report(system: Any, path: Any, budget: float = BUDGET, formulation: str
                 tune: bool = False, verify: bool = True, told: Told = lambda text: None) -> Path:
     """Write everything about a mechanism into one HTML file that works offline; returns its path.
 
-    system        a System, equations such as those of sd.embedding, or the name of a system of the catalogue
+    system        a System, equations such as those of sd.embedding, or a name that sd.bench takes
     budget        s that work against error may take; the rest takes about half a minute more
     formulation   "auto", "embedding", "recursive" or "augmented"; coordinates of the augmented one, and tune, as in
                   System.equations; of equations that are given these do not count
@@ -81,9 +84,7 @@ def _equations(system: Any, formulation: str, coordinates: str, tune: bool) -> E
     if isinstance(system, Equations):
         return system
     if isinstance(system, str):
-        from symdyn.systems import get
-
-        system = get(system)
+        system = named(system)
     if not isinstance(system, System):
         raise ArgumentError(f"the report takes a System, equations or a name of the catalogue, found {system!r}")
     return formulated(system, formulation, tune, coordinates)
@@ -167,6 +168,8 @@ def _show_generated(part: Part, equations: Equations) -> None:
 
 def _show_condition(part: Part, subject: Subject) -> None:
     found = full_condition.along(subject)
+    if len(found.solution.t) and stands_still(subject, found.solution.x):
+        part.notes.append(STILL)
     part.shown = {"found": found, "curves": [_range(label, values) for label, values in found.curves.items()],
                   "states": len(found.t), "end": f"{found.solution.t[-1]:g}" if len(found.solution.t) else "0",
                   "facts": facts(found.solution),
@@ -182,7 +185,9 @@ def _range(label: str, values: Any) -> dict[str, str]:
 
 
 def _show_work(part: Part, system: Any, formulation: str, budget: float, told: Told) -> None:
-    part.shown = full_work.shown(full_work.measure(system, formulation, budget, told))
+    benchmarks = full_work.measure(system, formulation, budget, told)
+    part.notes += dict.fromkeys(f"{note[0].upper()}{note[1:]}." for benchmark in benchmarks for note in benchmark.notes)
+    part.shown = full_work.shown(benchmarks)
     if part.shown["note"]:
         part.notes.append(part.shown["note"])
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, no_value
 
 
 def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, float | None], owner: str) -> np.ndarray:
@@ -67,7 +67,7 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
     missing = [n for n in names if n not in given and defaults.get(n) is None]
     missing = [n for n in missing if not any(n in f for f in faults)]
     if missing:
-        faults.append(f"no value for {', '.join(missing)}, which {'have' if len(missing) > 1 else 'has'} no default")
+        faults.append(no_value(missing))
     if faults:
         raise ArgumentError(f"{owner}: {what}: " + "; ".join(faults))
     array = np.array([given.get(n, defaults.get(n)) for n in names], dtype=float)

@@ -43,7 +43,7 @@ Trial = Callable[[Request, str], Outcome]
 
 
 def automatic(module: Module, request: Request, trial: Trial) -> tuple[str, str]:
-    """The method and, in one sentence, why.
+    """The method and, in one sentence, why: what was found of stiffness, by which number against which bound; what follows.
 
     trial   runs a request by a method
     """
@@ -53,16 +53,32 @@ def automatic(module: Module, request: Request, trial: Trial) -> tuple[str, str]
     verdict, found = _stiffness(module, request, trial, explicit, stiff)
     if verdict == "stiff":
         return stiff, found
-    why = f"{found}; for rtol = {request.rtol:.3g}{' and constraints' if module.metadata['constraints'] else ''}"
+    method, choice = _by_tolerance(module, request, verdict, explicit)
+    return method, f"{found}; {choice}"
+
+
+def _by_tolerance(module: Module, request: Request, verdict: str, explicit: str) -> tuple[str, str]:
+    """The method for a motion that needs no implicit one, and why."""
     if module.backend != "c":
-        return explicit, f"{why} the explicit method of order 8 is quickest of those without compiled code"
+        return explicit, "of the explicit methods that need no compiled code the one of order 8 is quickest"
     operations = module.metadata.get("operations", {}).get("rhs", SHORT)
-    loose = request.rtol >= (LOOSE_TINY_RTOL if operations < TINY else LOOSE_RTOL)
-    if loose and verdict != "limited" and _fits(module, request, LOOSE):
-        return LOOSE, f"{why} the pair of order 5 needs the fewest evaluations"
-    if request.rtol <= (SHORT_RTOL if operations < SHORT else FINEST_RTOL) and _fits(module, request, FINEST):
-        return FINEST, f"{why}, and with {operations} operations in the right-hand side, series of high order are most exact"
-    return explicit, f"{why} the explicit method of order 8 is quickest"
+    loose = LOOSE_TINY_RTOL if operations < TINY else LOOSE_RTOL
+    finest = SHORT_RTOL if operations < SHORT else FINEST_RTOL
+
+    def asked(bound: str) -> str:
+        return f"for rtol = {request.rtol:.3g} ({bound}, with {operations} operations in the right-hand side)"
+
+    if request.rtol >= loose and verdict == "limited":
+        return explicit, (f"{asked(f'{loose:.3g} or more')} the explicit method of order 8 is quickest, as stability limits the "
+                          "pair of order 5 to shorter steps")
+    if request.rtol >= loose and _fits(module, request, LOOSE):
+        return LOOSE, f"{asked(f'{loose:.3g} or more')} the explicit pair of order 5 needs the fewest evaluations"
+    if request.rtol > finest:
+        return explicit, f"{asked(f'between {finest:.3g} and {loose:.3g}')} the explicit method of order 8 is quickest"
+    if _fits(module, request, FINEST):
+        return FINEST, f"{asked(f'{finest:.3g} or less')} Taylor series are most exact"
+    return explicit, (f"{asked(f'{finest:.3g} or less')} Taylor series would be most exact, but do not fit (method='{FINEST}' "
+                      "tells why); the explicit method of order 8 is quickest")
 
 
 def _fits(module: Module, request: Request, method: str) -> bool:
@@ -82,21 +98,25 @@ def _stiffness(module: Module, request: Request, trial: Trial, explicit: str, st
     found = trial(asked, explicit)
     steps = np.abs(np.diff(found.t))
     if found.success:
-        return "", f"the motion is not stiff ({found.n_steps} steps of a trial run reach the end)"
+        return "", (f"no implicit method is needed: an explicit trial run reaches the end in {found.n_steps} steps, of "
+                    f"{TRIAL_STEPS} that it may take")
+    n, end = request.n_state, float(found.t[-1]) if len(found.t) else request.span[0]
+    unknown = "whether the motion is stiff is not known"
     if len(steps) < TRIAL_STEPS:
-        return "", "a trial run stopped early"
-    n, end = request.n_state, float(found.t[-1])
+        return "", f"{unknown}: a trial run stopped at t = {end:.3g} s, after {len(steps)} of {TRIAL_STEPS} explicit steps"
     length = float(np.median(steps[-20:]))
     x = found.x[-1][:n]
     modes = Modes.at(module, request, end, x)
     if modes is None:
-        return "", f"the eigenvalues cannot be evaluated at the end of a trial run, t = {end:.3g} s"
+        return "", (f"{unknown}: at t = {end:.3g} s, after {TRIAL_STEPS} explicit steps, the right-hand side cannot be evaluated "
+                    "on all sides of the state, which its eigenvalues need")
     product = modes.radius * length
-    limited = f"eigenvalues up to {modes.radius:.3g} 1/s times the step of a trial run, {length:.3g} s, are {product:.2g}"
+    limited = (f"steps of {length:.3g} s times the largest eigenvalue, {modes.radius:.3g} 1/s, are {product:.2g}"
+               f"{f', below {WORTH:g}' if product < WORTH else ''}; stability limits explicit ones from {LIMITED:g} on")
     to_come = abs(request.span[1] - end)
     later = replace(asked, span=(end, request.span[1]), x0=x.copy(), first_step=0.0, max_steps=STIFF_STEPS)
     try:
-        if product <= LIMITED and (doubt := _doubt(found, request, product, to_come / length)):
+        if product <= LIMITED and (doubt := _doubt(module, found, request, product, to_come / length)):
             ringing = modes.ringing(request.atol[:n] + request.rtol * np.abs(x))
             if ringing is None or not _outlasted(ringing.time, length, to_come, modes.radius):
                 return "", f"{doubt} ({limited})"
@@ -106,18 +126,18 @@ def _stiffness(module: Module, request: Request, trial: Trial, explicit: str, st
             calm = trial(replace(later, atol=ringing.amplitudes, rtol=LARGEST, max_step=most), stiff)
             later = replace(later, span=(float(calm.t[-1]), request.span[1]), x0=calm.x[-1][:n].copy())
             length = LIMITED / modes.radius
-            limited = (f"eigenvalues up to {modes.radius:.3g} 1/s ring for {ringing.time:.2g} s only, then stability limits "
-                       f"explicit steps to {length:.2g} s")
+            limited = (f"a vibration with eigenvalues up to {modes.radius:.3g} 1/s dies out within {ringing.time:.2g} s; then "
+                       f"stability limits explicit steps to {length:.2g} s")
         # From where the explicit trial ended: what dies away at the start takes an implicit method many short steps, too.
         longer = np.abs(np.diff(trial(later, stiff).t))
     except SymdynError as error:
-        return "", f"no implicit step can be tried: {error}"
+        return "", f"{unknown}: no implicit step can be tried ({error})"
     ratio = float(np.max(longer[-5:], initial=0.0)) / length
+    pays = f"times as long as explicit ones, and pay from {LONGER:g} times on ({limited})"
+    after = f"after t = {later.span[0]:.3g} s implicit steps are"
     if ratio >= LONGER:
-        return "stiff", f"the motion is stiff ({limited}): implicit steps are {ratio:.2g} times as long"
-    if product > LIMITED:
-        return "limited", f"stability limits explicit steps ({limited}), but implicit ones are only {ratio:.2g} times as long"
-    return "", f"the motion is not stiff near t = {end:.3g} s ({limited}; implicit steps are only {ratio:.2g} times as long)"
+        return "stiff", f"the motion is stiff: {after} {ratio:.0f} {pays}"
+    return "limited" if product > LIMITED else "", f"the motion is not stiff: {after} only {ratio:.2g} {pays}"
 
 
 def _outlasted(ringing: float, length: float, to_come: float, radius: float) -> bool:
@@ -127,21 +147,39 @@ def _outlasted(ringing: float, length: float, to_come: float, radius: float) -> 
     return after >= max(MANY, (IMPLICIT - 1) * ringing / length)
 
 
-def _doubt(found: Outcome, request: Request, product: float, to_come: float) -> str:
+def _doubt(module: Module, found: Outcome, request: Request, product: float, to_come: float) -> str:
     """Why no implicit method is tried where stability need not limit the explicit one; empty: it is worth a trial."""
     if product < WORTH:
-        return "accuracy limits explicit steps"
+        return "accuracy, not stability, limits explicit steps"
     half, n = TRIAL_STEPS // 2, request.n_state
-    if not _smooth(found.t[-half:], found.x[-half:, :n], request.rtol, request.atol[:n]):
-        return f"the motion is not stiff up to t = {found.t[-1]:.3g} s: it is not smooth over {half} explicit steps"
-    return f"some {to_come:.0f} explicit steps to come are too few for stiffness to matter" if to_come < MANY else ""
+    rough = _roughest(found.t[-half:], found.x[-half:, :n], request.rtol, request.atol[:n])
+    if rough is not None:
+        return (f"the motion itself, not stability, asks for short steps: over {half} explicit ones, to t = {found.t[-1]:.3g} s, "
+                f"{module.metadata['x'][rough.entry]} departs from a cubic by {100 * rough.missed:.2g} % of its range, where "
+                f"{100 * rough.allowed:.2g} % would be smooth")
+    return (f"stiffness does not matter: some {to_come:.0f} explicit steps are to come, fewer than the {MANY} from which on an "
+            "implicit method pays" if to_come < MANY else "")
 
 
-def _smooth(t: np.ndarray, x: np.ndarray, rtol: float, atol: np.ndarray) -> bool:
-    """Whether x(t), (n_t, n), is a cubic within SMOOTH of its range or ten times the tolerances."""
+class Rough(NamedTuple):
+    """Which entry of a state is least smooth, by how much of its range it departs from a cubic, and how much a smooth one may."""
+
+    entry: int
+    missed: float
+    allowed: float
+
+
+def _roughest(t: np.ndarray, x: np.ndarray, rtol: float, atol: np.ndarray) -> Rough | None:
+    """None if x(t), (n_t, n), is a cubic within SMOOTH of its range or ten times the tolerances."""
     powers = np.vander((t - t[0]) / (t[-1] - t[0]), 4)
     missed = np.abs(x - powers @ np.linalg.lstsq(powers, x, rcond=None)[0]).max(axis=0)
-    return bool((missed <= np.maximum(SMOOTH * np.ptp(x, axis=0), 10 * (atol + rtol * np.abs(x).max(axis=0)))).all())
+    ranges = np.ptp(x, axis=0)
+    allowed = np.maximum(SMOOTH * ranges, 10 * (atol + rtol * np.abs(x).max(axis=0)))
+    rough = ~(missed <= allowed)
+    if not rough.any():
+        return None
+    entry = int(np.argmax(np.where(rough, missed / np.where(rough, allowed, 1.0), 0.0)))
+    return Rough(entry, float(missed[entry] / ranges[entry]), float(allowed[entry] / ranges[entry]))
 
 
 class Ringing(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EvaluationError, EvaluationWarning
+from symdyn.errors import ArgumentError, EvaluationWarning
 from symdyn.runtime.batch_arguments import take_rows, together
 
 if TYPE_CHECKING:
@@ -103,32 +103,40 @@ def _on_vectors(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np
 
 
 def _broadcast(module: Module, n: int, arrays: Mapping[str, np.ndarray], xd: np.ndarray) -> dict[int, str]:
-    """The same with NumPy: all at once, and one by one where that fails."""
+    """The same with NumPy: all at once, without the rows that turn out to fail."""
     unit: Any = module.unit("rhs")
-    sizes = module.metadata["sizes"]
     t, x, inputs, p = (np.broadcast_to(arrays[k], (n, arrays[k].shape[1])) for k in ("t", "x", "inputs", "params"))
-    try:
-        xd[:] = unit.broadcast("rhs", t[:, 0], x, p, inputs)
-    except (ArithmeticError, ValueError):
-        xd[:] = np.nan
-        evaluator = unit.evaluator("rhs")
-        for k in range(n):
-            try:
-                evaluator.set_params(p[k])
-                xd[k] = evaluator.one(t[k, 0], x[k], inputs[k], [0.0] * sizes["ud"])
-            except EvaluationError:
-                continue
-    bad = np.flatnonzero(~np.isfinite(xd).all(axis=1))
-    return {int(k): _reason(unit, t[k, 0], x[k], p[k], inputs[k], xd[k]) for k in bad}
+    reasons: dict[int, str] = {}
+    xd[:] = np.nan
+    left = np.arange(n)
+    while len(left):
+        rows: Any = left if len(left) < n else slice(None)
+        try:
+            xd[rows] = unit.broadcast("rhs", t[rows, 0], x[rows], p[rows], inputs[rows])
+            break
+        except unit.module.SingularError as error:
+            failed = np.broadcast_to(error.states, len(left))
+            reasons |= dict.fromkeys(left[failed].tolist(), str(error))
+            left = left[~failed]
+        except (ArithmeticError, ValueError):  # of a function of the user, say, which does not tell the rows
+            reasons |= _one_by_one(unit, left, (t, x, inputs, p), xd)
+            break
+    for k in np.flatnonzero(~np.isfinite(xd).all(axis=1)).tolist():
+        reasons.setdefault(k, "the result is not finite")
+        xd[k] = np.nan
+    return dict(sorted(reasons.items()))
 
 
-def _reason(unit: Any, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray, row: np.ndarray) -> str:
-    row[:] = np.nan
-    try:
-        unit.module.evaluate("rhs", float(t), x, tuple(p.tolist()), inputs)
-    except (ArithmeticError, ValueError) as error:
-        return str(error)
-    return "the result is not finite"
+def _one_by_one(unit: Any, rows: np.ndarray, arguments: tuple[np.ndarray, ...], xd: np.ndarray) -> dict[int, str]:
+    """Fill these rows of xd; returns why, for those that fail."""
+    reasons = {}
+    for k in rows.tolist():
+        t, x, inputs, p = (a[k] for a in arguments)
+        try:
+            xd[k] = unit.evaluate("rhs", float(t[0]), x, tuple(p.tolist()), inputs)
+        except (ArithmeticError, ValueError) as error:
+            reasons[k] = str(error)
+    return reasons
 
 
 def _numbers(module: Module, values: Any, what: str) -> np.ndarray:

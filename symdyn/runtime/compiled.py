@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.errors import SymdynError
 from symdyn.runtime.events import EVENTS, at_once, ended, not_known
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.stabilization import Corrections, not_converged
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
@@ -101,6 +103,11 @@ class _Run:
             self.guard = guard = Interrupts(call.__code__)
             self.problem.function = _InputFunction(call)
 
+    @property
+    def raised(self) -> InputRaised | None:
+        """What a function of inputs raised, if it did."""
+        return self.trouble[0] if self.trouble and isinstance(self.trouble[0], InputRaised) else None
+
     def at(self, times: np.ndarray, x: np.ndarray, limit: int) -> int:
         """Go on, writing states at the requested times."""
         return self._go(0, limit, times, len(times), x)
@@ -135,9 +142,9 @@ class _Run:
 
 
 def run_compiled(module: Module, request: Request, method: str, bar: Any = None, field: str = "rhs") -> Outcome:
-    """Integrate with a compiled method.
+    """Integrate with a compiled method. What a function of inputs raises ends the run.
 
-    An exception of an input function ends the run; it is raised again unless it is a KeyboardInterrupt.
+    Raises ArgumentError where such a function returns what does not fit.
     """
     unit: Any = module.unit(unit_name(field, method))
     run = _Run(unit, with_own_tolerances(request, method))
@@ -170,7 +177,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
         interrupted = True
     if run.trouble and isinstance(run.trouble[0], KeyboardInterrupt):
         interrupted = True
-    elif run.trouble:
+    elif run.trouble and run.raised is None:
         raise run.trouble[0]
     written = run.written.value
     if times is None:
@@ -179,8 +186,9 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     else:
         t, x = times[:written], x_out[:written]
     report = run.report()
-    over = status == _EVENT_STOPPED and not interrupted and not stopped
-    success = over or (status == _DONE and not interrupted and not stopped)
+    early = interrupted or stopped or run.raised is not None
+    over = status == _EVENT_STOPPED and not early
+    success = over or (status == _DONE and not early)
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
     if over:
         message = ended(module, next(k for k, s, _ in reversed(run.happened) if module.metadata[EVENTS][k]["stop"]), report[0])
@@ -189,14 +197,20 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
     return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), run.seconds,
                    Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),
-                   int(report[15 + 2 * n_x]), _doubt(module, method, report) if status >= 0 else "")
+                   int(report[15 + 2 * n_x]), _doubt(module, request, method, report) if status >= 0 else "",
+                   None if run.raised is None else run.raised.__cause__)
 
 
-def _doubt(module: Module, method: str, report: np.ndarray) -> str:
-    """What to say of steps whose errors the method did not see; for "gauss" bad_index counts them, see its template."""
-    rough = -1 - int(report[6])
-    if method != "gauss" or rough < 1:
+def _doubt(module: Module, request: Request, method: str, report: np.ndarray) -> str:
+    """What to say of steps whose errors the method did not see, or which are not those that were asked for; for "gauss" bad_index
+    and reason count them, see its template."""
+    if method != "gauss":
         return ""
+    rough, divided = -1 - int(report[6]), int(report[5]) if request.first_step else 0
+    if rough < 1:
+        return (f"{module.name}: method 'gauss' divided {divided} of its steps of one length, the latest of them at t = "
+                f"{report[7]:.9g} s: its iteration does not converge over the whole of them. With steps of several lengths it is "
+                "neither symplectic nor symmetric, and energy may drift; give a shorter first_step") if divided else ""
     return (f"{module.name}: method 'gauss' went across kinks or jumps of the right-hand side, the latest of them just before "
             f"t = {report[7]:.9g} s: of the steps that were done again by halves, {rough} differ by more than ten times the "
             f"tolerance; use method='{DEFAULT}'")
@@ -207,6 +221,8 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
     t, x = report[0], report[8:8 + n]
     if interrupted:
         return describe_stop(metadata, t, x, "interrupted")
+    if run.raised is not None:
+        return describe_stop(module.metadata, run.raised.t, run.raised.x, str(run.raised))
     if stopped:
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _EVENT_AT_ONCE:
@@ -245,7 +261,7 @@ def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
     request = run.request
     try:
         return not_finite(module.metadata["inputs"], request.inputs.at(t, x[:request.n_state].copy()), t)
-    except Exception:
+    except SymdynError:
         return ""
 
 

@@ -36,6 +36,17 @@ _CUT = 1e-9
 _RESTARTS = 8
 
 
+class NotConsistent(ArgumentError):
+    """A start violates the constraints; `found` tells which and by how much, the message also what to do."""
+
+    def __init__(self, found: str, advice: str = "") -> None:
+        super().__init__(found, advice)
+        self.found = found
+
+    def __str__(self) -> str:
+        return "; ".join(filter(None, self.args))
+
+
 def normalised(module: Module, x: np.ndarray) -> np.ndarray:
     """The state with unit vectors of length 1; raises ArgumentError if they are off by more than rounding of input."""
     for group in module.metadata.get("unit_groups", ()):
@@ -49,7 +60,7 @@ def normalised(module: Module, x: np.ndarray) -> np.ndarray:
 
 
 def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> None:
-    """Raise ArgumentError, which names the violated constraints, if a state is not consistent."""
+    """Raise NotConsistent, which names the violated constraints, if a state is not consistent."""
     if not names(module):
         return
     faults = []
@@ -59,7 +70,7 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
         if (np.abs(residual) > CONSISTENT).any():
             faults.append(f"the initial {what} violate {listed(module, residual, CONSISTENT)} ({unit})")
     if faults:
-        raise ArgumentError(f"{module.name}: {'; '.join(faults)}; begin with the nearest consistent state: "
+        raise NotConsistent(f"{module.name}: {'; '.join(faults)}", "begin with the nearest consistent state: "
                             f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''})")
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
 from symdyn.runtime.constraints import names, rank
-from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import Field, Run
 from symdyn.runtime.stabilization import Projector
@@ -92,8 +91,7 @@ class Stabilized:
             return self.evaluator.one(t, state, inputs if self.field.n_in else None, yd)
         except EvaluationError as error:
             if np.isfinite(y).all() and np.isfinite(yd).all():
-                told = not_finite(self.field.module.metadata["inputs"], inputs, t)
-                self.field.trouble.append(str(error).removeprefix(f"{self.field.module.name}: ") + told)
+                self.field.note(error, t, inputs)
             return np.full(len(y), np.nan)
 
     def step(self) -> str | None:

@@ -104,7 +104,9 @@ class Locator:
         state, inputs = x[:self.n_state], self.given(t, x[:self.n_state])
         try:
             return self.module.evaluate(EVENTS, t, state, self.p, inputs)
-        except EvaluationError:
+        except EvaluationError as error:
+            if error.__cause__ is not None:  # which the user's function raised: there is nothing of the others, either
+                raise
             values = self.apart.each(t, state, inputs)
         lost = self.look & ~np.isfinite(values)
         if lost.any():

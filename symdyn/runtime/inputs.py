@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
+from symdyn.runtime.raised import InputRaised, called
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Inputs:
         return self.table is not None or self.of_tables
 
     def at(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The inputs at a time and state."""
+        """The inputs at a time and state. Raises InputRaised from whatever a function raises."""
         if self.function is not None:
             given = self.function(t, x)
             try:
@@ -49,10 +51,14 @@ class Inputs:
         return self.constant
 
     def rows(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """The inputs at every time, (n_t, n_in)."""
+        """The inputs at every time, (n_t, n_in); not a number where a function raises."""
         if self.function is None and self.table is None:
             return self.constant[None, :]
-        return np.array([self.at(tk, xk) for tk, xk in zip(t, x, strict=True)]).reshape(len(t), len(self.constant))
+        found = np.full((len(t), len(self.constant)), np.nan)
+        for k, (tk, xk) in enumerate(zip(t, x, strict=True)):
+            with suppress(InputRaised):
+                found[k] = self.at(tk, xk)
+        return found
 
 
 def not_finite(names: Sequence[str], values: Any, t: float) -> str:
@@ -77,7 +83,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     if not names:
         raise ArgumentError(f"{owner}: inputs were given, but the system has none")
     if callable(given):
-        return Inputs(start, function=given)
+        return Inputs(start, function=partial(_asked, given, "the input function"))
     if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
         return Inputs(start, *_table(given, len(names), owner))
     if not isinstance(given, Mapping):
@@ -92,7 +98,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     sources: list[tuple[int, Callable[[float, np.ndarray], Any]]] = []
     for name, value in varying.items():
         if callable(value):
-            sources.append((places[name], value))
+            sources.append((places[name], partial(_asked, value, f"the function of input {name}")))
         else:
             times, table = _table(value, 1, owner)
             column = table[:, 0]
@@ -101,10 +107,19 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     def mixed(t: float, x: np.ndarray) -> np.ndarray:
         values = constant.copy()
         for place, source in sources:
-            values[place] = source(t, x)
+            value = source(t, x)
+            try:
+                values[place] = value
+            except (TypeError, ValueError):
+                raise ArgumentError(f"the function of input {names[place]} returned {value!r} at t = {t:.6g}; needed is a "
+                                    "number") from None
         return values
 
     return Inputs(constant, function=mixed, of_tables=not all(map(callable, varying.values())))
+
+
+def _asked(function: Callable[[float, np.ndarray], Any], what: str, t: float, x: np.ndarray) -> Any:
+    return called(function, t, x, what)
 
 
 def _interpolate(times: np.ndarray, column: np.ndarray, t: float, x: np.ndarray) -> float:

@@ -22,13 +22,11 @@ class CompiledMethod:
     """A method of the C backend.
 
     needs    functions that the module must have
-    serves   what it is for, a line
     unfit    why it does not take a module or a request, with what to use instead; empty if it does
     kinked   what tolerances are multiplied by where inputs have kinks, which its estimate of errors underrates
     """
 
     name: str
-    serves: str
     needs: tuple[str, ...] = ()
     unfit: Callable[[Module, Request], str] = lambda module, request: ""
     kinked: float = 1.0
@@ -44,17 +42,17 @@ def _constrained(module: Module, request: Request) -> str:
             "coordinates that need no constraints")
 
 
-def _switching(module: Module) -> str:
-    """Why steps of high order go wrong without a sign of it; empty if the right-hand side is smooth."""
+def _switching(module: Module, so: str) -> str:
+    """Why steps of high order go wrong without a sign of it, and what follows, `so`; empty if the right-hand side is smooth."""
     reason = module.metadata.get("not_smooth", "")
-    return f"{reason}, and has no Taylor series there; use method='{DEFAULT}'" if reason else ""
+    return f"{reason}, {so}; use method='{DEFAULT}'" if reason else ""
 
 
 def _not_expanded(module: Module, request: Request) -> str:
     """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
     if request.inputs.function is not None or request.inputs.table is not None:
         return f"inputs that vary have no Taylor series; use method='{DEFAULT}', or write them as expressions of the time t"
-    return _switching(module)
+    return _switching(module, "and has no Taylor series there")
 
 
 def _not_collocated(module: Module, request: Request) -> str:
@@ -62,18 +60,14 @@ def _not_collocated(module: Module, request: Request) -> str:
     if request.inputs.has_kinks:
         return (f"inputs by a table have a kink at each of its times, which constant steps go across; use method='{DEFAULT}', "
                 "a smooth function of t and x, or expressions of the time t")
-    return _constrained(module, request) or _switching(module)
+    return _constrained(module, request) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
 COMPILED = {m.name: m for m in (
-    CompiledMethod("dop853", "explicit, order 8: tolerances of 1e-6 to 1e-13"),
-    CompiledMethod("bs54", "explicit, order 5: tolerances from 1e-5 on"),
-    CompiledMethod("gauss", "symmetric, order 16, constant steps: very long conservative motion", unfit=_not_collocated),
-    CompiledMethod("taylor", "series by recurrences: short right-hand sides, smallest errors", unfit=_not_expanded),
+    CompiledMethod("dop853"), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
+    CompiledMethod("taylor", unfit=_not_expanded),
     # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
-    CompiledMethod("radau", "implicit, order 9, with the exact Jacobian: stiff systems", ("jacobian_x",), kinked=0.01),
-    CompiledMethod("radau5", "implicit, order 5, with the exact Jacobian: stiff systems, loose tolerances", ("jacobian_x",),
-                   kinked=0.01),
+    CompiledMethod("radau", ("jacobian_x",), kinked=0.01), CompiledMethod("radau5", ("jacobian_x",), kinked=0.01),
 )}
 
 

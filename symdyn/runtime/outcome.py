@@ -50,6 +50,7 @@ class Outcome:
 
     happened   events in order: which, when, the state (n_x,) just before
     doubt      what to warn of in a run that went on
+    cause      what a function of the user raised, if that ended the run
     """
 
     t: np.ndarray
@@ -66,3 +67,4 @@ class Outcome:
     n_jacobians: int = 0
     n_factorizations: int = 0
     doubt: str = ""
+    cause: BaseException | None = None

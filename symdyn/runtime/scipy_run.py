@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from symdyn.runtime.events import Locator
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
@@ -26,8 +28,13 @@ def solver_class_of(module: Module, method: Any) -> Any:
 
     if isinstance(method, str):
         if method not in _SCIPY:
-            raise ArgumentError(f"{module.name}: there is no method {method!r}; there are {', '.join(COMPILED)} (compiled), "
-                                f"{', '.join(_SCIPY)}, ggl (with constraints), or pass an OdeSolver class")
+            known = [*COMPILED, "auto", *_SCIPY, "ggl"]
+            alike = difflib.get_close_matches(method.lower(), [name.lower() for name in known], 3)
+            near = [name for name in known if name.lower() in alike]
+            hint = f", did you mean {' or '.join(near)}? There are" if near else "; there are"
+            raise ArgumentError(f"{module.name}: there is no method {method!r}{hint} {', '.join(COMPILED)} (compiled), "
+                                f"{', '.join(_SCIPY)} (SciPy), auto (chooses one of them), ggl (with constraints), or pass an "
+                                "OdeSolver class")
         return getattr(integrate, method)
     if isinstance(method, type) and issubclass(method, integrate.OdeSolver):
         return method
@@ -53,16 +60,15 @@ class Field:
         self.n_in = len(request.inputs.constant)
         self.trouble: list[str] = []
         self.failed: list[tuple[float, np.ndarray]] = []  # where
-        self.raised: list[Exception] = []  # by functions of the user
+        self.cause: BaseException | None = None  # what a function of the user raised there
+        self.misfit: ArgumentError | None = None  # what one of inputs returned that does not fit
 
     def given(self, t: float, x: np.ndarray) -> Any:
         """Inputs at a state of the mechanism."""
-        if not self.n_in:
-            return ()
         try:
-            return self.request.inputs.at(t, x)
-        except Exception as error:
-            self.raised.append(error)
+            return self.request.inputs.at(t, x) if self.n_in else ()
+        except ArgumentError as error:
+            self.misfit = error
             raise
 
     def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -71,10 +77,15 @@ class Field:
             return self.evaluator.one(t, x, inputs)
         except EvaluationError as error:
             if np.isfinite(x).all():
-                told = not_finite(self.module.metadata["inputs"], inputs, t)
-                self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + told)
+                self.note(error, t, inputs)
                 self.failed[:] = [(t, x.copy())]
             return np.full(len(x), np.nan)
+
+    def note(self, error: EvaluationError, t: float, inputs: Any) -> None:
+        """Keep why an evaluation failed."""
+        told = not_finite(self.module.metadata["inputs"], inputs, t)
+        self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + told)
+        self.cause = error.__cause__
 
     def jacobian(self, t: float, x: np.ndarray) -> np.ndarray:
         """Exact; the work, if it is integrated too, is one more row, and nothing depends on it."""
@@ -117,6 +128,8 @@ class Run:
         self.ts, self.xs = [self.here], [self.state]
         self.pending = list(request.times[1:]) if request.times is not None else []
         self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0, 0), "", False
+        self.cause: BaseException | None = None  # as in Outcome
+        self.raised: InputRaised | None = None
         self.solver: Any = None
         self.dense: Any = None
 
@@ -140,7 +153,7 @@ class Run:
         if self.projector is not None:
             self.xs[0] = self.state = self.projector(t0, self.request.x0)
         if not np.isfinite(self.field(t0, self.state)).all():  # SciPy would look for a first step for ever
-            raise EvaluationError(self.field.trouble[-1])
+            raise EvaluationError(self.field.trouble[-1]) from self.field.cause
         self.solver = self.solver_class(self.field, t0, self.state, t_end, **self.options)
         if self.locator is not None:
             self.locator.begin(t0, self.state, self.field(t0, self.state), 1e-9 * (t_end - t0))
@@ -172,7 +185,7 @@ class Run:
 
     def _why_failed(self, note: str | None) -> str:
         if self.field.trouble:
-            why = self.field.trouble[-1]
+            why, self.cause = self.field.trouble[-1], self.field.cause
         elif note:
             state = self.state[:self.request.n_state]
             why = note.rstrip(".") + nearly_singular(self.module, self.here, state, self.request.p)
@@ -219,9 +232,7 @@ class Run:
                     return None
                 left = at
         except (EvaluationError, ProjectionFailed) as error:
-            if error in self.field.raised:
-                raise
-            locator.failed = str(error).removeprefix(f"{self.module.name}: ")
+            locator.failed, self.cause = str(error).removeprefix(f"{self.module.name}: "), error.__cause__
             trusted = locator.known
             return _Cut(trusted, start if trusted == begun else self.between(trusted), None)
         return None
@@ -261,7 +272,11 @@ class Run:
     def outcome(self, interrupted: bool) -> Outcome:
         done = not self.message or self.over
         n = min(len(self.ts), len(self.xs))  # an interrupt may come between the two
-        message = self.message if done else describe_stop(self.metadata, self.here, self.state, self.message)
+        message = self.message
+        if self.raised is not None:  # where the function was called, as in C
+            message = describe_stop(self.module.metadata, self.raised.t, self.raised.x, message)
+        elif not done:
+            message = describe_stop(self.metadata, self.here, self.state, message)
         t, x = np.array(self.ts[:n]), np.array(self.xs[:n])
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
@@ -269,7 +284,7 @@ class Run:
         return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, rejected, evaluations,
                        corrections=self.projector.corrections if self.projector is not None else Corrections(),
                        happened=self.locator.happened if self.locator is not None else (),
-                       n_jacobians=jacobians, n_factorizations=factorizations)
+                       n_jacobians=jacobians, n_factorizations=factorizations, cause=self.cause)
 
     def _used(self) -> tuple[int, int, int, int]:
         """Rejected steps where the solver counts them, evaluations, Jacobians and factorizations, of all solvers so far."""
@@ -292,10 +307,14 @@ class Run:
             interrupted, self.message = True, "interrupted"
         except ProjectionFailed as error:
             self.message = str(error) + self.dependent()
+        except InputRaised as error:
+            self.raised, self.cause, self.message = error, error.__cause__, str(error)
         except (ValueError, ArithmeticError) as error:
-            if error in self.field.raised:
+            if error is self.field.misfit:
                 raise
-            self.message = (self.field.trouble[-1] if self.field.trouble else str(error)) + self.dependent()
+            known = bool(self.field.trouble)
+            self.cause = self.field.cause if known else error.__cause__
+            self.message = (self.field.trouble[-1] if known else str(error)) + self.dependent()
         return self.outcome(interrupted)
 
 

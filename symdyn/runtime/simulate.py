@@ -51,7 +51,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol
     method      compiled: one of symdyn.runtime.methods.COMPILED: "dop853" (default with the C backend), "bs54" for loose
                 tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very
-                long conservative motion (with first_step all its steps have that length, and tolerances do not count); or one
+                long conservative motion (with first_step its steps have that length, but for some that a warning counts); or one
                 of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
                 Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit
                 method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and constraints;
@@ -67,7 +67,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
 
     Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
-    and why, and a SimulationWarning is given. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
+    and why, and a SimulationWarning is given. What a function of the user raises ends a run like that, and is its `cause`.
+    Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
     Raises ArgumentError for values that do not fit.
     """
     metadata = module.metadata

@@ -34,6 +34,7 @@ class Solution:
 
     t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
     success, message    whether the end was reached, and if not when, where and why
+    cause    the exception by which a function of the user ended the motion, with its traceback; else None
     n_steps, n_rejected, nfev   of the integrator; njev, nlu: Jacobians and factorizations of implicit methods
     seconds, integrator_seconds   wall time of the call, and inside compiled code
     tolerances    relative, and the largest absolute one, if they are known
@@ -48,7 +49,7 @@ class Solution:
         self.t = outcome.t
         self.x = outcome.x[:, :-1] if work else outcome.x
         self._work = outcome.x[:, -1] if work else None
-        self.success, self.message = outcome.success, outcome.message
+        self.success, self.message, self.cause = outcome.success, outcome.message, outcome.cause
         self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
         self.njev, self.nlu = outcome.n_jacobians, outcome.n_factorizations
         self.integrator_seconds = outcome.seconds
@@ -137,7 +138,7 @@ class Solution:
 
     @cached_property
     def inputs(self) -> np.ndarray:
-        """The inputs at every time, (n_t, n_in)."""
+        """The inputs at every time, (n_t, n_in); not a number where a function of the user raises."""
         rows = self._inputs.rows(self.t, self.x)
         return np.broadcast_to(rows, (len(self.t), rows.shape[1]))
 

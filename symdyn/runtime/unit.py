@@ -20,6 +20,7 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler
+from symdyn.runtime.raised import in_prologue, raise_by_text
 
 NOT_FINITE = -1
 
@@ -87,7 +88,7 @@ class CUnit:
         """Compute the constants. Raises EvaluationError if they cannot be."""
         code = self.function("prologue")(ctypes.c_void_p(p.ctypes.data), ctypes.c_void_p(c.ctypes.data))
         if code:
-            raise EvaluationError(f"{self.metadata['name']}: {self.reason(code)}; check the parameters")
+            raise EvaluationError(f"{self.metadata['name']}: {self.reason(code)}; {check_parameters(self.metadata, p)}")
         if not np.isfinite(c).all():
             raise EvaluationError(f"{self.metadata['name']}: {np.count_nonzero(~np.isfinite(c))} of the constants that "
                                   "depend on parameters only are not finite; check for a division by a zero parameter")
@@ -137,10 +138,8 @@ class CEvaluator:
         frame = Frame(n, *[a.ctypes.data for a in (*arrays, self.p, self.c, out)], *[int(len(a) > 1) for a in arrays], 0)
         code = self.unit.function(f"{self.name}_rows")(ctypes.byref(frame))
         if code:
-            k = frame.failed
-            raise EvaluationError(failure(self.unit.metadata, self.name, self.unit.reason(code),
-                                          arrays[0][min(k, len(arrays[0]) - 1)], arrays[1][min(k, len(arrays[1]) - 1)])
-                                  + (f" (row {k} of {n})" if n > 1 else ""))
+            raise EvaluationError(failure_of_row(self.unit.metadata, self.name, self.unit.reason(code), arrays[0], arrays[1],
+                                                 frame.failed, n))
         return out.reshape(n, *self.shape)
 
     def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
@@ -181,18 +180,44 @@ class PythonUnit:
     def evaluator(self, name: str) -> PythonEvaluator:
         return PythonEvaluator(self, name)
 
+    def evaluate(self, name: str, *arguments: Any) -> np.ndarray:
+        """A function at one state or at rows of states; arguments as those of the module's own `evaluate`.
+
+        Raises EvaluationError from what the text of a user's function raises; ArithmeticError or ValueError where the function
+        cannot be evaluated.
+        """
+        try:
+            result: np.ndarray = self.module.evaluate(name, *arguments)
+            return result
+        except Exception as error:
+            raise_by_text(error)
+            raise
+
     def broadcast(self, name: str, t: np.ndarray, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """A function that gives rows, at t (n,), x (n, n_x), parameters (n, n_p) and inputs (n, n_in): (n, n_out).
 
-        Raises ArithmeticError or ValueError where a single state cannot be evaluated.
+        Raises the module's SingularError, which tells the rows, where single ones cannot be evaluated; ArithmeticError or
+        ValueError where it is not known which.
         """
         sizes = self.metadata["sizes"]
         x, p, inputs = (a.T for a in (x, p, inputs))
         q, u, z = np.split(x, np.cumsum([sizes["q"], sizes["u"]]))
         many = self.module._MANY
         with np.errstate(all="ignore"):
-            result = many[name](t, q, u, z, np.zeros((sizes["ud"], 1)), inputs, p, many["prologue"](p))
+            try:
+                result = many[name](t, q, u, z, np.zeros((sizes["ud"], 1)), inputs, p, many["prologue"](p))
+            except Exception as error:
+                raise_by_text(error)
+                raise
             return np.stack([np.broadcast_to(r, t.shape) for r in result], axis=-1)
+
+
+class RowsError(Exception):
+    """Why some of many rows cannot be evaluated; first: of these rows the first."""
+
+    def __init__(self, why: str, failed: np.ndarray) -> None:
+        super().__init__(why)
+        self.first = int(np.argmax(failed))
 
 
 class PythonEvaluator:
@@ -219,32 +244,59 @@ class PythonEvaluator:
         n = _rows((t, x, inputs, ud))
         rows = [np.broadcast_to(a, (n, *np.shape(a)[1:])) for a in (t, x, inputs, ud)]
         with np.errstate(all="ignore"):
-            return self._evaluate(*rows)
+            try:
+                return self._evaluate(*rows)
+            except RowsError as error:
+                why, first = str(error), error.first
+            while first:  # as with C the first row that fails is told; one before it may fail later on
+                try:
+                    self._evaluate(*[a[:first] for a in rows])
+                    break
+                except RowsError as error:
+                    why, first = str(error), error.first
+        raise EvaluationError(failure_of_row(self.unit.metadata, self.name, why, rows[0], rows[1], first, n))
 
     def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
         sizes = self.unit.metadata["sizes"]
         rows = [np.atleast_2d(np.asarray(a, dtype=float)) for a in (x, inputs, np.zeros(sizes["ud"]))]
         with np.errstate(all="ignore"):
             try:
-                result: np.ndarray = self.unit.module.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
+                result: np.ndarray = self.unit.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
             except (ArithmeticError, ValueError):
                 result = np.full(self.unit.metadata["shapes"][self.name], np.nan)
         return result
 
     def _evaluate(self, t: Any, x: Any, inputs: Any, ud: Any) -> np.ndarray:
         try:
-            result: np.ndarray = self.unit.module.evaluate(self.name, t, x, self.p, inputs, ud)
+            result = self.unit.evaluate(self.name, t, x, self.p, inputs, ud)
         except (ArithmeticError, ValueError) as error:
-            raise EvaluationError(failure(self.unit.metadata, self.name, str(error), t, x)) from None
-        if not np.isfinite(result).all():
-            raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
-        return result
+            if np.ndim(x) > 1 and len(x) and isinstance(error, self.unit.module.SingularError):
+                raise RowsError(str(error), np.broadcast_to(error.states, len(x))) from None
+            why = f"; {check_parameters(self.unit.metadata, self.p)}" if in_prologue(error) else ""
+            raise EvaluationError(failure(self.unit.metadata, self.name, f"{error}{why}", t, x)) from error.__cause__
+        if np.isfinite(result).all():
+            return result
+        if np.ndim(x) > 1:
+            raise RowsError("the result is not finite", ~np.isfinite(result).reshape(len(x), -1).all(axis=1))
+        raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
+
+
+def check_parameters(metadata: Mapping[str, Any], p: Sequence[float] | np.ndarray) -> str:
+    """What to do where what depends on parameters only cannot be computed; those that are 0 are the first to look at."""
+    zero = [name for name, value in zip(metadata["parameters"], p, strict=False) if value == 0]
+    return "check the parameters" + (f", of which {', '.join(zero)} {'are' if len(zero) > 1 else 'is'} 0" if zero else "")
 
 
 def _rows(arrays: Sequence[np.ndarray]) -> int:
     """How many states there are: one row holds for all, and no row is no state."""
     lengths = [len(a) for a in arrays]
     return 0 if 0 in lengths else max(lengths)
+
+
+def failure_of_row(metadata: Mapping[str, Any], name: str, reason: str, t: np.ndarray, x: np.ndarray, k: int, n: int) -> str:
+    """The sentence for row k of n, where t and x have n rows or one for all."""
+    text = failure(metadata, name, reason, t[min(k, len(t) - 1)], x[min(k, len(x) - 1)])
+    return text + (f" (row {k} of {n})" if n > 1 else "")
 
 
 def failure(metadata: Mapping[str, Any], name: str, reason: str, t: Any, x: Any) -> str:

@@ -87,8 +87,7 @@ def _angles(subject: Subject, kind: str, d: float, sol: Any, truth: np.ndarray, 
         return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
                    PASS if sol.n_steps < 100 * usual or named else FAIL,
                    "the motion is right" if sol.n_steps < 100 * usual else "the motion is right, at many times the usual steps, "
-                   "which is "
-                   + ("told" if named else "not told"))
+                   f"which is {'told' if named else 'not told'}")
     return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
                DEGRADE if named else FAIL, "digits are lost near gimbal lock, and a warning says so" if named else
                "digits are lost near gimbal lock without a word")
@@ -128,11 +127,9 @@ def flips(short: bool) -> Iterator[Row]:
             yield Row("flips", subject.name, f"{method}: {periods} periods", None, None, "", FAIL, sol.message)
             continue
         yield within("flips", subject.name, f"{method}: {1.1 * periods:g} periods about the intermediate axis, {sol.n_steps} "
-                     "steps at "
-                     f"rtol {rtol:g}: angular velocity against elliptic functions (relative to 1 rad/s)", found, bound,
+                     f"steps at rtol {rtol:g}: angular velocity against elliptic functions (relative to 1 rad/s)", found, bound,
                      f"steps times their largest error ({local:.1g}, measured) times the derivative of the closed form by its "
-                     "start "
-                     f"({growth:.2g}), ten times for the place in a period where they are made",
+                     f"start ({growth:.2g}), ten times for the place in a period where they are made",
                      "the flips stay in time", "the flips are early or late")
 
 
@@ -200,10 +197,9 @@ def rotor(short: bool) -> Iterator[Row]:
     local = local_error(subject, end, rtol, scales, start)
     bound = sol.n_steps * (2 * local + 16 * EPS) * (1 + end)
     yield within("fast rotor", subject.name, f"rotor at 1e4 rad/s on a platform that precesses at {rate:.3g} rad/s, {end:g} s, "
-                 f"{sol.n_steps} steps: largest error of tilt and precession, rad", found, bound, f"steps times their largest "
-                 "error "
-                 f"({local:.1g}, measured), which nutation keeps and precession lets grow by 1 + t", "the platform precesses "
-                 "steadily, as it must", "the platform leaves its steady precession")
+                 f"{sol.n_steps} steps: largest error of tilt and precession, rad", found, bound, "steps times their largest "
+                 f"error ({local:.1g}, measured), which nutation keeps and precession lets grow by 1 + t", "the platform "
+                 "precesses steadily, as it must", "the platform leaves its steady precession")
     energy = sol.energy_error()
     yield within("fast rotor", subject.name, "energy over the same motion, most of it the rotor's", energy,
                  sol.n_steps * (2 * local + 16 * EPS) * 2, "twice the error of the rotor's speed, in its scale",

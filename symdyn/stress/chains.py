@@ -69,20 +69,17 @@ def chaos(short: bool) -> Iterator[Row]:
         steps = run.n_steps * np.arange(1, len(error) + 1)[::10] / len(error)
         share = float((error[::10] / (steps * local * most + 1e-300)).max())
         yield within("chaos", subject.name, f"{label}, run at rtol {rtol:g}, {run.n_steps} steps: largest error over what may "
-                     "have grown "
-                     "from errors of steps", share, 1.0, "errors the step control allows, summed over steps and magnified as "
-                     "the exact "
-                     "Jacobian tells", "errors grow no faster than they must", "errors grow faster than the motion magnifies")
+                     "have grown from errors of steps", share, 1.0, "errors the step control allows, summed over steps and "
+                     "magnified as the exact Jacobian tells", "errors grow no faster than they must",
+                     "errors grow faster than the motion magnifies")
         # And as fast: once they exist they are magnified.
         k = 10 * (len(error) // 40)
         rate = math.log(max(error[-1], 1e-300) / max(error[k], 1e-300)) / float(sol.t[-1] - sol.t[2 * k])
         wanted = math.log(np.linalg.norm(phi[-1] @ inverse[k // 10], 2)) / float(sol.t[-1] - sol.t[2 * k])
         slack = math.log(run.n_steps) / float(sol.t[-1] - sol.t[2 * k])
         yield within("chaos", subject.name, f"{label}, run at rtol {rtol:g}: rate of growth {rate:.2g} 1/s over the last three "
-                     "quarters, "
-                     f"of the variational equations {wanted:.2g}: difference", abs(rate - wanted), slack, "logarithm of the "
-                     "number of "
-                     "steps, whose errors point anywhere, over the time", "errors grow at the rate of the variational equations",
-                     "the rate is another")
+                     f"quarters, of the variational equations {wanted:.2g}: difference", abs(rate - wanted), slack,
+                     "logarithm of the number of steps, whose errors point anywhere, over the time",
+                     "errors grow at the rate of the variational equations", "the rate is another")
 
 

@@ -30,7 +30,6 @@ class Coded:
     hi, lo    values with 32 digits as sums of two doubles (n, size), NaN where there are none
     known     (n,), whether a first-order bound holds; divisors: (n,), the largest relative error of one
     comparable   which entries are compared together, and in what scale: see symdyn.stress.yardstick, together and weights
-    usual     (n,), whether the usual statements hold, not those for states where a check fails
     """
 
     def __init__(self, subject: Subject, statements: Sequence[Statements], rows: np.ndarray,
@@ -39,8 +38,7 @@ class Coded:
         n, size = true[0].shape
         self.labels, self.factors = comparable
         self.hi, self.lo = (part.copy() for part in true)
-        self.known, self.usual = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
-        self.divisors = np.zeros(n)
+        self.known, self.divisors = np.zeros(n, dtype=bool), np.zeros(n)
         self._bounds = {backend: np.full((n, size), np.inf) for backend in ("c", "numpy")}
         todo = np.arange(n)
         for one in statements:
@@ -52,7 +50,6 @@ class Coded:
                 holds = todo[~found.failed]
                 found_there = exactly_as_written(subject, one.tape, rows[holds], params)
                 self.hi[holds], self.lo[holds] = halves(found_there, size)
-            self.usual[todo[found.failed]] = False
             todo = todo[found.failed]
 
     def _take(self, found: FirstOrder, where: np.ndarray) -> None:

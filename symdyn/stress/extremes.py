@@ -11,16 +11,16 @@ import numpy as np
 
 from symdyn.errors import SymdynError
 from symdyn.stress.finding import Finding, first_order_row, judged
-from symdyn.stress.flow import Path, flow, growth_to
-from symdyn.stress.motion import MAGNIFIED, reversible
-from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
+from symdyn.stress.flow import Path, demand_motion, flow, growth_to, path
+from symdyn.stress.motion import MAGNIFIED, energy_row, reversible
+from symdyn.stress.record import DEGRADE, FAIL, PASS, MotionStops, NotApplicable, Row, within
 from symdyn.stress.rounding import FEW, Measured, states
 from symdyn.stress.statements import emitted
 from symdyn.stress.subject import EPS, RTOL, Subject
 
 RATIOS = tuple(10.0**k for k in range(-8, 9, 2))
-# A run that is stopped after so many steps takes too many.
-STEPS = 20_000
+# A run that is stopped after so many steps takes too many; a short one has so many.
+STEPS, SHORT = 20_000, 300
 
 
 def steps(subject: Subject, short: bool) -> Iterator[Row]:
@@ -76,8 +76,10 @@ def denormals(subject: Subject, short: bool) -> Iterator[Row]:
         changed = start + 5e-324
     end = subject.duration / 20
     one, two = (subject.run((0.0, end), x, max_steps=STEPS) for x in (start, changed))
+    if not one.success:
+        raise MotionStops(float(one.t[-1]), end, one.message)
     size = max(float(np.abs(one.x).max()), 1e-300)
-    found = float(np.abs(one.x[-1] - two.x[-1]).max()) / size if one.success and two.success else float("inf")
+    found = float(np.abs(one.x[-1] - two.x[-1]).max()) / size if two.success else float("inf")
     # Denormals differ from zero by 1e-323, whatever the motion magnifies by.
     yield within("denormals", subject.name, f"zeros of the start are 5e-324 instead, {end:g} s: largest difference at the end",
                  found, 1e-12, "a change of 5e-324 may change roundings of the last place only, and where these select steps "
@@ -86,7 +88,7 @@ def denormals(subject: Subject, short: bool) -> Iterator[Row]:
 
 
 def masses(subject: Subject, short: bool) -> Iterator[Row]:
-    """Ratios of masses from 1e-8 to 1e8: accelerations against 30 digits, and a motion."""
+    """Ratios of masses from 1e-8 to 1e8: accelerations against 30 digits, and a short motion with its energy at both ends."""
     units, names = subject.module.metadata["units"], subject.module.metadata["parameters"]
     heavy = [k for unit in ("kg", "kg m^2") for k in [i for i, n in enumerate(names) if units.get(n) == unit][1::2]]
     if len(heavy) == 0 or sum(units.get(n) == "kg" for n in names) < 2:
@@ -115,6 +117,34 @@ def masses(subject: Subject, short: bool) -> Iterator[Row]:
     if every:
         yield from first_order_row(subject, f"accelerations at {FEW} states for each ratio of masses", every, "ratios",
                                    FEW * len(every))
+    nothing: list[str] = []
+    for ratio in (RATIOS[0], RATIOS[-1]):
+        try:
+            yield _short_motion(subject, heavy, ratio)
+        except NotApplicable as reason:
+            nothing.append(str(reason))
+    if nothing:
+        raise NotApplicable(f"of motions: {'; '.join(dict.fromkeys(nothing))}")
+
+
+def _short_motion(subject: Subject, heavy: list[int], ratio: float) -> Row:
+    """The energy of a motion of at most SHORT steps, a tenth of the duration, with masses so many times as large, which may make
+    it stiff."""
+    p = subject.params.copy()
+    p[heavy] *= ratio
+    other, end = subject.changed(p, "auto"), subject.duration / 10
+    done = f"motion with {len(heavy)} masses and inertias times {ratio:g}: "
+    first = other.run((0.0, end), rtol=RTOL, steps=True, max_steps=SHORT)
+    try:
+        if not first.success and first.n_steps < SHORT:
+            raise MotionStops(float(first.t[-1]), end, first.message)
+        demand_motion(other, first)
+        return energy_row(other, path(other, float(first.t[-1])), "mass ratios", done)
+    except MotionStops as stop:
+        named = "stopped at t =" in stop.told and "state there" in stop.told
+        return Row("mass ratios", subject.name, f"{done}{stop.told}", None, None, "", DEGRADE if named else FAIL,
+                   "such masses lead where the description does not reach; it stops with time, state and reason" if named else
+                   "the message lacks time, state or reason")
 
 
 def inputs(subject: Subject, short: bool) -> Iterator[Row]:

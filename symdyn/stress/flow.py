@@ -11,13 +11,15 @@ import numpy as np
 from scipy.linalg import expm
 
 from symdyn.runtime.solution import Solution
-from symdyn.stress.record import MotionStops, NotApplicable
+from symdyn.stress.record import MotionStops, NotApplicable, StandsStill
 from symdyn.stress.subject import RTOL, Subject
 
 # Intervals of the variational equations; more operations than this make no Jacobian to be compiled.
 INTERVALS = 400
 PER_STEP, MOST = 4, 4000
 LONGEST = 3000
+# A smaller motion than this part of the mechanism is one of errors of steps, or leaves them no two digits.
+STILL = 100 * RTOL
 # Steps whose errors are measured, among the first so many, and the tolerance of what they are compared with.
 MEASURED, MEASURED_AMONG, FINE = 40, 20_000, 1e-14
 
@@ -67,6 +69,24 @@ def path(subject: Subject, end: float, rtol: float = RTOL, resolved: bool = Fals
     if not sol.success:
         raise MotionStops(float(sol.t[-1]), end, sol.message)
     return Path(sol, scales, rtol, local_error(subject, end, rtol, scales))
+
+
+def stands_still(subject: Subject, x: np.ndarray) -> bool:
+    """Whether no coordinate changes over rows of states, of a run at RTOL or thereabouts, by more than errors of steps may make
+    up: STILL of the largest value of its unit, of 1 rad, or of the longest parameter in metres."""
+    module = subject.module
+    known, params = module.metadata["units"], zip(module.metadata["parameters"], subject.params, strict=True)
+    longest = max((abs(float(p)) for name, p in params if known.get(name) == "m"), default=1.0)
+    n_q, n_u = (module.metadata["sizes"][k] for k in "qu")
+    least = np.array([longest if known.get(name) == "m" else 1.0 for name in module.metadata["x"]])
+    change = np.ptp(x, axis=0) <= STILL * np.maximum(scales_of(subject, x), least)
+    return bool(np.delete(change, slice(n_q, n_q + n_u)).all())  # rounding alone gives speeds beside those that are zero
+
+
+def demand_motion(subject: Subject, sol: Solution) -> None:
+    """Raises StandsStill if nothing moves."""
+    if stands_still(subject, sol.x):
+        raise StandsStill(float(sol.t[-1]))
 
 
 def local_error(subject: Subject, end: float, rtol: float, scales: np.ndarray, start: np.ndarray | None = None,

@@ -68,8 +68,7 @@ def energy_drift(short: bool) -> Iterator[Row]:
             continue
         if method == "gauss":
             yield within("energy drift", subject.name, done, sol.energy_error(), 1e-13, "symmetric, symplectic steps keep "
-                         "energy but "
-                         "for rounding, which compensated summation keeps from adding up: a few hundred roundings",
+                         "energy but for rounding, which compensated summation keeps from adding up: a few hundred roundings",
                          "energy does not drift")
             continue
         scales = np.abs(one.x).max(axis=0)
@@ -77,9 +76,9 @@ def energy_drift(short: bool) -> Iterator[Row]:
         gradient = float(np.linalg.norm(scales)) * 2 * 9.81
         size, _ = sol.energy_scale
         bound = sol.n_steps * (2 * local + 8 * EPS) * max(gradient, size) / size
-        yield within("energy drift", subject.name, done, sol.energy_error(), bound, f"steps times their largest error "
-                     f"({local:.1g}, "
-                     "measured) and roundings, all to one side", "energy drifts no faster than errors of steps add up")
+        yield within("energy drift", subject.name, done, sol.energy_error(), bound, "steps times their largest error "
+                     f"({local:.1g}, measured) and roundings, all to one side",
+                     "energy drifts no faster than errors of steps add up")
 
 
 # -- stiffness

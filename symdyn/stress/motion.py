@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from symdyn.runtime.solution import Solution
-from symdyn.stress.flow import Path, flow, growth_back, path
+from symdyn.stress.flow import Path, demand_motion, flow, growth_back, path
 from symdyn.stress.record import DEGRADE, FAIL, PASS, MotionStops, NotApplicable, Row, within
 from symdyn.stress.subject import EPS, RTOL, Subject
 
@@ -26,10 +26,19 @@ def _end(subject: Subject, short: bool) -> float:
 
 def energy(subject: Subject, short: bool) -> Iterator[Row]:
     """The energy of the usual motion, less the work of its loads."""
+    motion = path(subject, _end(subject, short))
+    demand_motion(subject, motion.sol)
+    yield energy_row(subject, motion)
+
+
+def energy_row(subject: Subject, motion: Path, check: str = "energy", of: str = "") -> Row:
+    """The row of the energy of a motion; of: what is said before.
+
+    Raises NotApplicable where there is none, MotionStops where a motion at other times stops early.
+    """
     if not subject.has("energy"):
         raise NotApplicable("the equations tell no energy")
     conservative = bool(subject.module.metadata["conservative"])
-    motion = path(subject, _end(subject, short))
     end = float(motion.sol.t[-1])
     sol = subject.run(np.linspace(0.0, end, 401), rtol=RTOL, atol=RTOL * motion.scales, work=not conservative)
     if not sol.success:
@@ -42,11 +51,10 @@ def energy(subject: Subject, short: bool) -> Iterator[Row]:
     per_step = motion.step_error * (2 if subject.constrained else 1) + 8 * operations * EPS
     own = 16 * EPS * subject.equations.tape("energy").longest_chain() * float(np.abs(sol.energies).sum(axis=1).max())
     bound = (sol.n_steps * per_step * steepest + own) / size
-    yield within("energy", subject.name, f"{end:g} s in {sol.n_steps} steps at rtol {RTOL:g}: change of energy less work of "
-                 "loads",
-                 sol.energy_error(), bound, "steps times the error one may have times the gradient of the energy, over the "
-                 "energy",
-                 "energy is kept as the tolerances promise", "energy is lost or gained beyond what the tolerances allow")
+    return within(check, subject.name, f"{of}{end:.3g} s in {sol.n_steps} steps at rtol {RTOL:g}: change of energy less work of "
+                  "loads", sol.energy_error(), bound, "steps times the error one may have times the gradient of the energy, over "
+                  "the energy", "energy is kept as the tolerances promise",
+                  "energy is lost or gained beyond what the tolerances allow")
 
 
 def energy_gradient(subject: Subject, sol: Solution, scales: np.ndarray) -> float:
@@ -69,6 +77,7 @@ def constraints(subject: Subject, short: bool) -> Iterator[Row]:
     if not subject.constrained:
         raise NotApplicable("there are no constraints")
     sol = path(subject, _end(subject, short)).sol
+    demand_motion(subject, sol)
     done = f"{sol.t[-1]:g} s in {sol.n_steps} steps, at {len(sol.t)} times"
     far = float(np.abs(sol.q).max())
     yield within("constraints", subject.name, f"{done}: residuals of constraints over the length",
@@ -133,8 +142,7 @@ def divergence(subject: Subject, short: bool) -> Iterator[Row]:
     parts = (float(np.linalg.norm(wanted - coarse)), bent, 2 * runs[0].n_steps * grown * allowed)
     yield within("divergence", subject.name,
                  f"a change of {size:.1g} of the start, after {times[-1]:.3g} s {np.linalg.norm(apart) / size:.3g} times as "
-                 "large: "
-                 "difference from the variational equations with the exact Jacobian, over the largest magnification",
+                 "large: difference from the variational equations with the exact Jacobian, over the largest magnification",
                  found, sum(parts) / (size * grown), "the variational equations' own error (from intervals twice as long), the "
                  "change's higher orders (from twice the change), errors of steps", "small changes grow as they must",
                  "the Jacobian is not that of the motion")
@@ -154,8 +162,8 @@ def condition(subject: Subject, short: bool) -> Iterator[Row]:
     text = "of the constrained system" if subject.constrained else "of the mass matrix"
     verdict = PASS if lost <= 1e-8 else DEGRADE
     yield Row("condition", subject.name, f"condition {text}, rows and columns scaled, at {len(worst)} states of "
-              f"{motion.sol.t[-1]:g} "
-              f"s: {worst.min():.2g} to {most:.2g}; times rounding of the longest chain of {chain} operations", lost, 1e-8,
+              f"{motion.sol.t[-1]:g} s: {worst.min():.2g} to {most:.2g}; times rounding of the longest chain of {chain} "
+              "operations", lost, 1e-8,
               "accelerations that keep the usual tolerance of 1e-8", verdict,
               "accelerations have the digits that the usual tolerance needs" if verdict == PASS else
               "the mechanism itself is ill-conditioned: accelerations have fewer digits than the usual tolerance asks for")
@@ -164,12 +172,14 @@ def condition(subject: Subject, short: bool) -> Iterator[Row]:
 def reversible(subject: Subject, short: bool, both: bool = True) -> tuple[Path, np.ndarray, int]:
     """The motion, its magnification back to the start, and the place up to which that stays below MAGNIFIED."""
     end = _end(subject, short)
-    for _ in range(6):
+    for k in range(6):
         motion = path(subject, end, resolved=True)
+        if k == 0:
+            demand_motion(subject, motion.sol)
         back = growth_back(flow(subject, motion)) if both else np.ones(1)
-        k = int(np.flatnonzero(back <= MAGNIFIED)[-1])
-        if not both or k >= 40:
-            return motion, back, k
+        last = int(np.flatnonzero(back <= MAGNIFIED)[-1])
+        if not both or last >= 40:
+            return motion, back, last
         end /= 10
     raise NotApplicable("the motion forgets its start within a millionth of its duration")
 

@@ -21,18 +21,38 @@ LEGEND = {
     FAIL: "anything else",
 }
 _WIDTH = 118
+# Of a mechanism that begins in equilibrium, or has no forces and no speeds.
+STILL = "the motion stands still"
 
 
 class NotApplicable(Exception):
     """A check has nothing to look at here; the message tells why."""
 
 
-class MotionStops(NotApplicable):
-    """The usual motion of a mechanism stops early, so that it cannot be looked at; t: when, of its end, s; told: its message."""
+class NoUsualMotion(NotApplicable):
+    """The usual motion of a mechanism cannot be looked at; done, why: of the row that tells it once."""
+
+    def __init__(self, reason: str, done: str, why: str) -> None:
+        super().__init__(reason)
+        self.done, self.why = done, why
+
+
+class MotionStops(NoUsualMotion):
+    """It stops early; t: when, of its end, s; told: its message."""
 
     def __init__(self, t: float, end: float, told: str) -> None:
-        super().__init__(f"the usual motion stops early: {told}")
-        self.t, self.end, self.told = t, end, told
+        super().__init__(f"the usual motion stops early: {told}", f"the usual motion stops at t = {t:.9g} s, before {end:g} s: "
+                         f"{told}", "checks that need the whole of it are left out")
+        self.told = told
+
+
+class StandsStill(NoUsualMotion):
+    """Nothing moves until `end`, s, so that energy would be kept, and every end be the same, whatever the code did."""
+
+    def __init__(self, end: float) -> None:
+        super().__init__(f"{STILL}; set system.initial to a start from which it moves", f"{STILL}: no coordinate changes within "
+                         f"{end:g} s", "checks of a motion are left out, since they would pass whatever the code did; set "
+                         "system.initial to a start from which it moves, such as {q: 0.5, q.dot: 1}")
 
 
 @dataclass(frozen=True)
@@ -76,8 +96,8 @@ class StressReport:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all(row.verdict != FAIL for row in self.rows)
+        """Whether something was looked at, and nothing failed."""
+        return bool(self.rows) and all(row.verdict != FAIL for row in self.rows)
 
     def count(self) -> dict[str, int]:
         """How many rows of each verdict."""
@@ -95,7 +115,8 @@ class StressReport:
         """One line."""
         counted = ", ".join(f"{n} {verdict}" for verdict, n in self.count().items())
         begun = f"unfinished: {self.unfinished}; " if self.unfinished else ""
-        return f"{begun}{len(self.rows)} rows: {counted}; {len(self.left_out)} left out; {self.seconds:.0f} s"
+        none = "" if self.rows or self.unfinished else "nothing was looked at, which does not count as passed: "
+        return f"{none}{begun}{len(self.rows)} rows: {counted}; {len(self.left_out)} left out; {self.seconds:.0f} s"
 
     def save(self, path: object) -> Path:
         """Write .json (all of it), .txt (the table) or .html (one page); returns the path.
@@ -140,8 +161,8 @@ def told(row: Row) -> str:
     """A row as text of several lines."""
     head = f"{row.verdict:8}{row.check:19}{row.system:35}{number(row.figure):>10}{number(row.bound):>10}"
     wrapped = textwrap.TextWrapper(_WIDTH, initial_indent=" " * 8, subsequent_indent=" " * 10)
-    rest = [row.done, f"bound: {row.origin}" if row.origin else "", row.why]
-    return "\n".join([head, *[wrapped.fill(text) for text in rest if text]])
+    rest = [row.done, f"bound: {row.origin}" if row.origin else "", *row.why.splitlines()]  # what a compiler says has lines
+    return "\n".join([head, *[wrapped.fill(text) for text in rest if text.strip()]])
 
 
 def number(value: float | None) -> str:

@@ -239,16 +239,9 @@ class Measured:
         self._subject = subject
 
     def run(self, evaluator: Any) -> np.ndarray:
-        """The function of generated code at the states, (n, size). Those that need other equations are run by themselves: the
-        NumPy backend takes these for all states if it has to for one."""
-        values = np.full(self.values.shape, np.nan)
-        usual = self.coded.usual if self.coded else np.ones(len(values), dtype=bool)
+        """The function of generated code at the states, (n, size)."""
         where = self.where
-        for rows in (usual, ~usual):
-            if rows.any():
-                values[rows] = evaluated(evaluator, where.t[rows], where.x[rows], self._subject.params, where.inputs[rows],
-                                         where.ud[rows])
-        return values
+        return evaluated(evaluator, where.t, where.x, self._subject.params, where.inputs, where.ud)
 
     def compared(self, values: np.ndarray, backend: str = "c") -> Finding:
         """Values of generated code (n, size) against these."""

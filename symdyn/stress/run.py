@@ -20,9 +20,9 @@ from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.progress import bar as progress_bar
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
-from symdyn.stress.record import DEGRADE, FAIL, Interrupted, MotionStops, NotApplicable, Row, StressReport
-from symdyn.stress.subject import Subject
-from symdyn.systems import get
+from symdyn.stress.record import DEGRADE, FAIL, Interrupted, NotApplicable, NoUsualMotion, Row, StressReport
+from symdyn.stress.start import start
+from symdyn.stress.subject import Subject, named
 from symdyn.systems import names as catalogue
 
 # In the short form, where the whole catalogue would take too long.
@@ -64,24 +64,30 @@ CHECKS = {check.name: check for check in (
 )}
 
 
-def stress(system: Any = None, short: bool = False, checks: Sequence[str] | None = None, progress: bool = False,
+def stress(system: Any = None, short: bool = False, checks: str | Sequence[str] | None = None, progress: bool = False,
            jobs: int = 1, show: Callable[[Row], None] | None = None) -> StressReport:
     """Put a mechanism, or symdyn itself with its catalogue, under stress.
 
-    system     a System, Equations or the name of one of the catalogue, or a list of these; None: the catalogue, and the checks
-               that have mechanisms of their own
-    short      fewer states, systems and shorter runs: less than half a minute
-    checks     names of CHECKS; default: all that apply
-    progress   show a bar (needs tqdm); jobs: processes, for names of the catalogue and checks of their own
+    system     a System, Equations or a name that sd.bench takes, such as "four_bar" or "n_link_pendulum(3)", or a list of these;
+               None: the catalogue, and the checks that have mechanisms of their own
+    short      fewer states, systems and ratios, shorter runs, rounding of C code at -O0 only, and of checks that are not named
+               those that need no long time: less than half a minute
+    checks     name or names of CHECKS; default: all that apply
+    progress   show a bar (needs tqdm); jobs: processes, for names and checks of their own
     show       called with every row as soon as it is there
 
-    Returns a StressReport; `passed` is False if a row failed. A check that crashes is such a row.
-    Raises ArgumentError for an unknown check or something that is no mechanism, SymdynError for an unknown name; Interrupted, a
-    KeyboardInterrupt with the report of what is finished.
+    Motions begin in the system's initial state, moved onto its constraints, and last for its duration.
+    Returns a StressReport; `passed` is False if a row failed, or there is none. A check that crashes is such a row, and so is a
+    mechanism that cannot be compiled or evaluated at its start.
+    Raises ArgumentError for an unknown check or name, something that is no mechanism and parameters without numbers, ModelError
+    for a description with faults; Interrupted, a KeyboardInterrupt with the report of what is finished.
     """
     if isinstance(jobs, bool) or not isinstance(jobs, Integral) or jobs < 1:
         raise ArgumentError(f"jobs is {jobs!r}; pass a number of processes, 1 or more")
-    tasks = _tasks(system, short, _chosen(checks))
+    chosen = _chosen(checks)
+    if checks is None:  # those that are named are run wherever they can be
+        chosen = [check for check in chosen if (check.short or not short) and (check.of_system or system is None)]
+    tasks = _tasks(system, short, chosen)
     report, begun = StressReport(), clock.perf_counter()
     total, done = sum(len(names) for _, names, _ in tasks), 0
     bar = _bar(total) if progress else None
@@ -113,27 +119,38 @@ Result = tuple[list[Row], list[str], int]
 
 def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
     """What to run: a system ("" for none) with names of checks."""
-    own = tuple(c.name for c in chosen if not c.of_system and (c.short or not short))
-    of_system = tuple(c.name for c in chosen if c.of_system and (c.short or not short))
+    own = tuple(c.name for c in chosen if not c.of_system)
+    of_system = tuple(c.name for c in chosen if c.of_system)
     if system is not None:
         listed = list(system) if isinstance(system, (list, tuple)) else [system]
-        for one in listed:
-            if isinstance(one, str):
-                get(one)  # an unknown name is told before anything is run
-            elif not isinstance(one, (System, Equations, Subject)):
-                raise ArgumentError(f"stress was given {one!r}; pass a System, Equations, or the name of one of the catalogue")
-        if not of_system:
+        if not listed:
+            raise ArgumentError("stress was given no system; pass some, or leave out the argument for the catalogue")
+        if own:
             raise ArgumentError(f"the checks {', '.join(own)} have mechanisms of their own; leave out the system")
-        return [(one, of_system, short) for one in listed]
+        return [(_subject(one), of_system, short) for one in listed]
     listed = list(SHORT if short else catalogue())
     return [*[("", (name,), short) for name in own], *[(name, of_system, short) for name in listed if of_system]]
 
 
-def _chosen(names: Sequence[str] | None) -> list[Check]:
+def _subject(system: Any) -> str | Subject:
+    """A name, which a process can be given, or what is put under stress; what is wrong with it is told before anything is run."""
+    if isinstance(system, str):
+        named(system)
+        return system
+    if not isinstance(system, (System, Equations, Subject)):
+        raise ArgumentError(f"stress was given {system!r}; pass a System, Equations, or the name of one of the catalogue")
+    found = system if isinstance(system, Subject) else Subject(system)
+    found.demand_numbers()
+    return found
+
+
+def _chosen(names: str | Sequence[str] | None) -> list[Check]:
     if names is None:
         return list(CHECKS.values())
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        raise ArgumentError(f"checks is {names!r}; pass a list of names: {', '.join(CHECKS)}")
+    if isinstance(names, str):
+        names = [names]
+    if not isinstance(names, Iterable) or not (names := list(names)):
+        raise ArgumentError(f"checks is {names!r}; pass names of checks, or leave it out for all: {', '.join(CHECKS)}")
     unknown = [name for name in names if name not in CHECKS]
     if unknown:
         near = difflib.get_close_matches(str(unknown[0]), CHECKS, 3)
@@ -143,42 +160,40 @@ def _chosen(names: Sequence[str] | None) -> list[Check]:
 
 
 def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
-    """One check after the other. That the motion stops is told by the first one that looks at it."""
+    """One check after the other, of a mechanism after its start. What is wrong with its usual motion is told by the first one
+    that looks at it."""
     for system, names, short in tasks:
-        subject: Any = system
+        subject = None
+        if system != "":
+            subject = Subject(system) if isinstance(system, str) else system
+            begun = list(start(subject))
+            fit = all(row.verdict != FAIL for row in begun)
+            yield begun, [] if fit else [f"{', '.join(names)}, {subject.name}: it cannot be run"], 0 if fit else len(names)
+            if not fit:
+                continue
         told = False
         for name in names:
-            rows, left_out, subject = _one(subject, name, short)
+            rows, left_out = _one(subject, name, short)
             yield [row for row in rows if not (told and row.check == USUAL)], left_out, 1
             told = told or any(row.check == USUAL for row in rows)
-        if isinstance(subject, Subject) and subject.lacking:
-            yield [Row("numbers", subject.name, f"nothing was run: {', '.join(subject.lacking)} without a number", None, None, "",
-                       DEGRADE, "give every parameter a number in the system's `defaults`")], [], 0
 
 
-def _one(system: Any, name: str, short: bool) -> tuple[list[Row], list[str], Any]:
-    """Rows of a check, what it leaves out, and the subject for the next one. Whatever a check raises is a row."""
-    check, rows = CHECKS[name], []
-    label = system if isinstance(system, str) else getattr(system, "name", repr(system))
+def _one(subject: Subject | None, name: str, short: bool) -> tuple[list[Row], list[str]]:
+    """Rows of a check, and what it leaves out. Whatever a check raises is a row."""
+    check, rows, label = CHECKS[name], [], "-" if subject is None else subject.name
     try:
-        if check.of_system and not isinstance(system, Subject):
-            system = Subject(system)
-        label = system.name if isinstance(system, Subject) else "-"
-        if check.of_system and system.lacking:
-            raise NotApplicable(f"{', '.join(system.lacking)} without a number")
-        for row in check.run(system, short) if check.of_system else check.run(short):
+        for row in check.run(short) if subject is None else check.run(subject, short):
             rows.append(row)
     except NotApplicable as reason:
-        if isinstance(reason, MotionStops):
-            rows.append(Row(USUAL, str(label), f"the usual motion stops at t = {reason.t:.9g} s, before {reason.end:g} s: "
-                            f"{reason.told}", None, None, "", DEGRADE, "checks that need the whole of it are left out"))
-        return rows, [f"{name}, {label}: {reason}"], system
+        if isinstance(reason, NoUsualMotion):
+            rows.append(Row(USUAL, label, reason.done, None, None, "", DEGRADE, reason.why))
+        return rows, [f"{name}, {label}: {reason}"]
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(last.filename).name}:{last.lineno}"
-        rows.append(Row(name, str(label), f"{type(error).__name__} in {where}", None, None,
-                        "", FAIL, f"the check itself ended early: {error}"[:400]))
-    return rows, [], system
+        rows.append(Row(name, label, f"{type(error).__name__} in {where}", None, None,
+                        "", FAIL, f"the check itself ended early: {error}"))
+    return rows, []
 
 
 def _whole(task: Task) -> Result:
@@ -203,7 +218,7 @@ def _spread(tasks: Sequence[Task], jobs: int) -> Generator[Result]:
             try:
                 yield done.result()
             except Exception as error:  # the process itself died
-                died = Row(", ".join(names), str(system) or "-", "its process", None, None, "", FAIL, f"it died: {error}"[:400])
+                died = Row(", ".join(names), str(system) or "-", "its process", None, None, "", FAIL, f"it died: {error}")
                 yield [died], [], len(names)
     except BaseException:
         for process in set(multiprocessing.active_children()) - before:

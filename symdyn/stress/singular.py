@@ -18,9 +18,11 @@ from symdyn.model.symbols import coordinates, parameters, time
 from symdyn.model.system import System
 from symdyn.stress.record import DEGRADE, FAIL, Row, within
 from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.yardstick import conditions
 from symdyn.systems import get
 
 RTOL = 1e-10
+PROJECTED = "steps times the error one may have, doubled by the projection, tenfold for the gradient of the energy in its scale"
 
 
 def two_points() -> System:
@@ -89,13 +91,13 @@ def _named(check: str, name: str, done: str, sol: Any, words: tuple[str, ...]) -
 
 def configurations(short: bool) -> Iterator[Row]:
     """Mechanisms that pass positions where their constraints lose rank."""
-    cases: list[tuple[str, System, dict[str, float], float]] = [
-        ("slider-crank through its fold", get("slider_crank"), {}, 10.0),
-        ("two windows through the flat position", get("n_four_bar", n=2), {}, 20.0),
-        ("four-bar, a parallelogram, through its dead point", get("n_four_bar", n=1), {}, 10.0)]
+    cases: list[tuple[str, System, float]] = [
+        ("slider-crank through its fold", get("slider_crank"), 10.0),
+        ("two windows through the flat position", get("n_four_bar", n=2), 20.0),
+        ("four-bar, a parallelogram, through its dead point", get("n_four_bar", n=1), 10.0)]
     if not short:
-        cases.append(("eight windows through the flat position", get("n_four_bar", n=8), {}, 10.0))
-    for what, system, _, end in cases:
+        cases.append(("eight windows through the flat position", get("n_four_bar", n=8), 10.0))
+    for what, system, end in cases:
         subject = Subject(system)
         end = end / 4 if short else end
         sol = subject.run((0.0, end), rtol=RTOL, max_steps=200_000)
@@ -107,9 +109,7 @@ def configurations(short: bool) -> Iterator[Row]:
         passes = _closed(system.name, sol)
         yield within("singular positions", subject.name, f"{done}, rank down to {rank} at output times: energy error",
                      sol.energy_error(), sol.n_steps * 2 * math.sqrt(sol.x.shape[1]) * 2 * RTOL * 10,
-                     "steps times the error one may have, doubled by the projection, tenfold "
-                     "for the gradient of the energy in its scale",
-                     "energy passes the singular position")
+                     PROJECTED, "energy passes the singular position")
         if passes is not None:
             found, where = passes
             yield within("singular positions", subject.name, f"{done}: distance from the branch {where}", found, 1e-6,
@@ -148,8 +148,7 @@ def _four_bar(short: bool) -> Iterator[Row]:
         return
     turns = float(np.ptp(sol.q[:, 0])) / (2 * math.pi)
     yield within("singular positions", subject.name, f"{done}, {turns:.2g} turns of the crank: energy error",
-                 sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, "steps times the error one may have, "
-                 "doubled by the projection, tenfold for the gradient of the energy in its scale",
+                 sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, PROJECTED,
                  "energy passes the change point")
 
 
@@ -209,8 +208,6 @@ def redundant(short: bool) -> Iterator[Row]:
         found = np.array([subject.module.rhs(0.0, row) for row in x])
         size = np.abs(wanted).max()
         chain = subject.equations.tape("rhs").longest_chain()
-        from symdyn.stress.yardstick import conditions
-
         condition = float(conditions(first, np.zeros(len(x)), x).max())
         yield within("redundant", subject.name, f"last hinge closed {times} times, 10 states: accelerations against those with "
                      "one, relative", float(np.abs(found - wanted).max() / size), 4 * EPS * chain * condition,
@@ -221,9 +218,8 @@ def redundant(short: bool) -> Iterator[Row]:
             yield _named("redundant", subject.name, f"last hinge closed {times} times", sol, ("rank", "depend"))
             continue
         yield within("redundant", subject.name, f"last hinge closed {times} times, {sol.t[-1]:g} s, {sol.n_steps} steps: energy "
-                     "error", sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, "steps times the error one may "
-                     "have, doubled by the projection, tenfold "
-                     "for the gradient of the energy in its scale", "energy is kept with redundant constraints")
+                     "error", sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, PROJECTED,
+                     "energy is kept with redundant constraints")
 
 
 # -- forces of the user that fail

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import ArgumentError, EvaluationError, no_value
 from symdyn.formulation.equations import Equations
 from symdyn.pipeline import FUNCTIONS, emit, has_function
 from symdyn.runtime.compiler import Compiler, find_compiler, plain
@@ -17,29 +18,46 @@ from symdyn.runtime.module import Module
 from symdyn.runtime.solution import Solution
 from symdyn.runtime.unit import CUnit, PythonUnit
 
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
 EPS = 2.0**-53
 # Of runs that are compared: all but the last digits.
 RTOL = 1e-10
+# Where a system of the catalogue begins that has no motion of its own: it is in equilibrium.
+BESIDE = {"floating_crane": {"beta": 0.2}}
 # Derivatives, and forms for other purposes.
 IDENTIFICATION, LONG = ("regressor", "inertial_parameters", "base_regressor", "base_parameters"), 1000
 SELDOM = ("jacobian_x", "jacobian_inputs", "jacobian_params", "power_x", "reactions_by_lam", "residual", "watches",
           "drawn_lengths", "events", "event_resets")
 
 
+def named(name: str) -> System:
+    """The system of a name of the catalogue, of that with its first option in parentheses, such as n_link_pendulum(3), or of the
+    list of `symdyn bench --all`.
+
+    Raises ArgumentError for a name that there is not.
+    """
+    from symdyn.bench.work import cases
+
+    case = cases.named(name)
+    return case.maker()(**case.options)
+
+
 class Subject:
     """A mechanism with its usual parameters, start and duration.
 
-    system   a System, Equations, or the name of a system of the catalogue
+    system   a System, Equations, or a name as of `named`
     """
 
     def __init__(self, system: Any) -> None:
         if isinstance(system, str):
-            from symdyn.systems import get
-
-            system = get(system)
+            beside, system = BESIDE.get(system, {}), named(system)
+            system.initial = {**system.initial, **beside}
         self.equations: Equations = system if isinstance(system, Equations) else system.equations()
         self.name = self.equations.name
         self.symbols = self.equations.symbols
+        self.method: str | None = None  # of runs that name none; None: the usual one
         self._whole: Any = None
         self._evaluators: dict[str, Any] = {}
 
@@ -64,10 +82,12 @@ class Subject:
         """What `evaluate` runs: "c", or "numpy" where there is no compiler."""
         return "c" if find_compiler() is not None else "numpy"
 
-    @property
-    def lacking(self) -> list[str]:
-        """Parameters without a number."""
-        return [p.name for p in self.symbols.parameters if p not in self.symbols.defaults]
+    def demand_numbers(self) -> None:
+        """Raises ArgumentError where parameters have no number: nothing could be run."""
+        lacking = [p.name for p in self.symbols.parameters if p not in self.symbols.defaults]
+        if lacking:
+            raise ArgumentError(f"{self.name}: parameters: {no_value(lacking)}; give every parameter a number in the system's "
+                                "`defaults`")
 
     @cached_property
     def params(self) -> np.ndarray:
@@ -83,11 +103,16 @@ class Subject:
     def duration(self) -> float:
         return float(self.module.metadata["duration"])
 
+    @property
+    def given(self) -> np.ndarray:
+        """The initial state as it was given, (n_x,)."""
+        metadata = self.module.metadata
+        return np.array([metadata["initial"].get(name, 0.0) for name in metadata["x"]], dtype=float)
+
     @cached_property
     def start(self) -> np.ndarray:
-        """The usual start, on the constraints, (n_x,)."""
-        metadata = self.module.metadata
-        x = np.array([metadata["initial"].get(name, 0.0) for name in metadata["x"]], dtype=float)
+        """The usual start: what was given, moved onto the constraints, (n_x,)."""
+        metadata, x = self.module.metadata, self.given
         n_q, n_u = metadata["sizes"]["q"], metadata["sizes"]["u"]
         for group in metadata.get("unit_groups", ()):
             places = [metadata["x"].index(name) for name in group]
@@ -98,6 +123,13 @@ class Subject:
             x[:n_q + n_u] = np.concatenate([q, u])
         return x
 
+    def changed(self, params: np.ndarray, method: str) -> Subject:
+        """The same mechanism with other parameters (n_p,), by the same code, run by a method; its start is this one's."""
+        other = copy.copy(self)
+        other.__dict__.update(params=params, start=self.start)
+        other.method = method
+        return other
+
     def parts(self, x: np.ndarray) -> dict[str, np.ndarray]:
         """A state as arguments of `simulate`."""
         sizes = self.module.metadata["sizes"]
@@ -106,6 +138,8 @@ class Subject:
 
     def run(self, t: Any, x: np.ndarray | None = None, params: Any = None, rtol: float = RTOL, **options: Any) -> Solution:
         """A motion; warnings are kept in `told` of the solution."""
+        if options.get("method") is None:
+            options["method"] = self.method
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             sol = self.module.simulate(t, params=self.params if params is None else params, rtol=rtol,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.stress.flow import flow, growth_to, path, scales_of
+from symdyn.stress.flow import demand_motion, flow, growth_to, path, scales_of
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
 from symdyn.stress.rounding import FEW, states
 from symdyn.stress.subject import EPS, RTOL, Subject
@@ -106,6 +106,7 @@ def _bits(subject: Subject, system: Units, p: np.ndarray, x: np.ndarray, short: 
                                 atol=RTOL * scales * of_x, max_steps=5000, steps=True, first_step=end / 1024 * time,
                                 **({"inputs": free} if len(free) else {})))
     one, two = ends
+    demand_motion(subject, one)
     if one.n_steps != two.n_steps or one.n_rejected != two.n_rejected or len(one.t) != len(two.t):
         figure, steps = float(np.linalg.norm((two.x[-1] / x - one.x[-1]) / scales)), f"{one.n_steps} and {two.n_steps} steps"
     else:
@@ -116,10 +117,9 @@ def _bits(subject: Subject, system: Units, p: np.ndarray, x: np.ndarray, short: 
         yield Row("units", subject.name, done, figure, 0.0, origin, PASS, "the same bits in other units")
         return
     grown = 1.0
-    if figure:
-        with contextlib.suppress(NotApplicable):
-            phi = flow(subject, path(subject, end, resolved=True))
-            grown = growth_to(phi, len(phi) - 1)
+    with contextlib.suppress(NotApplicable):
+        phi = flow(subject, path(subject, end, resolved=True))
+        grown = growth_to(phi, len(phi) - 1)
     bound = (one.n_steps + two.n_steps) * 2 * np.sqrt(len(x)) * RTOL * grown
     gentle = figure <= bound
     cause = "a power of a quantity, or a threshold with a unit"
@@ -160,6 +160,5 @@ def _decimal(subject: Subject, short: bool) -> Iterator[Row]:
     steps = one.n_steps + two.n_steps
     bound = steps * (motion.step_error * (2 if subject.constrained else 1) + 8 * chain * EPS) * grown
     yield within("units", subject.name, f"units mm, t, s: motion of {end:.3g} s, {one.n_steps} and {two.n_steps} steps: "
-                 "difference "
-                 "at the end", figure, bound, f"steps times the error one may have times the largest magnification ({grown:.2g})",
-                 "the same motion in other units", "another motion in other units")
+                 "difference at the end", figure, bound, "steps times the error one may have times the largest magnification "
+                 f"({grown:.2g})", "the same motion in other units", "another motion in other units")

@@ -46,8 +46,10 @@ class _Balancer:
             if isinstance(value, Node):
                 if node in names:
                     self.recorder.name(names[node], value)
-                if node in checks:
-                    self.recorder.positive(unsigned(value) if node.op == "guard" else value, checks[node])
+                if node in checks and node.op == "guard":
+                    self.recorder.positive(unsigned(value), checks[node])
+                elif node in checks:
+                    self.new[node] = self.recorder.positive(value, checks[node])
         return Tape(self.recorder, {name: Output(name, o.shape, tuple(self._of(e) for e in o.entries))
                                     for name, o in self.old.outputs.items()})
 

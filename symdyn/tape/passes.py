@@ -47,8 +47,10 @@ def substitute(entries: tuple, replacements: Mapping[Node, Any], recorder: Recor
             if isinstance(value, Node):
                 if node in node.recorder.names:
                     recorder.name(node.recorder.names[node], value)
-                if node in node.recorder.checks:
-                    recorder.positive(unsigned(value) if node.op == "guard" else value, node.recorder.checks[node])
+                if node in node.recorder.checks and node.op == "guard":
+                    recorder.positive(unsigned(value), node.recorder.checks[node])
+                elif node in node.recorder.checks:
+                    new[node] = recorder.positive(value, node.recorder.checks[node])
     return tuple(new[e] if isinstance(e, Node) else e for e in entries)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -39,7 +40,7 @@ class Recorder:
     """
 
     def __init__(self) -> None:
-        self._known: dict[tuple, Node] = {}
+        self._known: defaultdict[str, dict[tuple, Node]] = defaultdict(dict)  # operation -> arguments -> node
         self._count = 0
         self._section = ""
         self.names: dict[Node, str] = {}
@@ -79,8 +80,10 @@ class Recorder:
         return self._section
 
     def positive(self, node: Any, reason: str) -> Any:
-        """Demand that a value is positive when it is computed; reason tells what it means if not."""
+        """The value, which must be positive when it is computed; reason tells what it means if not."""
         if isinstance(node, Node):
+            if node.op == "neg":  # what is computed, and divided by, is the value without its sign
+                return self.guard(node, node, reason)
             self.checks.setdefault(node, reason)
         return node
 
@@ -101,10 +104,10 @@ class Recorder:
         return self._record("guard", value, margin)
 
     def _make(self, op: str, args: tuple, mask: int) -> Node:
-        key = (op, *args)
-        node = self._known.get(key)
+        known = self._known[op]
+        node = known.get(args)
         if node is None:
-            node = self._known[key] = Node(self, op, args, self._count, mask, self._section)
+            node = known[args] = Node(self, op, args, self._count, mask, self._section)
             self._count += 1
         return node
 

@@ -261,6 +261,7 @@ class _Slow:
     """A program that takes far too long to prepare."""
 
     name = title = "slow"
+    bodies = False
 
     def available(self):
         return True
@@ -292,3 +293,35 @@ def test_errors_in_other_coordinates_where_a_state_is_known(swinging):
     for errors in yardstick.errors(other, alone):
         assert np.isnan(errors[:-1]).all() and errors[-1] < 1e-9
     assert np.isnan(yardstick.errors(other, np.full_like(same, np.nan))).all()
+
+
+def test_other_programs_come_before_what_takes_long_to_compile(monkeypatch):
+    order = []
+    monkeypatch.setattr(published, "search", lambda line, *_: order.append(line.program))
+    measure(_short(methods=("radau", "bs54", "taylor", "dop853")), ["scipy"], 1)
+    assert order == ["symdyn bs54", "symdyn dop853", "scipy DOP853", "scipy LSODA", "scipy Radau", "symdyn radau",
+                     "symdyn taylor"]
+
+
+def test_time_is_kept_for_what_was_found_and_the_rest_is_told(monkeypatch):
+    given = []
+    monkeypatch.setattr(published, "search", lambda line, case, exact, until: given.append(until))
+    begun = time.perf_counter()
+    measure(_short(methods=("dop853", "bs54")), [], 1, begun + 1000)
+    assert given[0] == given[1] and 740 < given[0] - begun < 760  # of all lines together
+    found = _line("symdyn dop853", False, (1e-2, 0.05), (1e-3, 1e-2), (1e-4, 1e-5))
+    text = str(Result(_short(), "", [found, _line("other", True, (1e-3, 1e-2, [1.0]))], {}, True))
+    assert "symdyn dop853             embedding        1e-01    1e-02  not timed   5.0e-02" in text
+    assert "symdyn dop853             embedding        1e-03    1e-04  not timed   1.0e-05" in text
+    assert text.count("not timed") == 2
+
+
+def test_an_interrupt_tells_that_it_goes_on(monkeypatch, tmp_path, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(published, "CASES", {"short": _short(methods=("dop853",))})
+    monkeypatch.setattr(published, "search", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        published.run(["short"], [], 1, None, tmp_path)
+    assert "what was found is kept, the same command goes on" in capsys.readouterr().err

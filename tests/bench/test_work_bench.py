@@ -14,7 +14,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.bench import kept
-from symdyn.bench.work import against, benchmark, picture, plan, resume
+from symdyn.bench.work import against, benchmark, methods, picture, plan, resume
 from symdyn.bench.work.against.apart import TooLong, prepared
 from symdyn.bench.work.against.peer import Failed, Unfit
 from symdyn.bench.work.asked import checked, grid
@@ -389,6 +389,7 @@ class _Exact:
     """A peer that is always right, and one that never fits."""
 
     name = title = "exact"
+    bodies = False
 
     def available(self):
         return True
@@ -595,7 +596,7 @@ def test_all_faults_are_told_at_once():
         sd.bench("pendulum", end=-1.0)
     with pytest.raises(ArgumentError, match="takes a System, equations or a name of the catalogue, found 3"):
         sd.bench(3)
-    with pytest.raises(ArgumentError, match="no mechanism 'double_pendulm' to measure; did you mean double_pendulum"):
+    with pytest.raises(ArgumentError, match="no mechanism 'double_pendulm'; did you mean double_pendulum"):
         sd.bench("double_pendulm")
     with pytest.raises(ArgumentError, match="pendulum takes no option, found 'pendulum\\(3\\)'"):
         sd.bench("pendulum(3)")
@@ -671,10 +672,79 @@ def test_parameters_without_values_are_told_with_what_to_do(tmp_path, capsys):
     system = sd.systems.get("pendulum")
     system.defaults = {}
     for lacking in (system, system.embedding()):
-        with pytest.raises(ArgumentError, match=r"no value for .*, which have no defaults; give every parameter a number"):
+        with pytest.raises(ArgumentError, match=r"no value for .*, which have no default; give every parameter a number"):
             sd.bench(lacking)
 
 
 def test_reference_prints():
     assert str(Reference("closed form", (1.0,), [[0.0]], 15.9, "known")) == "closed form, 15.9 digits: known"
     assert isinstance(Benchmark("a", 1.0, [], [], Reference("x", (1.0,), [[0.0]], 3.0, "")).record(), dict)
+
+
+def test_without_a_compiler_methods_of_scipy_are_taken_and_that_is_told(monkeypatch):
+    for module in (methods, benchmark):
+        monkeypatch.setattr(module, "find_compiler", lambda: None)
+    about = subject("pendulum", end=1.0)
+    asked = checked([about], ["embedding"], tolerances=[1e-4], repeats=1)
+    assert asked.methods == ("RK45", "DOP853", "Radau", "LSODA")
+    result = run(about, asked)
+    assert [r.method for r in result.rows] == list(asked.methods) and result.table().count("there is no C compiler") == 1
+
+
+def test_an_interrupt_tells_that_the_same_command_goes_on(monkeypatch, tmp_path, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plan, "own", stopped)
+    assert main(["bench", "pendulum", "--end", "1", "--formulations", "embedding", "--output", str(tmp_path)]) == 130
+    assert "interrupted; what was measured is kept, the same command goes on" in capsys.readouterr().err
+
+
+def test_the_budget_that_was_asked_for_is_told(tmp_path, capsys, drawn, monkeypatch):
+    original = benchmark.find_reference
+    monkeypatch.setattr(benchmark, "find_reference", lambda *given: time.sleep(0.3) or original(*given))
+    small = ["--end", "1", "--formulations", "embedding", "--methods", "dop853", "--rtol", "1e-4", "--budget", "0.25", "--output"]
+    main(["bench", "pendulum", *small, str(tmp_path / "one")])
+    assert "1 of 1 runs were not made within the budget of 0.25 s, which derivation" in capsys.readouterr().out
+    main(["bench", "pendulum", "double_pendulum", *small, str(tmp_path / "two")])
+    assert re.search(r"within the budget of 0\.25 s, of which this mechanism has 0\.1\d* s, which", capsys.readouterr().out)
+
+
+def test_evaluations_of_series_have_no_operations():
+    result = sd.bench("pendulum", formulations=["embedding"], methods=["taylor", "dop853"], tolerances=[1e-6], end=1.0, repeats=1)
+    series, other = result.rows
+    assert series.evaluations > 0 == series.operations and other.operations == other.evaluations * result.operations["embedding"]
+    line = next(line for line in result.table().splitlines() if line.startswith("embedding") and "taylor" in line)
+    assert line.split()[6] == "-" and "with taylor orders of its series; operations" in result.table().replace("\n", " ")
+
+
+def test_more_methods_than_colours_are_told_apart():
+    names = [f"m{k}" for k in range(13)]
+    styles = styles_of([Row("embedding", name, 1e-6) for name in names])
+    looks = {(s["color"], s.get("markerfacecolor", "")) for s in styles.values()}
+    assert len(looks) == 13 and [s.get("markerfacecolor") for s in styles.values()] == [None] * 8 + ["white"] * 5
+    rows = [Row("embedding", name, 10.0**-k, least=1e-3, seconds=1e-3, error=10.0**-k, evaluations=9, errors=(10.0**-k,),
+                until=((1e-3, 9),)) for name in names for k in (3, 6)]
+    shown = picture.picture(Benchmark("a", 1.0, rows, [], Reference("x", (1.0,), [[0.0]], 3.0, "")))
+    handles = {h.get_label(): h for h in shown.legends[0].legend_handles}
+    assert handles["m0"].get_color() == handles["m8"].get_color()
+    assert (handles["m0"].get_marker(), handles["m8"].get_marker()) == ("None", "o")
+
+
+def test_where_no_run_gets_below_any_error_that_is_told(tmp_path, drawn):
+    rows = [Row("embedding", "dop853", 1e-3, error=0.5, least=1.0, seconds=1.0, errors=(0.5,), until=((1.0, 3),))]
+    text = Benchmark("a", 1.0, rows, [], Reference("x", (1.0,), [[0.0]], 3.0, "")).table()
+    assert "least time below an error, at the end: none, no run got below 0.01" in text
+
+
+def test_programs_that_take_bodies_show_no_formulation_of_ours(monkeypatch):
+    class Bodies(_Exact):
+        bodies = True
+        name = title = "from bodies"
+
+    monkeypatch.setattr(against, "names", lambda: ["some"])
+    monkeypatch.setattr(against, "peers", lambda name: (Bodies(), _Exact()))
+    about = subject("pendulum", end=2.0)
+    result = run(about, checked([about], ["embedding"], peers=["some"], **ASKED))
+    assert {(r.formulation, r.method) for r in result.rows if r.peer} == {("bodies", "from bodies"), ("embedding", "exact")}
+    assert picture.title("bodies") == "bodies and joints"

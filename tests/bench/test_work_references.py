@@ -1,5 +1,6 @@
 """References of work against error: closed forms, motions with more digits, two runs that agree, and where they are kept."""
 
+import importlib.util
 import json
 
 import numpy as np
@@ -13,7 +14,7 @@ from symdyn.bench.work.converged import Exact, TooLong, converged, states
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.reference import agreement, default_times, find_reference
 from symdyn.bench.work.subject import Yardstick
-from symdyn.errors import SymdynError
+from symdyn.errors import CompileError, SymdynError
 
 
 @pytest.fixture(scope="module")
@@ -174,3 +175,36 @@ def test_stored_references_are_of_the_mechanisms_as_they_are(name):
     assert found is not None and found.digits == data["digits"]
     tight = first.module.simulate(np.r_[0.0, found.times[:2]], rtol=1e-13).x[1:]
     assert np.nanmax(Yardstick(found, first).errors(first, tight)) < 1e-9
+
+
+def user_function(tmp_path, body, line):
+    """A body on a rail that a function of the user pulls."""
+    (tmp_path / "pulling.py").write_text(f"def pulling(q):\n    return {body}\n", encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("pulling", tmp_path / "pulling.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    name = f"pull_{line.count('n')}_{len(body)}"
+    pull = sd.External(name, ["q"], python=module.pulling,
+                       c=f"static int {name}(const double *in, double *out)\n{{\n    out[0] = {line};\n    return 0;\n}}")
+    q, (m,) = sd.coordinates("q"), sd.parameters("m1:2")
+    system = sd.System("pulled", gravity=None)
+    system.add_joint(sd.Prismatic("slide", system.ground, system.add_body("b", mass=m), q, axis=[1, 0, 0]))
+    system.add_joint_force("slide", pull(q))
+    system.defaults, system.initial = {m: 1}, {q: 1}
+    return system
+
+
+def test_what_a_compiler_says_is_told_once(tmp_path):
+    told = []
+    about = of_system(user_function(tmp_path, "-q", "nonsense"), 1.0)
+    with pytest.raises(CompileError, match="nonsense") as caught:
+        find_reference(about, [about.first()], told=told.append)
+    assert str(caught.value).count("Output:") == 1 and "reference" not in str(caught.value)
+    assert not any("Output" in text or "nonsense" in text for text in told)
+
+
+def test_what_a_users_text_raises_is_a_reason_and_no_crash(tmp_path):
+    about = of_system(user_function(tmp_path, "1 / 0", "-in[0]"), 1.0)
+    reference = find_reference(about, [about.first()])
+    assert reference.kind == "agreement" and reference.digits > 10
+    assert "raised ZeroDivisionError at (1.0): division by zero" in reference.how

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import pickle
 from collections.abc import Callable
@@ -12,9 +13,15 @@ from symdyn.comparison import Case, Comparison, Formula, Verdict, run
 from symdyn.lecture import cases
 
 
+@functools.cache
+def taken(case: str) -> list[Formula]:
+    """The formulas of a case of the lecture, derived once."""
+    return [f for c in cases() if c.name == case for f in c.taken()]
+
+
 def formula(case: str, name: str) -> Formula:
     """A formula of a case of the lecture."""
-    return next(f for c in cases() if c.name == case for f in c.taken() if f.name == name)
+    return next(f for f in taken(case) if f.name == name)
 
 
 def verdicts(changed: Formula) -> list[Verdict]:

@@ -234,6 +234,7 @@ def test_numpy_runs_one_by_one(compiled: Callable[..., Any], fast: Any) -> None:
 
 def test_interrupt_keeps_what_is_finished(fast: Any) -> None:
     q, u = starts(60_000)
+    fast.simulate_batch(*starts(4), t=(0, 1))  # its code is compiled before the clock runs
     threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(SimulationInterrupted, match=r"interrupted after [0-9]+ of 60000 motions") as caught:
         fast.simulate_batch(q, u, t=(0, 1000))

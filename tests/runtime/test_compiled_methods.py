@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -14,11 +15,11 @@ from symdyn.backend.methods import METHODS
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.pipeline import emit
 from symdyn.runtime import methods, simulate
-from symdyn.runtime.automatic import Modes
+from symdyn.runtime.automatic import Modes, automatic
 from symdyn.runtime.compiler import find_compiler
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.methods import COMPILED, split_name, unit_name
-from symdyn.runtime.outcome import Request
+from symdyn.runtime.outcome import Outcome, Request
 from tests.runtime.constrained import module as constrained
 
 START = {"q": {"q1": 2.0}, "u": {"q1_dot": 0.5}}
@@ -90,12 +91,18 @@ def test_the_loose_pair_on_constraints() -> None:
 # -- the choice
 
 
-@pytest.mark.parametrize(("rtol", "method", "why"), [(1e-3, "bs54", "for rtol = 0.001 the pair of order 5"),
-                                                     (1e-6, "dop853", "for rtol = 1e-06 the explicit method of order 8"),
-                                                     (1e-9, "taylor", "for rtol = 1e-09, and with 4 operations in the")])
+@pytest.mark.parametrize(("rtol", "method", "why"), [
+    (1e-3, "bs54", "for rtol = 0.001 (0.0003 or more, with 4 operations in the right-hand side) the explicit pair of order 5 "
+                   "needs the fewest evaluations"),
+    (1e-6, "dop853", "for rtol = 1e-06 (between 1e-07 and 0.0003, with 4 operations in the right-hand side) the explicit method "
+                     "of order 8 is quickest"),
+    (1e-9, "taylor", "for rtol = 1e-09 (1e-07 or less, with 4 operations in the right-hand side) Taylor series are most exact")])
 def test_auto_by_tolerance(rtol: float, method: str, why: str, pendulum: Any) -> None:
     found = pendulum.simulate((0, 10), **START, rtol=rtol, method="auto")
-    assert found.method == method and why in found.why and "the motion is not stiff" in found.why
+    assert found.method == method and found.why.endswith(f"; {why}")
+    if rtol > 1e-9:
+        assert re.match(r"no implicit method is needed: an explicit trial run reaches the end in \d+ steps, of 100 that it may "
+                        "take; ", found.why)
     named = pendulum.simulate((0, 10), **START, rtol=rtol, method=method)
     np.testing.assert_array_equal(found.x, named.x)
     assert named.why == ""
@@ -103,7 +110,9 @@ def test_auto_by_tolerance(rtol: float, method: str, why: str, pendulum: Any) ->
 
 def test_auto_with_constraints() -> None:
     found = constrained("four_bar").simulate((0, 2), rtol=1e-8, method="auto")
-    assert found.method == "dop853" and found.why.endswith("and constraints the explicit method of order 8 is quickest")
+    assert found.method == "dop853"
+    assert re.search(r"for rtol = 1e-08 \(between 1e-14 and 3e-05, with \d+ operations in the right-hand side\) the explicit "
+                     r"method of order 8 is quickest$", found.why)
 
 
 @pytest.mark.parametrize(("backend", "explicit", "implicit"), [("c", "dop853", "radau"), ("numpy", "DOP853", "Radau")])
@@ -114,7 +123,9 @@ def test_auto_by_stiffness(backend: str, explicit: str, implicit: str, oil: dict
     implicit = implicit if implicit in COMPILED or backend == "numpy" else "Radau"
     found = oil[backend].simulate((0, 1), rtol=1e-6, method="auto")
     assert found.method == implicit and found.n_steps < 100
-    assert "the motion is stiff (eigenvalues up to 1e+04 1/s times the step of a trial run" in found.why
+    assert re.fullmatch(r"the motion is stiff: after t = 0\.0\d+ s implicit steps are \d+ times as long as explicit ones, and "
+                        r"pay from 10 times on \(steps of 0\.000\d+ s times the largest eigenvalue, 1e\+04 1/s, are [56]\.?\d?; "
+                        r"stability limits explicit ones from 5 on\)", found.why)
     thin = oil[backend].simulate((0, 1), rtol=1e-6, method="auto", params={"d": 1.0})
     assert thin.method == explicit
 
@@ -147,7 +158,7 @@ def test_auto_by_stiffness_at_small_tolerances(backend: str, rtol: float, c: flo
     if backend not in following or (backend == "c" and "radau" not in COMPILED):
         pytest.skip("no C compiler here")
     found = following[backend].simulate((0, 2), params={"c": c, "d": d}, rtol=rtol, method="auto")
-    assert found.method == ("radau" if backend == "c" else "Radau") and "the motion is stiff (" in found.why
+    assert found.method == ("radau" if backend == "c" else "Radau") and "the motion is stiff: after t = " in found.why
     assert found.n_steps < 0.05 * 2 * d  # explicit steps: 0.15 to 1.8 times 2 d
     assert abs(found.q[-1, 0] - np.cos(found.t[-1])) < 1.1 * (1 + d) / c
 
@@ -159,16 +170,75 @@ def test_auto_compiles_no_jacobian_without_need(following: dict[str, Any], compi
     tried = []
     run = simulate._trial
     monkeypatch.setattr(simulate, "_trial", lambda module, asked, name: tried.append(name) or run(module, asked, name))
-    double = compiled("double_pendulum", "numpy")
+    pendulum, double = compiled("pendulum", "numpy"), compiled("double_pendulum", "numpy")
     with pytest.warns(SimulationWarning, match="after 20 steps"):
-        quick = double.simulate((0, 1000), rtol=1e-3, method="auto", max_steps=20)
-    assert "the motion is not stiff up to t = " in quick.why
+        quick = pendulum.simulate((0, 10_000), {"q1": 0.5}, rtol=1e-3, method="auto", max_steps=20)
+    assert re.match(r"the motion itself, not stability, asks for short steps: over 50 explicit ones, to t = [\d.]+ s, q1(_dot)? "
+                    r"departs from a cubic by [\d.]+ % of its range, where 1 % would be smooth \(steps of ", quick.why)
     with pytest.warns(SimulationWarning, match="after 20 steps"):
         exact = double.simulate((0, 1000), rtol=1e-12, method="auto", max_steps=20)
-    assert exact.why.startswith("accuracy limits explicit steps (eigenvalues up to")
+    assert re.match(r"accuracy, not stability, limits explicit steps \(steps of [\d.]+ s times the largest eigenvalue, [\d.]+ "
+                    r"1/s, are 0\.0\d+, below 0\.1; stability limits explicit ones from 5 on\); of the explicit methods that "
+                    "need no compiled code the one of order 8 is quickest", exact.why)
     short = following["numpy"].simulate((0, 0.1), rtol=1e-8, method="auto")
-    assert "explicit steps to come are too few for stiffness to matter (" in short.why and "not stiff" not in short.why
+    assert re.match(r"stiffness does not matter: some \d+ explicit steps are to come, fewer than the 1000 from which on an "
+                    r"implicit method pays \(steps of ", short.why)
+    assert all("not stiff" not in found.why for found in (quick, exact, short))
     assert tried == ["DOP853"] * 3
+
+
+UNKNOWN = "whether the motion is stiff is not known"
+
+
+@pytest.mark.parametrize(("steps", "length", "longer", "rtol", "method", "why"), [
+    (12, 1e-3, 0, 1e-6, "DOP853",
+     f"{UNKNOWN}: a trial run stopped at t = 0.012 s, after 12 of 100 explicit steps; of the explicit methods that need no "
+     "compiled code the one of order 8 is quickest"),
+    (100, np.nan, 0, 1e-6, "DOP853",
+     f"{UNKNOWN}: at t = 0 s, after 100 explicit steps, the right-hand side cannot be evaluated on all sides of the state, which "
+     "its eigenvalues need; of the"),
+    (100, 1e-3, None, 1e-6, "DOP853", f"{UNKNOWN}: no implicit step can be tried (no room here); of the"),
+    (100, 1e-3, 3e-3, 1e-6, "DOP853",
+     "the motion is not stiff: after t = 0.1 s implicit steps are only 3 times as long as explicit ones, and pay from 10 times "
+     "on (steps of 0.001 s times the largest eigenvalue, 1e+04 1/s, are 10; stability limits explicit ones from 5 on); of the"),
+    (100, 1e-3, 3e-3, 1e-3, "dop853",
+     " operations in the right-hand side) the explicit method of order 8 is quickest, as stability limits the pair of order 5 "
+     "to shorter steps"),
+    (100, 1e-3, 1.5e-2, 1e-3, "radau",
+     "the motion is stiff: after t = 0.1 s implicit steps are 15 times as long as explicit ones, and pay from 10 times on")])
+def test_auto_tells_what_trial_runs_tell(steps: int, length: float, longer: float | None, rtol: float, method: str, why: str,
+                                         oil: dict[str, Any]) -> None:
+    """Trial runs that take steps of these lengths."""
+    backend = "numpy" if method.isupper() else "c"
+    if backend not in oil:
+        pytest.skip("no C compiler here")
+    start = np.array([np.pi / 2, 0.0])
+
+    def trial(request: Request, name: str) -> Outcome:
+        implicit = name.lower().startswith("radau")
+        if implicit and longer is None:
+            raise ArgumentError("no room here")
+        t = np.arange(steps + 1.0) * np.nan_to_num(longer if implicit else length)  # type: ignore[arg-type]
+        return Outcome(t, np.outer(np.ones(len(t)), start if length > 0 else [np.nan, 0.0]), False, "", False, steps, 0, 0)
+
+    module = oil[backend]
+    request = Request((0, 1), None, start, module.parameters(), Inputs(np.zeros(0)), rtol, np.full(2, rtol), 0.0, 0.0, None, 2)
+    found = automatic(module, request, trial)
+    assert found[0] == method and why in found[1]
+
+
+def test_auto_tells_that_series_do_not_fit() -> None:
+    """A force that switches has no Taylor series."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler here")
+    q = sd.coordinates("q")
+    system = sd.System("switched", planar=True)
+    system.add_joint(sd.Prismatic("slide", system.ground, system.add_body("body", mass=1), q, axis=[1, 0]))
+    system.add_joint_force("slide", -sp.Abs(q))
+    found = system.embedding().compile(backend="c").simulate((0, 1), {"q": 1.0}, rtol=1e-9, method="auto")
+    assert found.method == "dop853" and found.why.endswith(
+        "operations in the right-hand side) Taylor series would be most exact, but do not fit (method='taylor' tells why); the "
+        "explicit method of order 8 is quickest")
 
 
 def test_spectral_radius(oil: dict[str, Any]) -> None:
@@ -206,8 +276,8 @@ def test_compiled_methods_need_compiled_code(method: str, compiled: Callable[...
 
 
 def test_a_method_that_does_not_fit_says_why(pendulum: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(COMPILED, "needy", methods.CompiledMethod("needy", "nothing", ("telepathy",)))
-    monkeypatch.setitem(COMPILED, "picky", methods.CompiledMethod("picky", "nothing", unfit=lambda m, _: f"{m.name} is small"))
+    monkeypatch.setitem(COMPILED, "needy", methods.CompiledMethod("needy", ("telepathy",)))
+    monkeypatch.setitem(COMPILED, "picky", methods.CompiledMethod("picky", unfit=lambda m, _: f"{m.name} is small"))
     with pytest.raises(ArgumentError, match="method 'needy' does not fit: its equations have no telepathy; use method='dop853'"):
         pendulum.simulate((0, 1), method="needy")
     with pytest.raises(ArgumentError, match="method 'picky' does not fit: pendulum is small"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from fractions import Fraction
@@ -16,6 +17,7 @@ from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.errors import ArgumentError, SimulationWarning
 from tests.helpers import GRAVITY, swing
 from tests.runtime.constrained import module as constrained
+from tests.user_functions import BOUNDED
 
 GAUSS = {"method": "gauss"}
 
@@ -139,9 +141,32 @@ def test_the_work_of_loads_is_integrated_along(compiled: Callable[..., Any]) -> 
 # -- what it does not take
 
 
+DIVIDED = (r"method 'gauss' divided (\d+) of its steps of one length, the latest of them at t = (\S+) s: .* give a shorter "
+           "first_step")
+
+
 def test_a_step_whose_sweeps_find_no_end_is_taken_in_parts(pendulum: Any) -> None:
-    found = pendulum.simulate([0.0, 20.0], [1.5], **GAUSS, first_step=5.0)
+    with pytest.warns(SimulationWarning, match=DIVIDED):
+        found = pendulum.simulate([0.0, 20.0], [1.5], **GAUSS, first_step=5.0)
     assert found.success and found.n_rejected > 0 and found.n_steps > 4
+
+
+def test_steps_that_were_divided_are_counted(double: Any) -> None:
+    """Of 100 equal steps some become two or more; with every step stored it is seen which."""
+    for h, t in ((0.1, (0.0, 10.0)), (0.25, (0.0, 10.0)), (0.25, np.array([0.0, 10.0]))):
+        with pytest.warns(SimulationWarning) as caught:
+            found = double.simulate(t, **GAUSS, first_step=h, steps=True)
+        number, latest = re.search(DIVIDED, str(caught[0].message)).groups()  # type: ignore[union-attr]
+        assert len(caught) == 1 and found.n_steps > 10 / h
+        assert (found.n_rejected > int(number)) == (h == 0.25)  # of the long ones some parts had to be divided once more
+        if isinstance(t, tuple):
+            parts = np.flatnonzero(np.abs(np.diff(found.t) - h) > 1e-9)
+            whole = np.unique(np.floor(found.t[parts] / h + 1e-6))
+            assert len(whole) == int(number) and whole[-1] == round(float(latest) / h)
+    for given in ({"first_step": 0.0125}, {"rtol": 1e-6}):  # short enough; chosen by the tolerance
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            double.simulate((0.0, 10.0), **GAUSS, **given)
 
 
 def test_constraints_are_refused() -> None:
@@ -184,6 +209,16 @@ def test_right_hand_sides_that_switch_are_refused() -> None:
         system.embedding().compile("c").simulate((0, 1), **GAUSS)
 
 
+def test_functions_of_the_user_are_refused_with_their_own_reason() -> None:
+    q = sd.coordinates("q")
+    system = sd.System("held")
+    slider = system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("block", mass=1), q, axis=[1, 0]))
+    system.add_joint_force(slider, BOUNDED(q.dot))
+    with pytest.raises(ArgumentError, match=r"held: method 'gauss' does not fit: the right-hand side calls .* function of "
+                                            r"the user, where it may have kinks, which constant steps go across; use method="):
+        system.embedding().compile("c").simulate((0, 1), **GAUSS)
+
+
 def test_kinks_that_the_equations_do_not_tell_are_warned_of() -> None:
     """By functions of the user: linear between points, a ramp that sets in, a stop, a jump; with steps chosen and given."""
     module = pushed()
@@ -212,4 +247,5 @@ def test_chaotic_motion_is_not_warned_of(double: Any) -> None:
     for given in ({"rtol": 1e-6}, {"rtol": 1e-10}, {"first_step": 0.1}):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", f".*{DIVIDED}")
             assert double.simulate(np.array([0.0, 20.0]), **GAUSS, **given).success

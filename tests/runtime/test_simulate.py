@@ -19,8 +19,16 @@ import sympy as sp
 from scipy import integrate
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, EvaluationError, MissingExtra, SimulationInterrupted, SimulationWarning
+from symdyn.errors import (
+    ArgumentError,
+    EvaluationError,
+    EvaluationWarning,
+    MissingExtra,
+    SimulationInterrupted,
+    SimulationWarning,
+)
 from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.methods import COMPILED
 
 ROOT = Path(__file__).parents[2]
 
@@ -205,6 +213,7 @@ def test_input_function_sees_the_state_and_may_keep_it(oscillator: Any) -> None:
     ({"F": "big"}, "the value of F is 'big', not a number"),
     ({"F": float("nan")}, "must be finite, found F = nan"),
     (lambda t, x: [1.0], "the input function returned 1 values at t = 0, needed are 2"),
+    ({"F": lambda t, x: "much"}, "the function of input F returned 'much' at t = 0; needed is a number"),
     (([0.0, 1.0], [1.0, 2.0]), r"values of shape \(2,\); give one row of 2 values for each time"),
     (([0.0, 1.0], [[1.0, 2.0]] * 3), r"times of shape \(2,\) and values of shape \(3, 2\)"),
     (([0.0, 0.0], [[1.0, 2.0]] * 2), "the times of a table of inputs must increase"),
@@ -212,8 +221,9 @@ def test_input_function_sees_the_state_and_may_keep_it(oscillator: Any) -> None:
     ({"F": ([0.0, 1.0], [1.0, 2.0, 3.0])}, r"give one row of 1 values for each time"),
 ])
 def test_inputs_that_do_not_fit(oscillator: Any, inputs: Any, message: str) -> None:
-    with pytest.raises(ArgumentError, match=message):
-        oscillator.simulate((0, 1), inputs=inputs)
+    for method in (None, "Radau"):
+        with pytest.raises(ArgumentError, match=message):
+            oscillator.simulate((0, 1), inputs=inputs, method=method)
 
 
 def test_inputs_of_a_system_without(double: Any) -> None:
@@ -223,16 +233,93 @@ def test_inputs_of_a_system_without(double: Any) -> None:
         double.simulate((0, 0.1), inputs=[1.0])
 
 
-@pytest.mark.parametrize("error", [ValueError, ZeroDivisionError, RuntimeError, EvaluationError])
-def test_exception_of_an_input_function(oscillator: Any, error: type[Exception]) -> None:
-    def fail(t: float, x: np.ndarray) -> list[float]:
+
+
+@pytest.mark.parametrize("error", [ValueError, ZeroDivisionError, RuntimeError, EvaluationError, ArgumentError])
+@pytest.mark.parametrize("method", [None, "radau", "gauss", "RK45", "Radau", "LSODA"])
+def test_what_an_input_function_raises_ends_the_motion(oscillator: Any, error: type[Exception], method: str | None) -> None:
+    if oscillator.backend == "numpy" and method in COMPILED:
+        return
+
+    def steer(t: float, x: np.ndarray) -> list[float]:
         if t > 0.5:
             raise error("mine")
         return [0.0, 0.0]
 
-    for method in (None, "Radau"):
-        with pytest.raises(error, match="mine"):
-            oscillator.simulate((0, 1), inputs=fail, method=method)
+    line = steer.__code__.co_firstlineno + 2
+    solution = stopped(lambda: oscillator.simulate((0, 1), inputs=steer, method=method))
+    assert re.fullmatch(rf"driven_oscillator: stopped at t = 0\.\d+: the input function \(steer\) raised {error.__name__}: mine, "
+                        rf"in line {line} of test_simulate\.py; the state there: q = \S+, q_dot = \S+, z = \S+", solution.message)
+    assert float(re.search(r"t = ([\d.]+)", solution.message).group(1)) > 0.5  # type: ignore[union-attr]
+    assert type(solution.cause) is error and str(solution.cause) == "mine"
+    # What came before is there, the inputs with it.
+    assert len(solution.t) > 1 and 0 < solution.t[-1] <= 0.5 and np.isfinite(solution.x).all()
+    assert np.isfinite(solution.inputs).all() and np.isfinite(solution.energy).all()
+
+
+@pytest.mark.parametrize("method", [None, "DOP853"])
+def test_an_input_function_that_raises_at_once(oscillator: Any, method: str | None) -> None:
+    def wrong(t: float) -> float:
+        return 0.0
+
+    solution = stopped(lambda: oscillator.simulate((0, 1), inputs={"G": wrong}, method=method))
+    assert "stopped at t = 0: the function of input G (wrong) raised TypeError: " in solution.message
+    assert isinstance(solution.cause, TypeError) and solution.t.tolist() == [0.0] and np.isnan(solution.inputs).all()
+    given = stopped(lambda: oscillator.simulate((0, 1), inputs=lambda t, x: [][0], method=method))
+    assert "t = 0: the input function raised IndexError: list index out of range, in line" in given.message
+    assert oscillator.simulate((0, 0.1), method=method).cause is None
+
+
+def table(v: np.ndarray) -> np.ndarray:
+    if np.any(np.abs(v) > 1.5):
+        raise RuntimeError("the table ends at 1.5 m/s")
+    return 0.5 * v
+
+
+def slope(v: np.ndarray) -> np.ndarray:
+    return 0.5 + 0 * v
+
+
+@pytest.fixture(scope="module")
+def falling() -> Any:
+    """A body that falls into what a function of the user, in Python alone, refuses, and an event of it."""
+    x = sd.coordinates("x")
+    system = sd.System("falling", gravity=[0, -10])
+    body = system.add_body("body", mass=1)
+    system.add_joint(sd.Prismatic("way", system.ground, body, x, axis=[0, 1]))
+    slopes = sd.External("slope", ["v"], python=slope)
+    system.add_joint_force("way", sd.External("table", ["v"], python=table, derivative=slopes)(x.dot))
+    return system.embedding().compile(backend="numpy")
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
+def test_what_the_text_of_a_function_raises_ends_the_motion(falling: Any, method: str) -> None:
+    solution = stopped(lambda: falling.simulate((0, 1), method=method))
+    assert ("rhs cannot be evaluated: the function table(v) raised RuntimeError: the table ends at 1.5 m/s, in its line 3: raise "
+            'RuntimeError("the table ends at 1.5 m/s"); at t = 0.1') in solution.message
+    assert solution.message.startswith("falling: stopped at t = 0.1") and "the state there: x = -0." in solution.message
+    assert type(solution.cause) is RuntimeError and 0.1 < solution.t[-1] < 0.2 and solution["x_dot"][-1] >= -1.5
+
+
+def test_what_the_text_of_a_function_raises_in_evaluations(falling: Any) -> None:
+    told = "the function table.v. raised RuntimeError: the table ends at 1.5 m/s"
+    with pytest.raises(EvaluationError, match=f"falling: rhs cannot be evaluated: {told}.*; at t = 0, x = 0, x_dot") as caught:
+        falling.rhs(0, [0, -2])
+    assert type(caught.value.__cause__) is RuntimeError
+    with pytest.warns(EvaluationWarning, match=told):
+        rows = falling.rhs_batch(0, [[0, -1], [0, -2], [0, 1]])
+    assert np.isfinite(rows).all(axis=1).tolist() == [True, False, True]
+
+
+def test_what_the_text_of_a_function_raises_in_an_event() -> None:
+    x = sd.coordinates("x")
+    system = sd.System("watched", gravity=[0, -10])
+    body = system.add_body("body", mass=1)
+    system.add_joint(sd.Prismatic("way", system.ground, body, x, axis=[0, 1]))
+    system.add_event("fast", sd.External("table", ["v"], python=table)(x.dot) + 10)
+    solution = stopped(lambda: system.embedding().compile(backend="numpy").simulate((0, 1)))
+    assert "the function table(v) raised RuntimeError: the table ends at 1.5 m/s" in solution.message
+    assert type(solution.cause) is RuntimeError and solution.t[-1] <= 0.15
 
 
 def test_closed_form(oscillator: Any) -> None:
@@ -273,6 +360,14 @@ def test_solver_class(double: Any, wanted: Any) -> None:
     solution = double.simulate((0, 1), **START, method=Mine, rtol=1e-11)
     assert solution.method == "Mine"
     np.testing.assert_allclose(solution.x, wanted(solution.t).T, atol=1e-8)
+
+
+@pytest.mark.parametrize(("method", "near"), [("dop85", "dop853 or DOP853"), ("rk45", "RK45"), ("radau7", ".*radau5.*"),
+                                              ("atuo", "auto")])
+def test_a_method_with_a_slip_of_the_pen(double: Any, method: str, near: str) -> None:
+    with pytest.raises(ArgumentError, match=rf"there is no method '{method}', did you mean {near}\? There are dop853, .*radau5 "
+                                            r"\(compiled\), RK23, .* auto \(chooses one of them\), ggl"):
+        double.simulate((0, 1), method=method)
 
 
 @pytest.mark.parametrize("method", ["euler", 5, str])
@@ -347,10 +442,12 @@ def test_mass_matrix_that_is_not_positive_on_the_way() -> None:
 def test_parameters_that_cannot_be(compiled: Callable[..., Any], backend: str) -> None:
     module = compiled("pendulum", backend)
     if backend == "c":
-        with pytest.raises(EvaluationError, match="the mass matrix is not positive definite at q1_dot; check the parameters"):
+        with pytest.raises(EvaluationError, match=r"the mass matrix is not positive definite at q1_dot; check the parameters, of "
+                                                  r"which l is 0$"):
             module.simulate((0, 1), params={"l": 0.0})
     else:
-        assert "not positive definite at q1_dot" in stopped(lambda: module.simulate((0, 1), params={"l": 0.0})).message
+        told = stopped(lambda: module.simulate((0, 1), params={"l": 0.0})).message
+        assert "not positive definite at q1_dot; check the parameters, of which l is 0; at t = 0" in told
 
 
 def test_number_of_steps(double: Any) -> None:

@@ -17,6 +17,7 @@ from symdyn.stress.coded import imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, set_aside
 from symdyn.stress.first_order import first_order
 from symdyn.stress.record import DEGRADE, FAIL, PASS
+from symdyn.stress.singular import two_points
 from symdyn.stress.statements import emitted, written_out
 from symdyn.stress.subject import EPS, Subject
 from symdyn.stress.yardstick import exactly_as_written, halves, leaves
@@ -194,18 +195,38 @@ def test_accelerations_that_miss_their_equations_are_found(crank: Subject, measu
     assert len(imbalance(crank, rows[:0], u_dot[:0], "c")) == 0
 
 
-def test_towards_gimbal_lock_first_the_bound_ends_and_then_all_digits() -> None:
+def test_towards_gimbal_lock_the_bound_holds_until_states_are_refused() -> None:
     turning = Subject(attitude.free_body("angles"))
     x = np.zeros((5, 6))
-    x[:, 0], x[:, 1], x[:, 2], x[:, 3:] = 0.3, math.pi / 2 - np.array([1e-9, 2e-8, 5e-8, 1e-6, 1.2]), 0.7, [0.3, 0.4, 0.5]
+    x[:, 0], x[:, 1], x[:, 2], x[:, 3:] = 0.3, math.pi / 2 - np.array([1e-9, 1e-7, 2e-7, 1e-6, 1.2]), 0.7, [0.3, 0.4, 0.5]
     where = rounding.States(np.zeros(5), x, np.zeros((5, 0)), np.zeros((5, 3)))
     one = rounding.Measured(turning, "rhs", where, None, emitted(turning, ["rhs"])["rhs"])
-    assert one.coded is not None and one.coded.known.tolist() == [False, False, False, True, True]
-    assert (one.coded.divisors >= 1).tolist() == [True, False, False, False, False] and one.singular.tolist()[:3] == [True] * 3
+    assert one.coded is not None and one.coded.known.tolist() == [False, True, True, True, True]
+    assert (one.coded.divisors >= 1).tolist() == [True, False, False, False, False]
     values = turning.evaluate("rhs", 0.0, x)
+    assert np.isnan(values[0]).all() and np.isnan(one.values[0]).all() and np.isfinite(values[1:]).all()
+    right = one.compared(values)
+    assert right.refused == right.singular.noise == right.unknown == 0 and right.beyond <= 0
+    assert list(set_aside(Named, [right])) == []  # type: ignore[arg-type]
+    values[:, 3:] += 1e-6 * np.abs(values[:, 3:]).max(axis=1, keepdims=True)
+    assert one.compared(values).beyond > 0
+
+
+def test_towards_a_stretched_arm_first_the_bound_ends_and_then_all_digits() -> None:
+    """The upper rod is given the mass 0 only when the code runs, so that its pivot is compared with 0 and rounding passes."""
+    arm = Subject(two_points())
+    arm.params = arm.module.parameters({"m_1": 0.0, "l": 0.7})
+    x = np.zeros((4, 4))
+    x[:, 0], x[:, 1], x[:, 2:] = 0.3, [5e-8, 1e-7, 1e-6, 1.2], [0.3, 0.4]
+    where = rounding.States(np.zeros(4), x, np.zeros((4, 0)), np.zeros((4, 2)))
+    one = rounding.Measured(arm, "rhs", where, None, emitted(arm, ["rhs"])["rhs"])
+    assert one.coded is not None and one.coded.known.tolist() == [False, False, True, True]
+    assert (one.coded.divisors >= 1).tolist() == [True, False, False, False]
+    assert one.singular.tolist() == [True, True, False, False]
+    values = arm.evaluate("rhs", 0.0, x)
     right = one.compared(values)
     assert right.singular.noise == 1 and -5 < right.singular.imbalance <= 0 and right.beyond <= 0
-    values[:, 3:] += 1e-6 * np.abs(values[:, 3:]).max(axis=1, keepdims=True)
+    values[:, 2:] += 1e-3 * np.abs(values[:, 2:]).max(axis=1, keepdims=True)
     wrong = one.compared(values)
     assert wrong.singular.imbalance > 0 and wrong.beyond > 0
     assert [row.verdict for row in set_aside(Named, [wrong])] == [FAIL]  # type: ignore[arg-type]

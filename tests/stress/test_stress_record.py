@@ -35,6 +35,7 @@ def test_verdict_follows_the_bound() -> None:
 def test_report_passes_unless_a_row_fails() -> None:
     assert StressReport([row(), row(DEGRADE)]).passed
     assert not StressReport([row(), row(FAIL)]).passed
+    assert not StressReport().passed and "nothing was looked at, which does not count as passed" in StressReport().summary()
     assert StressReport([row(), row(), row(FAIL)]).count() == {"pass": 2, "degrade": 0, "fail": 1}
 
 
@@ -72,25 +73,28 @@ def test_parameters_without_numbers_are_told() -> None:
     bare = sd.System("bare", gravity=[0, -9.81])
     q, m = sd.coordinates("q"), sd.parameters("m")
     bare.add_joint(sd.Revolute("hinge", bare.ground, bare.add_body("rod", mass=m, com=[1, 0]), q))
-    report = sd.stress(bare, short=True, checks=["rounding", "energy"])
-    (told,) = report.rows
-    assert told.verdict == DEGRADE and "m without a number" in told.done and "`defaults`" in told.why
-    assert report.left_out == ["rounding, bare: m without a number", "energy, bare: m without a number"]
+    for system in (bare, bare.embedding(), ["pendulum", bare]):
+        with pytest.raises(sd.ArgumentError, match="bare: parameters: no value for m, which has no default"):
+            sd.stress(system, short=True, checks=["rounding"])
 
 
 def test_unknown_check_is_told_with_near_ones() -> None:
     with pytest.raises(sd.ArgumentError, match="there is no check 'rouding'; did you mean rounding"):
         sd.stress("pendulum", checks=["rouding"])
     with pytest.raises(sd.ArgumentError, match="the checks flips have mechanisms of their own; leave out the system"):
-        sd.stress("pendulum", checks=["flips"])
+        sd.stress("pendulum", checks=["energy", "flips"])
 
 
 def test_what_is_no_mechanism_or_no_list_is_told() -> None:
     for arguments, told in (({"system": 3}, "stress was given 3; pass a System"), ({"system": ["pendulum", "nope"]},
-                             "no system 'nope'"),
+                             "there is no mechanism 'nope'; there are"),
+                            ({"system": "n_link_pendulum(x)"}, "option n of n_link_pendulum must be of the kind int"),
                             ({"system": "pendulum", "jobs": "x"}, "jobs is 'x'; pass a number of processes, 1 or more"),
                             ({"jobs": 0}, "jobs is 0"), ({"jobs": True}, "jobs is True"), ({"jobs": 1.5}, "jobs is 1.5"),
-                            ({"checks": 3}, "checks is 3; pass a list of names"), ({"checks": "units"}, "checks is 'units'")):
+                            ({"checks": 3}, "checks is 3; pass names of checks"),
+                            ({"checks": []}, r"checks is \[\]; pass names of checks"),
+                            ({"checks": "unit"}, "there is no check 'unit'; did you mean units"),
+                            ({"system": []}, "stress was given no system")):
         with pytest.raises(sd.SymdynError, match=told):
             sd.stress(**arguments)
 
@@ -121,7 +125,44 @@ def test_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any) -
     assert told.startswith("verdict") and "fail    energy" in told and "1 rows: 0 pass" in told
     assert sorted(p.name for p in tmp_path.iterdir()) == ["stress.html", "stress.json", "stress.txt"]
     assert main(["stress", "--jobs", "0"]) == 2 and "--jobs must be 1 or more, found 0" in capsys.readouterr().err
-    assert main(["stress", "no_such_system"]) == 2 and "no system 'no_such_system'" in capsys.readouterr().err
+    assert main(["stress", "no_such_system"]) == 2
+    told = capsys.readouterr().err
+    assert "there is no mechanism 'no_such_system'" in told and "a Python file that defines system() is taken too" in told
+
+
+def test_names_and_options_are_those_of_bench(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "mine.py").write_text("import symdyn as sd\n\ndef system(n):\n    return sd.systems.n_link_pendulum(n=n)\n")
+    asked = ["--short", "--checks", "condition", "--jobs", "1", "--output", str(tmp_path)]
+    for names, systems in ((["n_link_pendulum(2)", "heavy_top"], ["n_link_pendulum_2", "heavy_top"]),
+                           (["n_link_pendulum", "--option", "n=3"], ["n_link_pendulum_3"]),
+                           ([str(tmp_path / "mine.py"), "--option", "n=2"], ["n_link_pendulum_2"])):
+        assert main(["stress", *names, *asked]) == 0
+        stored = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))
+        assert [r["system"] for r in stored["rows"]] == systems
+    assert [r.system for r in sd.stress("n_link_pendulum(2)", short=True, checks="condition").rows] == ["n_link_pendulum_2"]
+    capsys.readouterr()
+    for names, why in ((["n_link_pendulum(a)"], "option n of n_link_pendulum must be of the kind int"),
+                       ([str(tmp_path / "mine.py")], "needs --option n=..."), (["--option", "n=3"], "goes with names")):
+        assert main(["stress", *names, *asked]) == 2 and why in capsys.readouterr().err
+
+
+def test_nothing_looked_at_is_a_failure(tmp_path: Path, capsys: Any) -> None:
+    assert main(["stress", "pendulum", "--checks", "constraints", "inputs", "--output", str(tmp_path)]) == 1
+    assert "nothing was looked at, which does not count as passed: 0 rows" in capsys.readouterr().out
+
+
+def test_one_name_is_a_list_of_one() -> None:
+    report = sd.stress("pendulum", short=True, checks="condition")
+    assert [r.check for r in report.rows] == ["condition"] and report.passed
+
+
+def test_checks_that_are_named_are_run_in_the_short_form_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    checks = {"a": stress_run.Check("a", lambda short: iter([row(check="quick")])),
+              "b": stress_run.Check("b", lambda short: iter([row(check="long")]), short=False)}
+    monkeypatch.setattr(stress_run, "CHECKS", checks)
+    assert [r.check for r in sd.stress(short=True).rows] == ["quick"]
+    assert [r.check for r in sd.stress(short=True, checks=["b"]).rows] == ["long"]
+    assert [r.check for r in sd.stress().rows] == ["quick", "long"]
 
 
 def test_list_names_every_check(capsys: Any) -> None:
@@ -178,9 +219,9 @@ def test_a_motion_that_stops_is_told_once() -> None:
     system.add_joint(sd.Prismatic("way", system.ground, system.add_body("block", mass=1, inertia=1), x))
     system.add_joint_force("way", sd.External("fails", ["v"], python=fails, c="""
 static int fails(const double *in, double *out) { out[0] = in[0] > 0.5 ? 0.0/0.0 : 1.0; return 0; }""")(x.dot))
-    system.duration = 5
-    report = sd.stress(system, short=True, checks=["condition", "energy", "reversal"])
+    system.duration = 20
+    report = sd.stress(system, short=True, checks=["condition", "energy", "reversal", "denormals"])
     (told,) = report.rows
     assert (told.check, told.system, told.verdict) == ("usual motion", "stopping", DEGRADE)
     assert told.done.startswith("the usual motion stops at t = 0.5") and "fails failed or gave what is not finite" in told.done
-    assert [text.split(",")[0] for text in report.left_out] == ["condition", "energy", "reversal"]
+    assert [text.split(",")[0] for text in report.left_out] == ["condition", "energy", "reversal", "denormals"]

@@ -234,13 +234,15 @@ def test_generated_code_agrees_with_40_digits(backend: str) -> None:
     many = unit(backend).many(np.zeros(1), np.zeros((1, 0)), np.array([[*a, *b] for a, b in pairs]), np.zeros((1, 0)))
     for row, (over, free) in zip(np.asarray(many), pairs, strict=True):
         one = np.array(unit(backend).one(0.0, np.zeros(0), np.array([*over, *free])))
-        np.testing.assert_array_equal(row, one)
-        for part, (seabed, case) in zip(np.split(one, 2), ((1, over), (0, free)), strict=True):
-            found = precisely(seabed, case)
-            for values, name in zip(np.split(part, [2, 10]), ("force", "first", "second"), strict=True):
-                wanted = found[name].ravel().astype(float)
-                # a stretched line loses digits: its stiffness 1 / e to the one across
-                np.testing.assert_allclose(values, wanted, rtol=0, atol=1e-11 * max(1, abs(wanted).max()))
+        if backend == "c":  # NumPy's functions of arrays need not round as those of numbers
+            np.testing.assert_array_equal(row, one)
+        for result in (row, one):
+            for part, (seabed, case) in zip(np.split(result, 2), ((1, over), (0, free)), strict=True):
+                found = precisely(seabed, case)
+                for values, name in zip(np.split(part, [2, 10]), ("force", "first", "second"), strict=True):
+                    wanted = found[name].ravel().astype(float)
+                    # a stretched line loses digits: its stiffness 1 / e to the one across
+                    np.testing.assert_allclose(values, wanted, rtol=0, atol=1e-11 * max(1, abs(wanted).max()))
 
 
 FAILS = {"straight above": (0, (0.0, 0.5, 1e-3, 0.0)), "on the seabed": (1, (0.9, 0.0, 1e-3, 0.0)),

@@ -25,7 +25,7 @@ Skipped: 11 operations on parameters only: hoisted into the prologue, run once a
 
 Every function is called f(t, x, params, inputs, ud) and reads what it needs of that; the state is x = [q; u; z].
 One state (a list or an array of one dimension) runs on plain floats; arrays of states, with the state along the last
-axis, run on NumPy, and t, inputs and ud may then have a value for each state too.
+axis, run on NumPy, and t, inputs and ud may then have a value for each state too. No state changes what others get.
 `python double_pendulum.py --selftest` checks every function against reference vectors made with 30 digits.
 """
 
@@ -60,11 +60,13 @@ METADATA = {
 
 
 class SingularError(ArithmeticError):
-    """A value that must be positive is not; `code` is its place in METADATA["reasons"], from 1."""
+    """A value that must be positive is not; `code` is its place in METADATA["reasons"], from 1; of arrays of states, `states`
+    tells at which: booleans that broadcast to the shape of these arrays."""
 
-    def __init__(self, code):
+    def __init__(self, code, states=True):
         super().__init__(METADATA["reasons"][code - 1])
         self.code = code
+        self.states = states
 
 
 class _OneState:
@@ -80,6 +82,11 @@ class _OneState:
     logical_or = staticmethod(lambda a, b: a or b)
     logical_not = staticmethod(lambda a: not a)
 
+    @staticmethod
+    def positive(value, code):
+        if not value > 0.0:  # NaN is not, either
+            raise SingularError(code)
+
 
 class _ManyStates:
     """The same for arrays of states, on NumPy."""
@@ -91,10 +98,10 @@ class _ManyStates:
     min, max, abs, sign, where = np.minimum, np.maximum, np.abs, np.sign, np.where
     logical_and, logical_or, logical_not = np.logical_and, np.logical_or, np.logical_not
 
-
-def _positive(value, code):
-    if not np.all(value > 0.0):
-        raise SingularError(code)
+    @staticmethod
+    def positive(value, code):
+        if not np.all(value > 0.0):
+            raise SingularError(code, np.logical_not(value > 0.0))
 
 
 def _define(m):
@@ -104,6 +111,7 @@ def _define(m):
     exp, log, sqrt, pow, floor, ceil, erf = m.exp, m.log, m.sqrt, m.pow, m.floor, m.ceil, m.erf
     min, max, abs, sign, where = m.min, m.max, m.abs, m.sign, m.where
     logical_and, logical_or, logical_not = m.logical_and, m.logical_or, m.logical_not
+    _positive = m.positive
 
     def prologue(p):
         # Constants: everything that depends on parameters only; 12 operations, once per set of parameters.

@@ -41,13 +41,13 @@ extern "C" {
 #endif
 
 enum {
-    four_bar_n_q = 3,       // coordinates
-    four_bar_n_u = 3,       // speeds
-    four_bar_n_z = 0,       // extra states
-    four_bar_n_x = 6,       // x = [q; u; z]
-    four_bar_n_inputs = 0,
-    four_bar_n_p = 14,       // parameters
-    four_bar_n_c = 9        // constants computed by the prologue
+    four_bar_n_q = 3,  // coordinates
+    four_bar_n_u = 3,  // speeds
+    four_bar_n_z = 0,  // extra states
+    four_bar_n_x = 6,  // x = [q; u; z]
+    four_bar_n_inputs = 0,  // inputs
+    four_bar_n_p = 14,  // parameters
+    four_bar_n_c = 9,  // constants computed by the prologue
 };
 
 // Names in the order of the arguments, with units and default values.

@@ -37,7 +37,7 @@ Skipped: 26 operations on parameters only: hoisted into the prologue, run once a
 
 Every function is called f(t, x, params, inputs, ud) and reads what it needs of that; the state is x = [q; u; z].
 One state (a list or an array of one dimension) runs on plain floats; arrays of states, with the state along the last
-axis, run on NumPy, and t, inputs and ud may then have a value for each state too.
+axis, run on NumPy, and t, inputs and ud may then have a value for each state too. No state changes what others get.
 `python four_bar.py --selftest` checks every function against reference vectors made with 30 digits.
 """
 
@@ -72,29 +72,41 @@ METADATA = {
 
 
 class SingularError(ArithmeticError):
-    """A value that must be positive is not; `code` is its place in METADATA["reasons"], from 1."""
+    """A value that must be positive is not; `code` is its place in METADATA["reasons"], from 1; of arrays of states, `states`
+    tells at which: booleans that broadcast to the shape of these arrays."""
 
-    def __init__(self, code):
+    def __init__(self, code, states=True):
         super().__init__(METADATA["reasons"][code - 1])
         self.code = code
+        self.states = states
+
+
+def _symdyn_solve(A, b, code):
+    """A^-1 b for one matrix, or for those of many states; where some are singular, it is told which."""
+    try:
+        return np.linalg.solve(A, b)
+    except np.linalg.LinAlgError:
+        singular = np.linalg.slogdet(A)[0] == 0.0
+        raise SingularError(code, singular if np.any(singular) else True) from None
 
 
 def symdyn_multipliers(n, m, values, code):
     """lam (m) of C^T lam = g of least norm for numbers or arrays of them (states): values are C row by row, scales of its rows
     and columns, and g; iterated, lam += (C C^T + e^2)^-1 C (g - C^T lam) with e = 1e-05."""
     shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-    flat = np.stack([np.broadcast_to(np.asarray(v, dtype=float), shape) for v in values], axis=-1)
+    flat = np.array(values if not shape else np.broadcast_arrays(*values), dtype=float)
+    flat = np.ascontiguousarray(np.moveaxis(flat, 0, -1))
     C, rows, columns, g = np.split(flat, np.cumsum([m * n, m, n]), axis=-1)
     C = rows[..., :, None] * C.reshape(*shape, m, n) * columns[..., None, :]
     g, Ct = columns * g, np.swapaxes(C, -1, -2)
     B = C @ Ct + 1e-05**2 * np.eye(m)
     lam = np.zeros((*rows.shape, 1))
     for _ in range(5):
-        lam = lam + np.linalg.solve(B, C @ (g[..., None] - Ct @ lam))
+        lam = lam + _symdyn_solve(B, C @ (g[..., None] - Ct @ lam), code)
     for _ in range(2):
         rest = lam  # what rounding has left outside the range of C, when all else has vanished
         for _ in range(5):
-            rest = 1e-05**2 * np.linalg.solve(B, rest)
+            rest = 1e-05**2 * _symdyn_solve(B, rest, code)
         lam = lam - rest
     return np.moveaxis(rows * lam[..., 0], -1, 0)
 
@@ -104,7 +116,8 @@ def symdyn_saddle(n, m, values, code):
     row, scales of the rows and columns of C, f and d; the iterated augmented Lagrangian of Bayo, Garcia de Jalon and Serna,
     Comput. Methods Appl. Mech. Eng. 71 (1988)."""
     shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-    flat = np.stack([np.broadcast_to(np.asarray(v, dtype=float), shape) for v in values], axis=-1)
+    flat = np.array(values if not shape else np.broadcast_arrays(*values), dtype=float)
+    flat = np.ascontiguousarray(np.moveaxis(flat, 0, -1))
     e, triangle, C, rows, columns, f, d = np.split(flat, np.cumsum([1, n * (n + 1) // 2, m * n, m, n, n]), axis=-1)
     M = np.empty((*shape, n, n))
     M[(..., *np.tril_indices(n))] = triangle
@@ -121,14 +134,19 @@ def symdyn_saddle(n, m, values, code):
     f, d, Ct = columns * f, rows * d, np.swapaxes(C, -1, -2)
     a = largest / e**2
     A = M + a[..., None] * (Ct @ C)
+    left, entries, loose = A.copy(), np.diagonal(A, axis1=-2, axis2=-1), np.zeros(shape, dtype=bool)
+    for j in range(n):  # a pivot that is next to nothing of its entry is none: nothing holds some direction
+        pivot = left[..., j, j]
+        loose |= pivot <= np.maximum(1e-14 * entries[..., j], 0.0)
+        column = left[..., j + 1:, j] / np.where(loose, 1.0, pivot)[..., None]
+        left[..., j + 1:, j + 1:] -= column[..., :, None] * left[..., None, j, j + 1:]
+    if loose.any():
+        raise SingularError(code, loose)
     x, lam = np.zeros(f.shape), np.zeros(d.shape)
     for _ in range(5):
         gap = d - (C @ x[..., None])[..., 0]
         r = f - (M @ x[..., None])[..., 0] + (Ct @ (a * gap - lam)[..., None])[..., 0]
-        try:
-            x = x + np.linalg.solve(A, r[..., None])[..., 0]
-        except np.linalg.LinAlgError:
-            raise SingularError(code) from None
+        x = x + _symdyn_solve(A, r[..., None], code)[..., 0]
         lam = lam - a * (d - (C @ x[..., None])[..., 0])
     return np.moveaxis(columns * x, -1, 0)
 
@@ -146,6 +164,15 @@ class _OneState:
     logical_or = staticmethod(lambda a, b: a or b)
     logical_not = staticmethod(lambda a: not a)
 
+    @staticmethod
+    def positive(value, code):
+        if not value > 0.0:  # NaN is not, either
+            raise SingularError(code)
+
+    @staticmethod
+    def otherwise(error, regular, singular, arguments):
+        return singular(*arguments)
+
 
 class _ManyStates:
     """The same for arrays of states, on NumPy."""
@@ -157,10 +184,42 @@ class _ManyStates:
     min, max, abs, sign, where = np.minimum, np.maximum, np.abs, np.sign, np.where
     logical_and, logical_or, logical_not = np.logical_and, np.logical_or, np.logical_not
 
+    @staticmethod
+    def positive(value, code):
+        if not np.all(value > 0.0):
+            raise SingularError(code, np.logical_not(value > 0.0))
 
-def _positive(value, code):
-    if not np.all(value > 0.0):
-        raise SingularError(code)
+    @staticmethod
+    def otherwise(error, regular, singular, arguments):
+        """What `regular` gives at the states where it does not fail, and `singular` at the others; error: of `regular` at all."""
+        t, *groups = arguments
+        shape = np.broadcast_shapes(np.shape(t), *[np.shape(value) for group in groups for value in group])
+        holds = np.array(np.broadcast_to(np.logical_not(error.states), shape))
+
+        def at(states, function):
+            def taken(value):  # one value for all states stays one
+                return value if np.ndim(value) == 0 else np.broadcast_to(value, shape)[states]
+
+            return function(taken(t), *[[taken(value) for value in group] for group in groups])
+
+        usual = []
+        while holds.any():
+            try:
+                usual = at(holds, regular)
+                break
+            except SingularError as another:  # a later check, which stops more of them
+                holds[holds] = np.logical_not(another.states)
+        fails = np.array(~holds)
+        try:
+            others = at(fails, singular)
+        except SingularError as last:
+            fails[fails] = last.states
+            raise SingularError(last.code, fails) from None
+        results = np.empty((len(others), *shape))
+        for states, values in ((holds, usual), (fails, others)):
+            for k, value in enumerate(values):
+                results[k, states] = value
+        return results
 
 
 def _define(m):
@@ -170,6 +229,7 @@ def _define(m):
     exp, log, sqrt, pow, floor, ceil, erf = m.exp, m.log, m.sqrt, m.pow, m.floor, m.ceil, m.erf
     min, max, abs, sign, where = m.min, m.max, m.abs, m.sign, m.where
     logical_and, logical_or, logical_not = m.logical_and, m.logical_or, m.logical_not
+    _positive = m.positive
 
     def prologue(p):
         # Constants: everything that depends on parameters only; 30 operations, once per set of parameters.
@@ -421,10 +481,11 @@ def _define(m):
 
     def rhs(*arguments):
         # x_dot = f(t, x) with x = [q; u; z]: M_tilde u_dot = F_tilde - k_tilde
+        # Each state by rhs_regular where no check fails there, else by rhs_singular.
         try:
             return rhs_regular(*arguments)
-        except SingularError:
-            return rhs_singular(*arguments)
+        except SingularError as error:
+            return m.otherwise(error, rhs_regular, rhs_singular, arguments)
 
     def C(t, q, u, z, ud, inputs, p, c):
         # constraints, zero where they hold; 0 in rows of velocity constraints
@@ -735,10 +796,11 @@ def _define(m):
 
     def lam(*arguments):
         # multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde
+        # Each state by lam_regular where no check fails there, else by lam_singular.
         try:
             return lam_regular(*arguments)
-        except SingularError:
-            return lam_singular(*arguments)
+        except SingularError as error:
+            return m.otherwise(error, lam_regular, lam_singular, arguments)
 
     def reactions_regular(t, q, u, z, ud, inputs, p, c):
         # force and moment of every joint on its child, at the joint's point on it, n-frame
@@ -1095,10 +1157,11 @@ def _define(m):
 
     def reactions(*arguments):
         # force and moment of every joint on its child, at the joint's point on it, n-frame
+        # Each state by reactions_regular where no check fails there, else by reactions_singular.
         try:
             return reactions_regular(*arguments)
-        except SingularError:
-            return reactions_singular(*arguments)
+        except SingularError as error:
+            return m.otherwise(error, reactions_regular, reactions_singular, arguments)
 
     return {"rhs": rhs, "C": C, "C_r": C_r, "F_d": F_d, "lam": lam, "reactions": reactions, "prologue": prologue}
 

@@ -22,7 +22,7 @@
 
 double sin(double), cos(double), tan(double), asin(double), acos(double), atan(double), atan2(double, double);
 double sinh(double), cosh(double), tanh(double), asinh(double), acosh(double), atanh(double);
-double exp(double), log(double), sqrt(double), pow(double, double), erf(double);
+double exp(double), exp2(double), log(double), log2(double), log1p(double), sqrt(double), pow(double, double), erf(double);
 double fabs(double), floor(double), ceil(double), fmin(double, double), fmax(double, double);
 
 // a*b + c, rounded once where the processor can.
@@ -84,8 +84,7 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
     for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= largest;
-    for (int i = 0; !small && i < n; i++)
-        if (!(fabs(angles[i]) <= largest)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
+    for (int i = 0; !small && i < n; i++) if (!(fabs(angles[i]) <= largest)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
 }
 
 // Constants: everything that depends on parameters only; 3 operations, once per set of parameters.
@@ -407,6 +406,16 @@ static inline double pendulum_dop853_scale(const pendulum_dop853 *run, int i, do
     return 1.0/(run->atol[i] + run->rtol*size + 1e-300);
 }
 
+// The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, has no say.
+static double pendulum_dop853_square(const pendulum_dop853 *run, const double *v, const double *x_new) {
+    double sum = 0.0;
+    for (int i = 0; i < 2; i++) {
+        const double a = v[i]*pendulum_dop853_scale(run, i, x_new[i]);
+        sum += run->atol[i] + fabs(run->x[i]) + fabs(x_new[i]) > 0.0 ? a*a : 0.0;
+    }
+    return sum/2.0;
+}
+
 // v^(1/8)
 static inline double pendulum_dop853_root(double v) {
     return sqrt(sqrt(sqrt(v)));
@@ -539,19 +548,13 @@ static int pendulum_dop853_state_at(pendulum_dop853 *run, double s, double *x) {
 // Length of the first step (Hairer, Norsett, Wanner, section II.4): by state, derivative, its change over a small Euler step.
 static double pendulum_dop853_first_step(pendulum_dop853 *run) {
     const double span = fabs(run->t_end - run->t);
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, y[2], yd[2], scale[2];
-    for (int i = 0; i < 2; i++) {
-        const double tolerated = run->atol[i] + run->rtol*fabs(run->x[i]);
-        scale[i] = tolerated > 0.0 ? 1.0/tolerated : 0.0;  // x = 0 without atol: no say
-        d0 += run->x[i]*scale[i]*run->x[i]*scale[i]/2.0;
-        d1 += run->xd[i]*scale[i]*run->xd[i]*scale[i]/2.0;
-    }
-    d0 = sqrt(d0), d1 = sqrt(d1);
+    const double d0 = sqrt(pendulum_dop853_square(run, run->x, run->x)), d1 = sqrt(pendulum_dop853_square(run, run->xd, run->x));
+    double y[2], yd[2];
     const double guess = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01*d0/d1, h0 = guess <= span ? guess : span;
     for (int i = 0; i < 2; i++) y[i] = run->x[i] + run->direction*h0*run->xd[i];
     if (pendulum_dop853_eval(run, run->t + run->direction*h0, y, yd)) return h0;  // the step control will find a way round
-    for (int i = 0; i < 2; i++) d2 += (yd[i] - run->xd[i])*scale[i]*(yd[i] - run->xd[i])*scale[i]/2.0;
-    d2 = sqrt(d2)/h0;
+    for (int i = 0; i < 2; i++) yd[i] -= run->xd[i];
+    const double d2 = sqrt(pendulum_dop853_square(run, yd, run->x))/h0;
     const double h1 = d1 <= 1e-15 && d2 <= 1e-15 ? (h0*1e-3 > 1e-6 ? h0*1e-3 : 1e-6) : pendulum_dop853_root(0.01/(d1 > d2 ? d1 : d2));
     return h1 < 100.0*h0 ? h1 : 100.0*h0;
 }
@@ -623,10 +626,7 @@ static void pendulum_dop853_judge(pendulum_dop853 *run, int failure, double err,
     run->root_old = root > 0.316 ? root : 0.316;
     run->t_old = run->t, run->h_old = run->h_try;
     run->t = run->t_new, run->t_low = run->t_new_low;
-    for (int i = 0; i < 2; i++) {
-        run->x_old[i] = run->x[i];
-        run->x[i] = x_new[i], run->xd[i] = xd_new[i];
-    }
+    for (int i = 0; i < 2; i++) run->x_old[i] = run->x[i], run->x[i] = x_new[i], run->xd[i] = xd_new[i];
     run->n_steps++, run->unstored = 1, run->rejected = run->dense_ready = 0;
     run->crossed = run->crossing, run->n_crossing = 0;
     if (run->t == run->t_end) run->status = pendulum_dop853_DONE;
@@ -648,8 +648,7 @@ static int pendulum_dop853_serve(pendulum_dop853 *run, const double *t_out, long
         const double s = t_out[*n_written];
         const double ahead = (s - run->t)*run->direction, behind = (run->t_old - s)*run->direction;
         double *restrict const x = x_out + *n_written*2;
-        if (run->direction == 0.0 ? !(fabs(s - run->t) <= run->t_slack)
-                : !(ahead <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;  // not reached yet
+        if (!((run->direction == 0.0 ? fabs(s - run->t) : ahead) <= (run->t == run->t_end ? run->t_slack : 0.0))) return 0;
         if (behind > run->t_slack) return pendulum_dop853_BAD_OUTPUT_TIME;
         int failure = 0;
         if (ahead >= 0.0 || behind >= 0.0) for (int i = 0; i < 2; i++) x[i] = ahead >= 0.0 ? run->x[i] : run->x_old[i];

@@ -24,13 +24,13 @@ extern "C" {
 #endif
 
 enum {
-    pendulum_n_q = 1,       // coordinates
-    pendulum_n_u = 1,       // speeds
-    pendulum_n_z = 0,       // extra states
-    pendulum_n_x = 2,       // x = [q; u; z]
-    pendulum_n_inputs = 0,
-    pendulum_n_p = 3,       // parameters
-    pendulum_n_c = 3        // constants computed by the prologue
+    pendulum_n_q = 1,  // coordinates
+    pendulum_n_u = 1,  // speeds
+    pendulum_n_z = 0,  // extra states
+    pendulum_n_x = 2,  // x = [q; u; z]
+    pendulum_n_inputs = 0,  // inputs
+    pendulum_n_p = 3,  // parameters
+    pendulum_n_c = 3,  // constants computed by the prologue
 };
 
 // Names in the order of the arguments, with units and default values.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 from symdyn.bench.peers.casadi_loop import Form, casadi_contestant, hoisted, operations
@@ -15,9 +16,13 @@ _ERROR_SIZE = 1000
 
 
 class CasadiPeer:
-    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install.
 
-    def __init__(self) -> None:
+    kinds   of joints that it is built for, as description.py writes them, all by default: one alone is built in two thirds of
+            the time
+    """
+
+    def __init__(self, kinds: Sequence[str] = ()) -> None:
         folder = package_folder("casadi")
         self.compiler = c_compiler()
         libraries = [root for root in (folder, *[p / "lib" for p in folder.parents[:4]]) if (root / "libcasadi.so").exists()]
@@ -26,7 +31,8 @@ class CasadiPeer:
         import casadi
 
         self.casadi = casadi
-        text = "".join(["#include <pinocchio/autodiff/casadi.hpp>\n", *[
+        asked = [f"#define KINDS {', '.join(kinds)}\n"] if kinds else []
+        text = "".join(["#include <pinocchio/autodiff/casadi.hpp>\n", *asked, *[
             (SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "casadi_aba.cpp")]])
         options = ["-O0", "-DBOOST_VARIANT_USE_RELAXED_GET_BY_DEFAULT", *include_flags("pinocchio", "boost", "eigen", "casadi"),
                    "-Wl,--no-as-needed", f"-L{libraries[0]}", "-lcasadi", f"-Wl,-rpath,{libraries[0]}"]

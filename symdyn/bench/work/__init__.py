@@ -2,11 +2,12 @@
 
     cases, bodies, closed_forms   the mechanisms of --all, and how a name becomes what is measured
     subject                       its formulations, and errors of motions in any coordinates
+    start                         where motions begin, and whether anything moves
     reference, converged, store   what errors are measured by: closed forms, runs with more digits, runs that agree
     methods, asked                what can be asked for, checked
     measure, against              one row of ours, and of another program
     plan, timing                  all rows in their order, and passes over them for their times
-    benchmark, resume             the run that goes on where it was stopped, the result
+    benchmark, resume, carried    the run that goes on where it was stopped, the result, rows kept for later runs
     table, picture, page          how it is shown
     command                       `symdyn bench`
 """
@@ -33,10 +34,11 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    "n_link_pendulum(5)", or of the list of `symdyn bench --all`
     formulations   some of "embedding", "recursive", "augmented", "absolute", "absolute:angles", and where the system can be had
                    with Euler parameters also "embedding:parameters" and so on; default: all that the mechanism has
-    methods        compiled ones, SciPy's, and "auto", as for `simulate`; default: all compiled ones
+    methods        compiled ones, SciPy's, and "auto", as for `simulate`; default: all compiled ones, without a compiler SciPy's
     tolerances     relative and absolute ones of a step; default: 1e-3 to 1e-15
     steps          s, for methods with steps of one length; besides the tolerances; default: none
-    end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state
+    end            s; default: the system's duration; the motion begins at t = 0 in the system's initial state, or the nearest
+                   one that fulfils its constraints; a motion that stands still is told
     repeats        timed runs of a row, of which the least time is compared; of very short ones up to eight times as many
     against        other programs to run beside: "scipy", "cvode", "ida", "heyoka", "casadi", "pinocchio", "mujoco", "exudyn",
                    or "all" of these
@@ -45,7 +47,8 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    processes of their own then, on Linux; what they prepare counts, and is ended and told where it takes too much
                    of what is left
     folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed anew
-                   at the end if there is time for that, else the rows say so
+                   at the end if there is time for that, else the rows say so; rows that are not asked for stay in the file for
+                   a later run
     progress       show a bar (needs tqdm)
     at             times besides the end at which errors are of interest, s; runs that end there are timed alone
     per_decade     tolerances to a decade, 1 to 10; more than one begin at 0.1, and tell the least time below an error more

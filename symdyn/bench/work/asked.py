@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from symdyn.bench.work import against, methods
 from symdyn.bench.work.subject import Subject
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, no_value
 
 # Of the usual grid, and the most to a decade.
 LOOSEST, TIGHTEST, DENSEST = 1e-3, 1e-15, 10
@@ -22,7 +22,7 @@ LARGEST = 0.1
 class Asked:
     """What is measured, checked.
 
-    formulations   None: all;  steps: s, None: chosen after a trial run;  at: further times of interest, s
+    formulations   None: all;  steps: s, None: none;  at: further times of interest, s
     budget         s, None: no bound
     """
 
@@ -70,9 +70,8 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
             faults.append(f"the end {subject.end!r} of {subject.name} must be a positive time, s")
         lacking = subject.lacking
         if lacking:
-            faults.append(f"{subject.name}: parameters: no value for {', '.join(lacking)}, which "
-                          f"{'has no default' if len(lacking) == 1 else 'have no defaults'}; give every parameter a number in "
-                          "the system's `defaults`")
+            faults.append(f"{subject.name}: parameters: {no_value(lacking)}; give every parameter a number in the system's "
+                          "`defaults`")
     return faults
 
 
@@ -81,7 +80,9 @@ def checked(subjects: Sequence[Subject], formulations: Any = None, method_names:
     """What is asked for. Raises ArgumentError that lists everything that is wrong with it."""
     formulations, method_names, peers = _listed(formulations), _listed(method_names), _listed(peers)
     tolerances, steps, at = _listed(tolerances), _listed(steps), _listed(at)
-    faults = faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at, per_decade)
+    faults = [f"no {what} are named; name some, or leave them out for the usual ones" for what, values in (
+        ("formulations", formulations), ("methods", method_names), ("tolerances", tolerances), ("steps", steps)) if values == []]
+    faults += faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at, per_decade)
     if faults:
         raise ArgumentError("the bench cannot run: " + (faults[0] if len(faults) == 1 else
                                                         f"{len(faults)} faults:\n  - " + "\n  - ".join(faults)))
@@ -102,7 +103,7 @@ def grid(per_decade: int) -> list[float]:
 
 def _listed(values: Any) -> Any:
     """A single value as a list of one."""
-    return [values] if isinstance(values, (str, int, float)) else None if values is None else list(values)
+    return None if values is None else list(values) if isinstance(values, Iterable) and not isinstance(values, str) else [values]
 
 
 def _is_whole(value: Any) -> bool:

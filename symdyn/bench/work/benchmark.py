@@ -13,14 +13,18 @@ from typing import Any
 from symdyn.bench import kept as files
 from symdyn.bench.work import resume
 from symdyn.bench.work.asked import Asked
-from symdyn.bench.work.plan import Key, Peers, Walk, jobs_of
-from symdyn.bench.work.record import Reference, Row, Skipped
+from symdyn.bench.work.carried import DAMAGED, Carried, carried
+from symdyn.bench.work.methods import NO_COMPILER
+from symdyn.bench.work.plan import Peers, Walk, jobs_of
+from symdyn.bench.work.record import Key, Reference, Row, Skipped
 from symdyn.bench.work.reference import PATIENCE, find_reference
+from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
 from symdyn.bench.work.subject import Formulation, Subject, Yardstick
 from symdyn.bench.work.timing import PASSES
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
 from symdyn.progress import bar as progress_bar
+from symdyn.runtime.compiler import find_compiler
 
 RESULTS = "results.json"
 STATE, BODIES = "coordinates (q) and speeds (u)", "poses (q) and velocities (u) of all bodies"
@@ -38,6 +42,9 @@ class Benchmark:
     about           machine, compiler, version
     measure         of what errors are: STATE, or BODIES if formulations with different coordinates take part
     timed           when this run began; command: what tells the command that it belongs to, if that measures several mechanisms
+    notes           what a reader must know of the motion, a sentence each
+    asked           keys of all rows that were asked for; motion: what tells the motion, machine and code, fingerprint also what
+                    errors are of; carried: rows of earlier runs that were not asked for, which a later one may go on with
     """
 
     name: str
@@ -53,12 +60,21 @@ class Benchmark:
     measure: str = STATE
     timed: str = ""
     command: str = ""
+    notes: tuple[str, ...] = ()
+    asked: tuple[Key, ...] = ()
+    motion: str = ""
+    carried: Carried = field(default_factory=Carried)
 
     def table(self) -> str:
         """Everything as text."""
         from symdyn.bench.work.table import table
 
         return table(self)
+
+    @property
+    def still(self) -> bool:
+        """Whether nothing moves: the best of runs without errors tells nothing."""
+        return STILL in self.notes
 
     @property
     def earlier(self) -> list[Row]:
@@ -88,11 +104,12 @@ class Benchmark:
         r = self.reference
         return {"name": self.name, "end": self.end, "at": list(self.at), "complete": not self.unfinished,
                 "unfinished": self.unfinished, "fingerprint": self.fingerprint, "about": self.about, "timed": self.timed,
-                "command": self.command,
+                "command": self.command, "motion": self.motion, "notes": list(self.notes), "asked": [list(k) for k in self.asked],
                 "operations": self.operations, "measure": self.measure,
                 "reference": {"kind": r.kind, "digits": round(r.digits, 2), "how": r.how, "names": list(r.names),
                               "times": list(r.times), "x": [list(x) for x in r.x]},
-                "skipped": [vars(s) for s in self.skipped], "rows": [row.record() for row in self.rows]}
+                "skipped": [vars(s) for s in self.skipped], "rows": [row.record() for row in self.rows],
+                "carried": self.carried.record(self.fingerprint, self.rows)}
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Benchmark:
@@ -101,7 +118,9 @@ class Benchmark:
         reference = Reference(r["kind"], tuple(r["times"]), r["x"], float(r["digits"]), r["how"], tuple(r["names"]))
         return cls(data["name"], float(data["end"]), [Row.of(row) for row in data["rows"]],
                    [Skipped(**skipped) for skipped in data["skipped"]], reference, tuple(data["at"]), dict(data["operations"]),
-                   dict(data["about"]), data["unfinished"], data["fingerprint"], data["measure"], data["timed"], data["command"])
+                   dict(data["about"]), data["unfinished"], data["fingerprint"], data["measure"], data["timed"], data["command"],
+                   tuple(data["notes"]), tuple(tuple(key) for key in data["asked"]), data["motion"],
+                   Carried.of({**data, "rows": ()}))
 
     def save(self, folder: Any) -> list[Path]:
         """Write results.json, work_precision.png and .svg and report.html into a folder, made if absent; returns their paths.
@@ -125,31 +144,40 @@ class Benchmark:
 
 
 def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bool = False,
-        told: Callable[[str], None] = lambda text: None, command: str = "") -> Benchmark:
+        told: Callable[[str], None] = lambda text: None, command: str = "", share: float | None = None,
+        begun: float | None = None) -> Benchmark:
     """Measure a mechanism.
 
     folder     rows that an unfinished run left there are kept, and timed anew at the end where that is cheap; every row is
                written as soon as it is measured
     progress   show a bar (needs tqdm);  told: called with what is going on;  command: see Benchmark
+    share      of the budget, s, where it is for several mechanisms;  begun: of time.perf_counter, when it began to count
     Raises SymdynError where nothing can be measured.
     """
-    begun = clock.perf_counter()
+    begun = clock.perf_counter() if begun is None else begun
     subject = replace(subject, at=asked.at)
-    formulations, skipped, first = _formulated(subject, asked)
-    budget = math.inf if asked.budget is None else asked.budget
+    formulations, skipped, first, moved = _formulated(subject, asked)
+    budget = math.inf if asked.budget is None else asked.budget if share is None else share
     now = clock.perf_counter()
     reference = find_reference(subject, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), told,
                                begun + budget * _AT_MOST)
     bodies = _differ(first, formulations)
+    motion = _motion(subject, first)
+    notes = [*filter(None, [moved]), *[STILL] * stands_still(reference, first), *[NO_COMPILER] * (find_compiler() is None)]
+    for note in notes:
+        told(f"{subject.name}: {note}")
     waited = clock.perf_counter() - begun
     result = Benchmark(subject.name, subject.end, [], skipped, reference, asked.at,
                        {f.name: f.operations for f in formulations}, resume.about(), "it was interrupted",
-                       _fingerprint(subject, first, reference, bodies), BODIES if bodies else STATE, resume.now(), command)
-    kept = _kept(folder, result)
+                       _fingerprint(motion, reference, bodies), BODIES if bodies else STATE, resume.now(), command,
+                       tuple(notes), motion=motion)
+    result = replace(result, carried=carried(folder and folder / RESULTS, result.motion, result.fingerprint))
     deadline = begun + budget
     with contextlib.ExitStack() as stack:
         peers = Peers(formulations, asked, subject, deadline, stack)
         jobs = list(jobs_of(formulations, asked, Yardstick(reference, first, bodies), peers))
+        result = replace(result, asked=tuple(job.key for job in jobs))
+        kept = result.carried.kept(result.fingerprint, result.asked)
         bar = progress_bar(desc=subject.name, total=len(jobs) * PASSES, unit="run", leave=False) if progress else None
         if bar is not None:
             stack.callback(bar.close)
@@ -160,37 +188,40 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
         walked.time_again(asked.repeats)
     result.skipped.extend([*peers.skipped, *walked.skipped])
     result = replace(result, rows=_sorted(result.rows, formulations, asked),
-                     unfinished=_unfinished(walked.left, len(jobs), peers.late, asked.budget, waited))
+                     unfinished=_unfinished(walked.left, len(jobs), peers.late, asked.budget, share, waited))
     if folder is not None:
         result.store(folder)
     return result
 
 
-def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None, waited: float) -> str:
-    """Why rows are missing; empty if none is. waited: s before anything could be run."""
+def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None, share: float | None, waited: float) -> str:
+    """Why rows are missing; empty if none is. share: of the budget, None: all of it; waited: s before anything could be run."""
     told = [f"{left} of {total} runs were not made"] if left else []
     if late:
         told.append(f"{late[0]} was not ready" if len(late) == 1 else f"{len(late)} other programs were not ready")
     if budget is None or not told:
         return ""
-    why = f", which derivation, compilation and reference used up: they took {waited:.2g} s" if waited > budget else ""
-    return f"{' and '.join(told)} within the budget of {budget:.4g} s{why}"
+    part = "" if share is None else f", of which this mechanism has {share:.3g} s"
+    over = waited > (budget if share is None else share)
+    why = f", which derivation, compilation and reference used up: they took {waited:.2g} s" if over else ""
+    return f"{' and '.join(told)} within the budget of {budget:.4g} s{part}{why}"
 
 
 def finished(subject: Subject, asked: Asked, folder: Path, command: str) -> Benchmark | None:
     """What an earlier run of the same command left in a folder, if it was done and the motion is the same; else None."""
     data = resume.whole(folder / RESULTS, command)
     subject = replace(subject, at=asked.at)
-    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError, SymdynError):  # damaged, or nothing can be derived
+    with contextlib.suppress(*DAMAGED, SymdynError):  # damaged, or nothing can be derived
         found = Benchmark.of(data)
-        formulations, _, first = _formulated(subject, asked)
-        if found.fingerprint == _fingerprint(subject, first, found.reference, _differ(first, formulations)):
+        formulations, _, first, _ = _formulated(subject, asked)
+        if found.fingerprint == _fingerprint(_motion(subject, first), found.reference, _differ(first, formulations)):
             return found
     return None
 
 
-def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation]:
-    """Formulations, those left out, and the first there is, whatever was asked for: errors are measured by its motion.
+def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation, str]:
+    """Formulations, those left out, the first there is, whatever was asked for: errors are measured by its motion; and what was
+    changed in the start, if it was not on the constraints, else nothing.
 
     Raises SymdynError if there is none.
     """
@@ -198,7 +229,16 @@ def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list
     if not formulations:
         raise SymdynError(f"{subject.name}: none of the formulations that were asked for fits:\n  - "
                           + "\n  - ".join(map(str, skipped)))
-    return formulations, skipped, formulations[0] if asked.formulations is None else subject.first()
+    first = formulations[0] if asked.formulations is None else subject.first()
+    moved, told = on_constraints(subject, first)
+    if told:
+        names = [f.name for f in formulations if f.name in moved.names]
+        skipped += [Skipped(f.name, "", ELSEWHERE) for f in formulations if f.name not in names]
+        if not names:
+            raise SymdynError(f"{subject.name}: {ELSEWHERE}")
+        formulations = moved.formulated(names)[0]
+        first = next((f for f in formulations if f.name == first.name), None) or moved.formulated([first.name])[0][0]
+    return formulations, skipped, first, told
 
 
 def _differ(first: Formulation, formulations: Sequence[Formulation]) -> bool:
@@ -216,24 +256,19 @@ def _sorted(rows: Sequence[Row], formulations: Sequence[Formulation], asked: Ask
 
     def place(row: Row) -> tuple[Any, ...]:
         method = order.index(row.method) if row.method in order else len(order)
-        return row.peer, row.peer and row.method, names.index(row.formulation), method, -(row.tolerance or row.step or 0.0)
+        formulation = names.index(row.formulation) if row.formulation in names else len(names)
+        return row.peer, row.peer and row.method, formulation, method, -(row.tolerance or row.step or 0.0)
 
     return sorted(rows, key=place)
 
 
-def _fingerprint(subject: Subject, first: Formulation, reference: Reference, bodies: bool) -> str:
-    """What rows depend on besides their own names: numbers, times, and the code that runs."""
+def _motion(subject: Subject, first: Formulation) -> str:
+    """What rows depend on besides their own names and what errors are of: numbers, and the code that runs."""
     text = "".join(emit(first.equations, "c", ("rhs",), standalone=False).files.values())
-    return resume.fingerprint(subject.name, subject.end, bodies, list(reference.times), reference.kind, first.x0.tolist(),
-                              first.module.default_parameters.tolist(), resume.about(), resume.code(), text)
+    return resume.fingerprint(subject.name, subject.end, first.x0.tolist(), first.module.default_parameters.tolist(),
+                              resume.about(), resume.code(), text)
 
 
-def _kept(folder: Path | None, result: Benchmark) -> dict[Key, Row]:
-    """The rows of an unfinished run of the same in a folder, with when they were timed."""
-    if folder is None:
-        return {}
-    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError):  # another's file
-        data = resume.left_by(folder / RESULTS, result.fingerprint)
-        rows = [Row.of(row) for row in data.get("rows", ())]
-        return {row.key: replace(row, earlier=row.earlier or data.get("timed", "") or "an unknown time") for row in rows}
-    return {}
+def _fingerprint(motion: str, reference: Reference, bodies: bool) -> str:
+    """The same, with what errors are of and measured by."""
+    return resume.fingerprint(motion, bodies, list(reference.times), reference.kind)

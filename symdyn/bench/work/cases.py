@@ -6,7 +6,7 @@ import difflib
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from symdyn import systems
@@ -16,11 +16,16 @@ from symdyn.bench.work.subject import Subject
 from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
+from symdyn.options import wrong_option
 
 _ORIENTATION = "orientation"
 _ORIENTATIONS = ("angles", "parameters")
 # m/s, of the turbine.
 _WIND = 8.0
+
+
+class Unknown(ArgumentError):
+    """A name that stands for no mechanism."""
 
 
 @dataclass(frozen=True)
@@ -77,29 +82,45 @@ def known() -> list[str]:
     return list(dict.fromkeys([*CASES, *systems.names()]))
 
 
-def subject(name: str, end: float | None = None) -> Subject:
-    """What is measured under a name of the list, of the catalogue, or of the catalogue with its first option in parentheses,
-    such as n_link_pendulum(7).
+def named(name: str, options: Mapping[str, Any] | None = None) -> Case:
+    """The mechanism of a name of the list, of the catalogue, or of the catalogue with its first option in parentheses, such as
+    n_link_pendulum(7).
 
-    Raises ArgumentError for a name that there is not.
+    options   besides, such as {"n": 7}
+    Raises Unknown for a name that there is not, ArgumentError for options that it does not take.
     """
-    case = CASES.get(name)
+    case, options = CASES.get(name), dict(options or {})
     if case is None:
         found = re.fullmatch(r"(\w+)(?:\((\w+)\))?", name)
         if found is None or found[1] not in systems.names():
             near = difflib.get_close_matches(name, known(), 3)
             hint = f"did you mean {' or '.join(near)}? There are" if near else "there are"
-            raise ArgumentError(f"there is no mechanism {name!r} to measure; {hint} {', '.join(known())}, and Python files that "
-                                "define system()")
-        options = {}
+            raise Unknown(f"there is no mechanism {name!r}; {hint} {', '.join(known())}")
+        case = Case(found[1])
         if found[2]:
-            first = next(iter(inspect.signature(getattr(systems, found[1])).parameters.values()), None)
+            first = next(iter(inspect.signature(case.maker()).parameters), None)
             if first is None:
                 raise ArgumentError(f"{found[1]} takes no option, found {name!r}")
-            options = {first.name: int(found[2]) if found[2].isdigit() else found[2]}
-        case = Case(found[1], options)
-    made = from_maker(file_name(name), case.maker(), case.end if end is None else end, case.options)
-    return Subject(made.name, made.variants, made.end, closed=case.closed, source=case.source)
+            if first in options:
+                raise ArgumentError(f"the option {first} is given twice: {name} and {first}={options[first]}")
+            options[first] = int(found[2]) if found[2].isdigit() else {"True": True, "False": False}.get(found[2], found[2])
+    wrong = wrong_option(name.partition("(")[0], case.maker(), options)
+    if wrong:
+        raise ArgumentError(wrong)
+    # What is known of the motion, it is known of the usual options.
+    return replace(case, options={**case.options, **options}, closed=None, source="") if options else case
+
+
+def title(name: str, options: Mapping[str, Any] | None = None) -> str:
+    """What files of a mechanism with these options are named by."""
+    return file_name("_".join((name, *(f"{key}_{value}" for key, value in (options or {}).items()))))
+
+
+def subject(name: str, end: float | None = None, options: Mapping[str, Any] | None = None) -> Subject:
+    """What is measured under a name; name, options and errors as of `named`."""
+    case = named(name, options)
+    made = from_maker(title(name, options), case.maker(), case.end if end is None else end, case.options)
+    return replace(made, closed=case.closed, source=case.source)
 
 
 def taken(system: Any, end: float | None = None) -> Subject:
@@ -108,6 +129,8 @@ def taken(system: Any, end: float | None = None) -> Subject:
     Raises ArgumentError for anything else.
     """
     if isinstance(system, str):
+        if system.endswith(".py"):
+            raise ArgumentError(f"{system} is the name of a file; pass the System that its function system() returns")
         return subject(system, end)
     if isinstance(system, System):
         return of_system(system, end)

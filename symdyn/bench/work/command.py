@@ -13,7 +13,7 @@ from symdyn.bench.work import resume
 from symdyn.bench.work.asked import Asked, checked
 from symdyn.bench.work.benchmark import RESULTS, Benchmark, finished
 from symdyn.bench.work.benchmark import run as run_one
-from symdyn.bench.work.cases import CASES, subject
+from symdyn.bench.work.cases import CASES
 from symdyn.bench.work.page import write_page
 from symdyn.bench.work.subject import Subject
 from symdyn.errors import ArgumentError, MissingExtra, SymdynError
@@ -22,15 +22,15 @@ FOLDER = Path("generated") / "bench"
 FILES = (RESULTS, "work_precision.png", "work_precision.svg", "report.html")
 
 
-def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None], Subject]) -> int:
+def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
     """Measure what was asked for; returns how many mechanisms could not be measured, and at least 1 if nothing was.
 
-    from_file   what is measured of a user's file
+    find   what is measured under a name; raises SymdynError for one that there is not
     Raises ArgumentError that lists everything that is wrong with what was asked for.
     """
     begun = clock.perf_counter()
     names = list(dict.fromkeys([*arguments.systems, *(CASES if arguments.all else ())]))
-    subjects, faults = _subjects(names, arguments.end, from_file)
+    subjects, faults = _subjects(names, find)
     if not names:
         faults.append(f"nothing is named; name mechanisms such as {', '.join(list(CASES)[:3])}, a Python file, or pass --all")
     options = {"formulations": arguments.formulations, "method_names": arguments.methods, "tolerances": arguments.rtol,
@@ -66,9 +66,9 @@ def run(arguments: argparse.Namespace, from_file: Callable[[Path, float | None],
             if left <= 0:
                 late.append(one.name)
                 continue
-            share = left / sum(other is one or other not in done for other in subjects[k:])
+            share = left / sum(other is one or other not in done for other in subjects[k:]) if len(subjects) > 1 else None
         try:
-            result = run_one(one, replace(asked, budget=share), place, arguments.progress, _tell, command)
+            result = run_one(one, asked, place, arguments.progress, _tell, command, share, begun if len(subjects) == 1 else None)
         except (ArgumentError, MissingExtra):
             raise
         except SymdynError as error:
@@ -116,13 +116,12 @@ def nothing(result: Benchmark) -> str:
     return "nothing was measured, everything was left out or stopped:\n  - " + "\n  - ".join(why)
 
 
-def _subjects(names: Sequence[str], end: float | None, from_file: Callable[[Path, float | None], Subject]
-              ) -> tuple[list[Subject], list[str]]:
+def _subjects(names: Sequence[str], find: Callable[[str], Subject]) -> tuple[list[Subject], list[str]]:
     """What is measured, and what is wrong with the names."""
     found, faults = [], []
     for name in names:
         try:
-            found.append(from_file(Path(name), end) if name.endswith(".py") else subject(name, end))
+            found.append(find(name))
         except SymdynError as error:
             faults.append(str(error))
     return found, faults

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.work.against.apart import Prepared, TooLong
-from symdyn.bench.work.against.peer import Peer
-from symdyn.bench.work.methods import AUTO
+from symdyn.bench.work.against.peer import Peer, taken_as
+from symdyn.bench.work.methods import AUTO, SERIES
 from symdyn.bench.work.record import NAN, Row
 from symdyn.bench.work.subject import Formulation, Yardstick
 from symdyn.bench.work.timing import Timing, one_pass, seconds_of
@@ -71,7 +71,7 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
     row = timing.told(row, len(yardstick.times)) if sol.success else row
     if method == AUTO:
         row = replace(row, chosen=sol.method, why=sol.why)
-    return replace(row, operations=row.evaluations * formulation.operations)
+    return row if SERIES in (row.method, row.chosen) else replace(row, operations=row.evaluations * formulation.operations)
 
 
 def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequence[float], tolerance: float,
@@ -82,7 +82,7 @@ def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequen
     timing  filled, to go on with
     Raises TooLong.
     """
-    row = Row(formulation.name, peer.name, tolerance, None)
+    row = Row(taken_as(peer, formulation.name), peer.name, tolerance, None)
     errors = np.full((2, len(yardstick.times)), NAN)
     timing = timing or Timing()
     try:

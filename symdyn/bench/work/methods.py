@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from symdyn.runtime.compiler import find_compiler
 from symdyn.runtime.methods import COMPILED, is_compiled
 
 # Of SciPy, on the compiled right-hand side; measured if they are named.
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA", "RK23")
+# Of these, what is measured unless methods are named where there is no compiler; and what is said of it.
+INSTEAD = ("RK45", "DOP853", "Radau", "LSODA")
+NO_COMPILER = "there is no C compiler: NumPy evaluates the right-hand side, for methods of SciPy; for compiled ones install gcc"
+# What it evaluates are orders of series, not the right-hand side, whose operations tell nothing of them.
+SERIES = "taylor"
 # Compiled methods with steps of one length, which they choose by the tolerance unless it is given.
 FIXED = ("gauss",)
 # Chooses one of them for every run; measured if it is named.
@@ -18,8 +24,8 @@ def names() -> list[str]:
 
 
 def usual() -> list[str]:
-    """What is measured unless methods are named: all that are compiled."""
-    return list(COMPILED)
+    """What is measured unless methods are named: all that are compiled, or where there is no compiler some of SciPy's."""
+    return list(COMPILED) if find_compiler() is not None else list(INSTEAD)
 
 
 def takes_steps(name: str) -> bool:

@@ -36,7 +36,7 @@ def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
     indices = [benchmark.index(t) for t in at]
     peers, busy = any(row.peer for row in benchmark.rows), sum(row.disturbed for row in benchmark.rows)
     return {"name": benchmark.name, "end": f"{benchmark.end:g}", "reference": benchmark.reference,
-            "measure": benchmark.measure, "digits": f"{benchmark.reference.digits:.3g}",
+            "notes": benchmark.notes, "measure": benchmark.measure, "digits": f"{benchmark.reference.digits:.3g}",
             "about": benchmark.about, "unfinished": benchmark.unfinished,
             "busy": f"{busy} of {len(benchmark.rows)}" if busy else "",
             "disturbed": f"{DISTURBED:g}", "earlier": earlier(benchmark), "choices": choices(benchmark),
@@ -51,7 +51,7 @@ def part(benchmark: Benchmark, picture: Path) -> dict[str, Any]:
 
 def _best(benchmark: Benchmark, at: float | None, peers: bool) -> list[dict[str, str]]:
     rows, index = [], None if at is None else benchmark.index(at)
-    for error in LEVELS:
+    for error in LEVELS if not benchmark.still else ():
         ours, theirs = benchmark.best(error, at, False), benchmark.best(error, at, True) if peers else None
         if ours is None and theirs is None:
             continue

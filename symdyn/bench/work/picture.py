@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from symdyn.bench.work.against.peer import BODIES
+from symdyn.bench.work.methods import SERIES
 from symdyn.bench.work.record import Row
 from symdyn.errors import MissingExtra
 
@@ -18,11 +20,14 @@ if TYPE_CHECKING:
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8c6d31")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (8, 2)), (0, (3, 4)))
+# With more methods than colours the others have hollow markers and thin lines.
+HOLLOW = {"markerfacecolor": "white", "linewidth": 1.0}
 # Marker and line of other programs; their colours are darker shades.
 PEERS = ("#444444", "#7a0177", "#005824", "#993404", "#08306b", "#67000d", "#3f007d", "#525252", "#b8860b", "#006d77")
 # Errors that are drawn; what is below the first counts as it.
 LEAST, MOST = 1e-17, 10.0
-NAMES = {"absolute:angles": "absolute, Euler angles", "absolute": "absolute", "given": "given equations"}
+NAMES = {"absolute:angles": "absolute, Euler angles", "absolute": "absolute", "given": "given equations",
+         BODIES: "bodies and joints"}
 
 
 def write_pictures(benchmark: Benchmark, folder: Path) -> list[Path]:
@@ -49,7 +54,8 @@ def picture(benchmark: Benchmark) -> Any:
     panels = figure.subplots(len(times), 2, squeeze=False)
     work: tuple[tuple[str, Callable[[Row, int | None], float]], ...] = (
         ("time inside the integrator [ms]", lambda row, index: row.time_at(index) * 1e3),
-        ("evaluations of the right-hand side", Row.evaluations_at))
+        ("evaluations of the right-hand side" + ", with taylor orders of series" * any(
+            SERIES in (row.method, row.chosen) for row in benchmark.rows), Row.evaluations_at))
     for axes, t in zip(panels, times, strict=True):
         index = None if t is None else benchmark.index(t)
         for panel, (title, value) in zip(axes, work, strict=True):
@@ -74,9 +80,10 @@ def styles_of(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
                                 "linestyle": (0, (2, 1)), "linewidth": 1.0, "markerfacecolor": "none", "markersize": 6.5}
         else:
             m, f = methods.index(row.method), formulations.index(row.formulation)
-            color = COLORS[(m if len(methods) > 1 else f) % len(COLORS)]
-            styles[row.line] = {"color": color, "marker": MARKERS[f % len(MARKERS)], "linestyle": LINES[f % len(LINES)],
-                                "linewidth": 1.6, "markersize": 5}
+            k = m if len(methods) > 1 else f
+            styles[row.line] = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[f % len(MARKERS)],
+                                "linestyle": LINES[f % len(LINES)], "linewidth": 1.6, "markersize": 5,
+                                **(HOLLOW if k >= len(COLORS) else {})}
     return styles
 
 
@@ -114,15 +121,19 @@ def _legend(figure: Any, rows: Sequence[Row], styles: dict[str, Any]) -> None:
     own = [r for r in rows if not r.peer]
     methods = list(dict.fromkeys(r.method for r in own))
     for method in methods:
-        color = next(styles[r.line]["color"] for r in own if r.method == method) if len(methods) > 1 else "0.35"
-        handles.append(entry(method, color=color, linewidth=3))
+        style = next(styles[r.line] for r in own if r.method == method)
+        hollow = {"marker": "o", "markersize": 8, "markerfacecolor": "white"} if "markerfacecolor" in style else {}
+        handles.append(entry(method, color=style["color"] if len(methods) > 1 else "0.35", linewidth=3, **hollow))
     handles.append(entry("formulations:", linestyle="none"))
     for name in dict.fromkeys(r.formulation for r in own):
         style = next(styles[r.line] for r in own if r.formulation == name)
-        handles.append(entry(title(name), **(style if len(methods) == 1 else {**style, "color": "0.35"})))
+        handles.append(entry(title(name), **(style if len(methods) == 1 else {
+            **style, "color": "0.35", "linewidth": 1.6, "markerfacecolor": "0.35"})))
     others = list(dict.fromkeys(r.line for r in rows if r.peer))
     if others:
-        handles += [entry("other programs:", linestyle="none"), *[entry(name, **styles[name]) for name in others]]
+        silent = {name for name in others if not any(r.evaluations for r in rows if r.line == name)}
+        handles += [entry("other programs:", linestyle="none"), *[
+            entry(f"{name} (tells no evaluations)" if name in silent else name, **styles[name]) for name in others]]
     figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9, handlelength=3.2)
 
 

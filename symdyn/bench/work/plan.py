@@ -10,10 +10,10 @@ from typing import Any
 
 from symdyn.bench.work import against, methods
 from symdyn.bench.work.against.apart import Prepared, TooLong, prepared
-from symdyn.bench.work.against.peer import Peer
+from symdyn.bench.work.against.peer import Peer, taken_as
 from symdyn.bench.work.asked import Asked
 from symdyn.bench.work.measure import own, peer_row
-from symdyn.bench.work.record import Row, Skipped
+from symdyn.bench.work.record import Key, Row, Skipped
 from symdyn.bench.work.subject import Formulation, Subject, Yardstick
 from symdyn.bench.work.timing import PASSES, Timing
 from symdyn.errors import ArgumentError, SymdynError
@@ -24,8 +24,6 @@ _FOR_PEERS, _FOR_NEXT = 1 / 2, 1 / 2
 _SLOW = 2.0
 # Rows of an earlier run are timed anew beside the others if that takes no longer than this, s, and fits the budget.
 _AGAIN = 120.0
-
-Key = tuple[str, str, float | None, float | None]
 
 
 @dataclass(frozen=True)
@@ -196,7 +194,7 @@ def jobs_of(formulations: Sequence[Formulation], asked: Asked, yardstick: Yardst
                        lambda timing, f=f, m=m, tolerance=tolerance: own(  # type: ignore[misc]
                            f, m, tolerance, None, yardstick, asked.repeats, asked.at, timing))
         for peer, f, ready in compared:
-            yield Job((f.name, peer.name, tolerance, None),
+            yield Job((taken_as(peer, f.name), peer.name, tolerance, None),
                        lambda timing, peer=peer, f=f, ready=ready, tolerance=tolerance: peer_row(  # type: ignore[misc]
                            peer, f, ready, peers.ends, tolerance, yardstick, asked.repeats, timing), True)
     for step in spread(asked.steps or ()):

@@ -24,6 +24,8 @@ from symdyn.progress import bar as progress_bar
 from symdyn.runtime.compiler import require_compiler
 
 RESULTS = "published.json"
+# Part of what is left of a budget for tolerances that is kept for times.
+_FOR_TIMES = 1 / 4
 LEGEND = f"""\
 ms: inside the integrator, to the end, least time of the runs, which are the same bit by bit; error: of all outputs, root mean
 square of differences relative to the exact value, or to {THRESHOLD:g} where that is larger; of A03 q the largest relative one.
@@ -64,8 +66,13 @@ class Result:
         for bound in self.case.bounds:
             found = [(line, run) for line in self.lines if (run := line.within(bound)) is not None]
             for line, run in sorted(found, key=lambda both: both[1].time):
-                yield (f"{line.program:26}{line.formulation.name:14}{bound:>8.0e}{run.tolerance:>9.0e}"
+                yield (f"{line.program:26}{line.form:14}{bound:>8.0e}{run.tolerance:>9.0e}"
                        f"{run.time * 1e3:>11.4g}{run.error:>10.1e}")
+            for line in self.lines:
+                known = [run for run in line.runs if run.error <= bound]
+                if known and line.within(bound) is None:
+                    run = max(known, key=lambda run: run.tolerance)
+                    yield f"{line.program:26}{line.form:14}{bound:>8.0e}{run.tolerance:>9.0e}{'not timed':>11}{run.error:>10.1e}"
             yield self._told(bound)
         for name, why in self.left_out.items():
             yield f"  left out: {name}: {textwrap.shorten(why, 170)}"
@@ -87,8 +94,8 @@ class Result:
                 "outputs": self.case.outputs, "published": self.case.published, "missed": self.missed(),
                 "unfinished": self.unfinished, "complete": not self.unfinished, "text": str(self),
                 "threshold": None if self.case.relative else THRESHOLD, "left out": self.left_out, "lines": [
-                    {"program": line.program, "formulation": line.formulation.name, "peer": line.peer, "why": line.why,
-                     "searched": line.searched,
+                    {"program": line.program, "formulation": line.formulation.name, "taken": line.form, "peer": line.peer,
+                     "why": line.why, "searched": line.searched,
                      "runs": [{k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(run).items()}
                               for run in line.runs]} for line in self.lines]}
 
@@ -117,12 +124,14 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
         formulations = case.formulations()
         exact, how = case.reference(formulations[0])
         lines, left_out, late = list[Line](), dict[str, str](), list[str]()
+        until: float | None = None  # of the search, which begins when other programs are prepared
         for line in lines_of(case, formulations, peers, left_out, late, deadline, stack):
             begun, known = clock.perf_counter(), found.get(line.key)
+            until = begun + (1 - _FOR_TIMES) * (deadline - begun) if until is None else until
             if known is not None:
                 line.runs, line.why, line.searched = [Run.of(run) for run in known["runs"]], known["why"], True
             else:
-                search(line, case, exact, deadline)
+                search(line, case, exact, until)
                 if line.runs:
                     told(f"{case.name}: {line.program}, {line.formulation.name}: {len(line.runs)} tolerances, "
                          f"{clock.perf_counter() - begun:.1f} s")
@@ -192,7 +201,11 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
         elif clock.perf_counter() > deadline:
             left.append(case.name)
         else:
-            result = measure(case, programs, repeats, deadline, _tell, before, store, progress)
+            try:
+                result = measure(case, programs, repeats, deadline, _tell, before, store, progress)
+            except KeyboardInterrupt:
+                _tell("what was found is kept, the same command goes on")
+                raise
             store(result)
             print(result, end="\n\n", flush=True)
     store()

@@ -13,6 +13,7 @@ import numpy as np
 
 from symdyn.bench.work import against
 from symdyn.bench.work.against.apart import TooLong, prepared
+from symdyn.bench.work.against.peer import taken_as
 from symdyn.bench.work.published_cases import Case
 from symdyn.bench.work.subject import Formulation
 from symdyn.bench.work.timing import ENOUGH, PASSES, one_pass, seconds_of
@@ -24,8 +25,10 @@ _HALVINGS = 3
 # A line whose runs take longer than _SLOW, s, or whose search with all that it compiles takes longer than _PATIENCE, s, is not
 # asked for tighter tolerances.
 _SLOW, _PATIENCE = 10.0, 300.0
-# Part of what is left of a budget that may pass until a program is prepared.
-_FOR_NEXT = 1 / 4
+# Methods of ours that are compiled in no time.
+QUICK = ("dop853", "bs54")
+# Part of what is left of a budget that may pass until all other programs are prepared, and part of that for the next one.
+_FOR_PEERS, _FOR_NEXT = 1 / 2, 1 / 2
 
 
 @dataclass
@@ -54,6 +57,7 @@ class Line:
     look       tolerance -> s inside the integrator, states at the case's times
     timed      tolerance, repeats, deadline -> s inside the integrator of the runs of one pass
     searched   all tolerances that are of interest were tried: a later run need not
+    taken      what it is told to run, if that is no formulation of ours
     """
 
     program: str
@@ -64,6 +68,12 @@ class Line:
     runs: list[Run] = field(default_factory=list)
     why: str = ""
     searched: bool = False
+    taken: str = ""
+
+    @property
+    def form(self) -> str:
+        """What it is told to run."""
+        return self.taken or self.formulation.name
 
     @property
     def key(self) -> tuple[str, str]:
@@ -85,13 +95,22 @@ class Line:
 
 def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[str], left_out: dict[str, str],
              late: list[str], deadline: float, stack: contextlib.ExitStack) -> Iterator[Line]:
-    """Ours, then other programs, each on the first formulation that it takes; the others into left_out.
+    """Ours, and other programs, each on the first formulation that it takes; the others into left_out.
 
+    Other programs are prepared first, and looked at before what of ours takes long to compile, so that a short budget shows
+    both.
     late   takes those that were not ready in time;  stack: closes what was prepared
     """
-    for f in formulations:
-        for method in case.methods:
-            yield _own(case, f, method)
+    others = list(_others(case, formulations, peers, left_out, late, deadline, stack))
+    ours = {quick: [_own(case, f, method) for f in formulations for method in case.methods if (method in QUICK) == quick]
+            for quick in (True, False)}
+    yield from (*ours[True], *others, *ours[False])
+
+
+def _others(case: Case, formulations: Sequence[Formulation], peers: Sequence[str], left_out: dict[str, str], late: list[str],
+            deadline: float, stack: contextlib.ExitStack) -> Iterator[Line]:
+    begun = clock.perf_counter()
+    until = begun + _FOR_PEERS * (deadline - begun)
     for name in peers:
         for peer in against.peers(name):
             there, taken, why = peer.available(), False, dict[str, str]()
@@ -101,7 +120,7 @@ def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[st
                 now = clock.perf_counter()
                 try:
                     ready = prepared(peer, (f.equations, f.module.default_parameters, f.x0, f.system), [case.end],
-                                     now + _FOR_NEXT * (deadline - now), deadline)
+                                     now + _FOR_NEXT * (until - now), deadline)
                 except TooLong as error:
                     why[f.name] = str(error)
                     late.append(peer.name)
@@ -113,7 +132,7 @@ def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[st
                 stack.callback(ready.close)
                 yield Line(peer.name, f, True, lambda tolerance, ready=ready: ready.states(  # type: ignore[misc]
                     tolerance, case.times), lambda tolerance, repeats, deadline, ready=ready: ready.timed(  # type: ignore[misc]
-                        0, tolerance, repeats, deadline)[0])
+                        0, tolerance, repeats, deadline)[0], taken=taken_as(peer, f.name))
                 break
             if not taken:
                 left_out[peer.name] = str(there) if there is not True else "; ".join(dict.fromkeys(why.values()))

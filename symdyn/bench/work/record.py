@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 NAN = math.nan
+# What tells rows apart: formulation, method, tolerance, step.
+Key = tuple[str, str, float | None, float | None]
 # A median this many times the least time tells of other work on the machine.
 DISTURBED = 1.25
 # Types of figures -> what they may be in a file.
@@ -23,7 +25,8 @@ class Row:
     tolerance, step       relative and absolute tolerance of a step, or its length, s; the other is None
     seconds               inside the integrator, median of `repeats` runs; least: the shortest of them
     evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not tell
-    operations            evaluations times the operations of the right-hand side's tape; 0 of peers
+    operations            evaluations times the operations of the right-hand side's tape; 0 of peers, and of taylor, whose
+                          evaluations are orders of series
     error                 at the end, norm-wise relative: the larger of error_q and error_u (see `subject.Yardstick`)
     error_q, error_u      of coordinates and of speeds, or of poses and velocities of all bodies
     errors                of the state at each time of the reference; worst: the largest of them
@@ -62,7 +65,7 @@ class Row:
     took: float = NAN
 
     @property
-    def key(self) -> tuple[str, str, float | None, float | None]:
+    def key(self) -> Key:
         """What tells rows apart."""
         return self.formulation, self.method, self.tolerance, self.step
 

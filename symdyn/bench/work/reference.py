@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 import time as clock
 import warnings
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ from symdyn.bench.work import store
 from symdyn.bench.work.converged import converged, expected_seconds
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation, Subject, Yardstick
-from symdyn.errors import SimulationWarning, SymdynError
+from symdyn.errors import CompileError, SimulationWarning, SymdynError
 
 # Seconds that a run with more digits may take where no budget is given.
 PATIENCE = 120.0
@@ -23,6 +24,8 @@ N_TIMES = 10
 _TIGHT = (1e-12, 1e-13, 1e-14)
 _METHODS = ("dop853", "Radau", "DOP853")
 _SECONDS_OF_SCIPY = 20.0
+# Characters of a reason that are told on the way; where there is no reference, all of it is told, once.
+_TOLD = 160
 
 
 def default_times(subject: Subject) -> list[float]:
@@ -57,7 +60,7 @@ def find_reference(subject: Subject, formulations: Sequence[Formulation], second
             return reference
     except SymdynError as error:
         why = str(error)
-    told(f"{why}: taken are the two tightest runs that agree")
+    told(f"{textwrap.shorten(why.splitlines()[0].rstrip('.'), _TOLD)}: taken are the two tightest runs that agree")
     return agreement(formulations, times, why, until)
 
 
@@ -66,9 +69,9 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
     agreement.
 
     until   as of find_reference
-    Raises SymdynError if there are no two.
+    Raises SymdynError if there are no two, CompileError if none can be compiled.
     """
-    first = formulations[0]
+    first, broken = formulations[0], None
     runs: list[tuple[Formulation, str, float, np.ndarray]] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)
@@ -83,6 +86,9 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
                         continue
                     try:
                         sol = formulation.module.simulate(np.r_[0.0, times], rtol=rtol, method=method)
+                    except CompileError as error:
+                        broken = error
+                        continue
                     except SymdynError:
                         continue
                     if sol.success:
@@ -99,6 +105,8 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
             if math.isfinite(differ) and (best is None or differ < best[0]):
                 best = differ, (f"{formulation.name} with {method} at {rtol:g} and {other.name} with {other_method} at "
                                 f"{other_rtol:g} differ by {differ:.1e}"), k
+    if not runs and broken is not None:
+        raise broken
     if best is None:
         raise SymdynError(f"{first.equations.name}: there is no reference: {why}, and no two runs of different formulations or "
                           "methods got to the end; shorten the motion, or look at why they stop")

@@ -1,4 +1,4 @@
-"""Results that an unfinished run left and a later one goes on with, what tells that they are of the same, and the bar."""
+"""What tells that results are of the same, those of a run that was done, and whether new ones can be written."""
 
 from __future__ import annotations
 
@@ -58,15 +58,6 @@ def digest(files: Mapping[str, Path]) -> str:
 def installed(names: Sequence[str]) -> list[tuple[str, bool]]:
     """Other programs, and whether they can run here."""
     return [(peer.name, peer.available() is True) for name in names for peer in against.peers(name)]
-
-
-def left_by(path: Path, mark: str) -> dict[str, Any]:
-    """What an unfinished run wrote, if its fingerprint is this one; else nothing."""
-    with contextlib.suppress(KeyError, TypeError):  # not there, or another's file
-        data = kept.read(path)
-        if not data["complete"] and data["fingerprint"] == mark:
-            return data  # type: ignore[no-any-return]
-    return {}
 
 
 def whole(path: Path, command: str) -> dict[str, Any]:

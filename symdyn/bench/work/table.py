@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 
 LEVELS = tuple(10.0**-k for k in range(2, 14))
 LEGEND = """\
-ms: wall time inside the integrator, median of the repeats (what is compared, and drawn, are the least times); operations:
-evaluations times operations of one; worst: the largest error over the reference's times; energy: error of the balance,
-relative; C: residual of the constraints relative to the mechanism's length, and of the norms of Euler parameters; errors q, u:
-at the end, norm-wise relative to the largest norm of the reference over its times, of """
+ms: wall time inside the integrator, median of the repeats (what is compared, and drawn, are the least times); evaluations: of
+the right-hand side, with taylor orders of its series; operations: evaluations times operations of one, unknown with taylor,
+with radau and radau5 without Jacobians and their factors: of different methods compare times; worst: the largest error over
+the reference's times; energy: error of the balance, relative; C: residual of the constraints relative to the mechanism's
+length, and of the norms of Euler parameters; errors q, u: at the end, norm-wise relative to the largest norm of the reference
+over its times, of """
 
 
 def table(benchmark: Benchmark) -> str:
@@ -27,6 +29,8 @@ def table(benchmark: Benchmark) -> str:
 
 def _lines(benchmark: Benchmark) -> Iterator[str]:
     yield f"{benchmark.name}, {benchmark.end:g} s"
+    for note in benchmark.notes:
+        yield from _wrapped(f"note: {note}")
     yield from _wrapped(f"reference: {benchmark.reference}")
     yield "operations of one evaluation: " + ", ".join(f"{name} {n}" for name, n in benchmark.operations.items())
     columns = [_at(t) for t in benchmark.at]
@@ -71,7 +75,12 @@ def choices(benchmark: Benchmark) -> str:
 def best(benchmark: Benchmark, at: float | None) -> Iterator[str]:
     """The least time below every level of error, ours and of other programs."""
     peers = any(row.peer for row in benchmark.rows)
-    yield f"least time below an error, at {f't = {at:g} s' if at is not None else 'the end'}:"
+    where = f"t = {at:g} s" if at is not None else "the end"
+    if benchmark.still or benchmark.best(LEVELS[0], at) is None:
+        why = "nothing moves" if benchmark.still else f"no run got below {LEVELS[0]:g}"
+        yield f"least time below an error, at {where}: none, {why}"
+        return
+    yield f"least time below an error, at {where}:"
     index = None if at is None else benchmark.index(at)
     for error in LEVELS:
         ours, theirs = benchmark.best(error, at, False), benchmark.best(error, at, True) if peers else None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symdyn.formulation.composite import factorize
+from symdyn.formulation.locking import behind, felt
 from symdyn.formulation.recursive.inverse_dynamics import Wrench, outside
 from symdyn.formulation.recursive.own_speeds import own_speeds
 from symdyn.formulation.recursive.velocities import (
@@ -82,8 +83,11 @@ def forward_dynamics(tree: Tree, tau: Vector, wrenches: Sequence[Wrench] | None 
             D[i] = S[i].T @ U[i]
             u[i] = tau_i - S[i].T @ (I_A[i] @ c[i] + p_A[i])
             named(tree, i, U=U[i], u=u[i])
-            factors[i] = factorize(tree.algebra, D[i], [f"joint {link.joint.name} moves no inertia along {tree.model.speeds[j]}"
-                                                        for j in own[i]])
+            reasons = [f"joint {link.joint.name} moves no inertia along {tree.model.speeds[j]}" for j in own[i]]
+            least = {k: tree.algebra.rounding for k, j in enumerate(own[i]) if j in tree.lockable}
+            sizes = {k: behind(tree, i, S[i][:, k], lambda child: (I_A[child][:3, :3], I_A[child][3:, 3:]))
+                     for k in least if not felt(tree, i, S[i][:, k])}
+            factors[i] = factorize(tree.algebra, D[i], reasons, least=least, sizes=sizes)
             if link.parent != GROUND:
                 X, X_star = m.X[i], m.X_star[i]
                 I_A[link.parent] = I_A[link.parent] + X_star @ (I_A[i] - U[i] @ factors[i].solve(U[i].T)) @ X

@@ -119,6 +119,7 @@ class NumericAlgebra:
 
     def __init__(self, numeric: NumericTree, values: Mapping[str, Any], digits: int | None, rates: Rates) -> None:
         self.numeric, self.values, self.digits = numeric, values, digits
+        self.rounding = float(TapeAlgebra.rounding) if digits is None else 64 * 10.0 ** -digits
         self.apparent_rates = rates
 
     def section(self, title: str) -> AbstractContextManager[None]:
@@ -133,6 +134,11 @@ class NumericAlgebra:
         """The value. Raises EvaluationError with the reason if it is not positive, as generated code reports it."""
         if not value > 0:
             raise EvaluationError(f"{self.numeric.model.name}: {reason}")
+        return value
+
+    def divisor(self, value: Any, least: Any, reason: str) -> Any:
+        """The value. Raises EvaluationError with the reason if it is not above `least`."""
+        self.positive(value - least, reason)
         return value
 
     def expression(self, e: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, no_value
 
 
 def taken(given: Any, names: Sequence[str], what: str, known: Mapping[str, Any], owner: str) -> dict[str, Any]:
@@ -23,7 +23,7 @@ def taken(given: Any, names: Sequence[str], what: str, known: Mapping[str, Any],
         faults = [f"there is no {n!r}; there are {', '.join(names) or 'none'}" for n in values if n not in names]
         missing = [n for n in names if n not in values and n not in known]
         if missing:
-            faults.append(f"no value for {', '.join(missing)}, which {'have' if len(missing) > 1 else 'has'} no default")
+            faults.append(no_value(missing))
         values = {n: values.get(n, known.get(n)) for n in names if n in values or n in known}
     else:
         listed = list(np.atleast_1d(np.asarray(given, dtype=object)))

@@ -41,14 +41,6 @@ RUNAWAY = "a coordinate runs away"
 
 
 @dataclass(frozen=True, eq=False)
-class Scales:
-    """Fixed during a search. columns: of v (n_u,); rows: of what is tested, of the constraints, of the extra states' rates."""
-
-    columns: np.ndarray
-    rows: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Trial:
     """A state on the way, with its residual and the derivative of it by the unknowns."""
 

@@ -26,6 +26,7 @@ class Casadi:
     """One family of methods: adams or not."""
 
     adams: bool
+    bodies = False
 
     @property
     def name(self) -> str:

@@ -20,6 +20,7 @@ class Cvode:
     """One family of methods: adams or not."""
 
     adams: bool
+    bodies = False
 
     @property
     def name(self) -> str:

@@ -28,6 +28,7 @@ class Exudyn:
     """One method; GeneralizedAlpha, for loops, and RK67 have fixed steps, and a tolerance stands for a number of them."""
 
     method: str
+    bodies = True
 
     @property
     def name(self) -> str:

@@ -30,6 +30,7 @@ class Heyoka:
     """The integrator."""
 
     name: str = "heyoka"
+    bodies = False
 
     @property
     def title(self) -> str:

@@ -24,6 +24,7 @@ class Ida:
     """The integrator, for mechanisms with constraints."""
 
     name: str = "IDA"
+    bodies = False
 
     @property
     def title(self) -> str:

@@ -28,6 +28,7 @@ class Mujoco:
     """The program; a tolerance stands for the number of steps that gives about such an error."""
 
     name: str = "mujoco RK4"
+    bodies = True
 
     @property
     def title(self) -> str:

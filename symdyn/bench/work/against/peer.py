@@ -17,6 +17,10 @@ LONGEST = 15.0
 Ran = tuple[float, int, np.ndarray]
 
 
+# In the place of a formulation, of programs that derive the motion themselves.
+BODIES = "bodies"
+
+
 class Runner(Protocol):
     """What runs a motion with a tolerance."""
 
@@ -51,10 +55,12 @@ class Peer(Protocol):
     """One program with one integrator.
 
     name    of the row, such as "heyoka" or "scipy LSODA"; title: the same with versions, for the legend
+    bodies  it takes bodies and joints, not a formulation of ours
     """
 
     name: str
     title: str
+    bodies: bool
 
     def available(self) -> bool | str:
         """True, or why it cannot run here and what to install."""
@@ -69,3 +75,8 @@ class Peer(Protocol):
         Raises Unfit if the peer has no way to run this mechanism.
         """
         ...
+
+
+def taken_as(peer: Peer, formulation: str) -> str:
+    """What a program is told to run: a formulation of ours, or bodies and joints."""
+    return BODIES if peer.bodies else formulation

@@ -25,6 +25,7 @@ class Pinocchio:
     """One family of methods: adams or not."""
 
     adams: bool
+    bodies = True
 
     @property
     def name(self) -> str:

@@ -24,6 +24,7 @@ class Scipy:
     """One of them; Radau and LSODA get the exact Jacobian."""
 
     method: str
+    bodies = False
 
     @property
     def name(self) -> str:

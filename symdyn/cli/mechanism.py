@@ -1,0 +1,70 @@
+"""What mechanism a name stands for, for commands that put one to the test: of the catalogue, with an option in parentheses or
+not, of the list of `symdyn bench --all`, or of a user's file."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symdyn.cli.messages import Stop
+from symdyn.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from symdyn.bench.work.subject import Subject
+    from symdyn.model.system import System
+
+
+def is_file(name: str) -> bool:
+    """Whether a name stands for a user's file; a file that is called as a mechanism does not take its place."""
+    from symdyn.bench.work.cases import known
+
+    return name.endswith(".py") or (name not in known() and Path(name).is_file())
+
+
+def find_mechanism(name: str, options: Mapping[str, Any]) -> System:
+    """The system of a name. Raises Stop for one that there is not, or with other options; what makes it raises what it does."""
+    from symdyn.bench.work.cases import named
+    from symdyn.cli import userfile
+
+    if is_file(name):
+        return userfile.from_file(Path(name), options)
+    with _refused():
+        case = named(name, options)
+    return case.maker()(**case.options)
+
+
+def find_subject(name: str, options: Mapping[str, Any], end: float | None = None) -> Subject:
+    """What `symdyn bench` measures of it: if what makes it has an option `orientation`, in angles and in parameters.
+
+    end   s, default: the system's duration
+    Raises Stop as find_mechanism.
+    """
+    from symdyn.bench.work.cases import from_maker, subject, title
+    from symdyn.cli import userfile
+
+    if is_file(name):
+        return from_maker(title(Path(name).stem, options), userfile.maker(Path(name)), end, options)
+    with _refused():
+        return subject(name, end, options)
+
+
+def title_of(name: str, options: Mapping[str, Any]) -> str:
+    """What files of a mechanism are named by."""
+    from symdyn.bench.work.cases import title
+
+    return title(Path(name).stem if is_file(name) else name, options)
+
+
+@contextlib.contextmanager
+def _refused() -> Iterator[None]:
+    """A name or an option that there is not becomes a Stop, which tells what the command line takes besides."""
+    from symdyn.bench.work.cases import Unknown
+
+    try:
+        yield
+    except Unknown as error:
+        raise Stop(f"{error}; the path of a Python file that defines system() is taken too") from None
+    except ArgumentError as error:
+        raise Stop(str(error)) from None
