@@ -180,12 +180,11 @@ def rounding(subject: Subject, short: bool) -> Iterator[Row]:
 
 
 def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
-    """What entries of states are known relative to, (n, n_x): themselves, but angles of many turns the largest of them, because
-    angles are added along a mechanism."""
+    """What entries of states are known relative to, (n, n_x): themselves, but angles the largest of them, because angles of parallel
+    axes are added along a mechanism."""
     angles, sizes = _angles(subject), x.copy()
     if angles:
-        most = np.abs(x[:, angles]).max(axis=1, keepdims=True)
-        sizes[:, angles] = np.where(most > 2 * np.pi, most, x[:, angles])
+        sizes[:, angles] = np.abs(x[:, angles]).max(axis=1, keepdims=True)
     return sizes
 
 
