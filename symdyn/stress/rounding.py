@@ -180,8 +180,8 @@ def rounding(subject: Subject, short: bool) -> Iterator[Row]:
 
 
 def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
-    """What entries of states are known relative to, (n, n_x): themselves, but angles the largest of them, because angles of parallel
-    axes are added along a mechanism."""
+    """What entries of states are known relative to, (n, n_x): themselves, but angles the largest of them, because they are
+    added along a mechanism."""
     angles, sizes = _angles(subject), x.copy()
     if angles:
         sizes[:, angles] = np.abs(x[:, angles]).max(axis=1, keepdims=True)

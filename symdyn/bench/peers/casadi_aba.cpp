@@ -11,10 +11,21 @@ template <class S, int O>
 struct FewJoints {
     using Scalar = S;
     static constexpr int Options = O;
+    using JointModelRX = JointModelRevoluteTpl<S, O, 0>;
+    using JointModelRY = JointModelRevoluteTpl<S, O, 1>;
+    using JointModelRZ = JointModelRevoluteTpl<S, O, 2>;
+    using JointModelPX = JointModelPrismaticTpl<S, O, 0>;
+    using JointModelPY = JointModelPrismaticTpl<S, O, 1>;
+    using JointModelPZ = JointModelPrismaticTpl<S, O, 2>;
+    using JointModelSpherical = JointModelSphericalTpl<S, O>;
     // Pinocchio asks each joint whether it is one of these; with Boost's relaxed get the variant answers no.
     using JointModelMimic = JointModelMimicTpl<S, O, FewJoints>;
-    using JointModelVariant = Kinds::Models<S, O>;
-    using JointDataVariant = Kinds::Data<S, O>;
+    using JointModelVariant = boost::variant<JointModelRX, JointModelRY, JointModelRZ, JointModelPX, JointModelPY, JointModelPZ,
+                                             JointModelSpherical>;
+    using JointDataVariant = boost::variant<
+        JointDataRevoluteTpl<S, O, 0>, JointDataRevoluteTpl<S, O, 1>, JointDataRevoluteTpl<S, O, 2>,
+        JointDataPrismaticTpl<S, O, 0>, JointDataPrismaticTpl<S, O, 1>, JointDataPrismaticTpl<S, O, 2>,
+        JointDataSphericalTpl<S, O>>;
 };
 
 } // namespace peers

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
 from typing import Any
 
 from symdyn.bench.peers.casadi_loop import Form, casadi_contestant, hoisted, operations
@@ -16,13 +15,9 @@ _ERROR_SIZE = 1000
 
 
 class CasadiPeer:
-    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install.
+    """The generator. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
 
-    kinds   of joints that it is built for, as description.py writes them, all by default: one alone is built in two thirds of
-            the time
-    """
-
-    def __init__(self, kinds: Sequence[str] = ()) -> None:
+    def __init__(self) -> None:
         folder = package_folder("casadi")
         self.compiler = c_compiler()
         libraries = [root for root in (folder, *[p / "lib" for p in folder.parents[:4]]) if (root / "libcasadi.so").exists()]
@@ -31,8 +26,7 @@ class CasadiPeer:
         import casadi
 
         self.casadi = casadi
-        asked = [f"#define KINDS {', '.join(kinds)}\n"] if kinds else []
-        text = "".join(["#include <pinocchio/autodiff/casadi.hpp>\n", *asked, *[
+        text = "".join(["#include <pinocchio/autodiff/casadi.hpp>\n", *[
             (SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "casadi_aba.cpp")]])
         options = ["-O0", "-DBOOST_VARIANT_USE_RELAXED_GET_BY_DEFAULT", *include_flags("pinocchio", "boost", "eigen", "casadi"),
                    "-Wl,--no-as-needed", f"-L{libraries[0]}", "-lcasadi", f"-Wl,-rpath,{libraries[0]}"]

@@ -1,4 +1,4 @@
-// Builds a Pinocchio model, for any scalar, from a description in plain text. KINDS are those joints that it may have.
+// Builds a Pinocchio model, for any scalar, from a description in plain text.
 //
 // Words are separated by white space. A number is written out, or is `p3` or `-p3` for parameter 3:
 //   gravity X Y Z                         m/s^2, world axes
@@ -15,44 +15,7 @@
 
 #include <pinocchio/multibody.hpp>
 
-#ifndef KINDS
-#define KINDS RX, RY, RZ, PX, PY, PZ, S
-#endif
-
 namespace peers {
-
-// The kinds of joints: their words, and what they are in Pinocchio.
-template <int axis>
-struct Revolute {
-    template <class Scalar, int O> using Model = pinocchio::JointModelRevoluteTpl<Scalar, O, axis>;
-    template <class Scalar, int O> using Data = pinocchio::JointDataRevoluteTpl<Scalar, O, axis>;
-};
-template <int axis>
-struct Prismatic {
-    template <class Scalar, int O> using Model = pinocchio::JointModelPrismaticTpl<Scalar, O, axis>;
-    template <class Scalar, int O> using Data = pinocchio::JointDataPrismaticTpl<Scalar, O, axis>;
-};
-struct RX : Revolute<0> { static constexpr auto word = "RX"; };
-struct RY : Revolute<1> { static constexpr auto word = "RY"; };
-struct RZ : Revolute<2> { static constexpr auto word = "RZ"; };
-struct PX : Prismatic<0> { static constexpr auto word = "PX"; };
-struct PY : Prismatic<1> { static constexpr auto word = "PY"; };
-struct PZ : Prismatic<2> { static constexpr auto word = "PZ"; };
-struct S {
-    static constexpr auto word = "S";
-    template <class Scalar, int O> using Model = pinocchio::JointModelSphericalTpl<Scalar, O>;
-    template <class Scalar, int O> using Data = pinocchio::JointDataSphericalTpl<Scalar, O>;
-};
-
-template <class... Kind>
-struct Listed {
-    template <class Scalar, int O> using Models = boost::variant<typename Kind::template Model<Scalar, O>...>;
-    template <class Scalar, int O> using Data = boost::variant<typename Kind::template Data<Scalar, O>...>;
-
-    template <class Variant, class Scalar>
-    static std::map<std::string, Variant> by_word() { return {{Kind::word, typename Kind::template Model<Scalar, 0>()}...}; }
-};
-using Kinds = Listed<KINDS>;
 
 template <class Scalar>
 class Reader {
@@ -103,8 +66,13 @@ private:
 template <class Scalar, template <class, int> class Joints>
 pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std::vector<Scalar> &parameters)
 {
+    using Collection = Joints<Scalar, 0>;
     using Place = pinocchio::SE3Tpl<Scalar>;
-    const auto kinds = Kinds::by_word<typename Joints<Scalar, 0>::JointModelVariant, Scalar>();
+    const std::map<std::string, typename Collection::JointModelVariant> kinds = {
+        {"RX", typename Collection::JointModelRX()}, {"RY", typename Collection::JointModelRY()},
+        {"RZ", typename Collection::JointModelRZ()}, {"PX", typename Collection::JointModelPX()},
+        {"PY", typename Collection::JointModelPY()}, {"PZ", typename Collection::JointModelPZ()},
+        {"S", typename Collection::JointModelSpherical()}};
     pinocchio::ModelTpl<Scalar, 0, Joints> model;
     Reader<Scalar> reader(text, parameters);
     std::string what;
