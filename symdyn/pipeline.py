@@ -85,22 +85,19 @@ FUNCTIONS = {
 }
 # Of statics and linearization, compiled together, with what they are used with; the headers' words.
 STATICS = {
-    "balance": "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot]; ud: u_dot, lam",
+    "balance": "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot; C_dot; C_ddot; q_dot; q_ddot]; ud: u_dot, lam",
     "N_dot": "derivative of N by time",
-    "rates_q": "derivative of q_dot by q",
 }
 # Along directions that are arguments: one short function in place of long matrices.
 VARIATIONS = {
-    "variation": "derivative of the balance along a direction of [q; u; z; inputs; p; lam]",
-    "second_variation": "the same derivative of the balance's linear form in v (q' = N v), u', u_dot', z', lam'",
+    "variation": "derivative of the balance along a direction of [q; u; z; inputs; p; u_dot; lam]",
+    "second_variation": "the same derivative of the linear form of its first three parts in v (q' = N v), u', u_dot', z', lam'",
+    "outputs_variation": "the same derivative of the outputs",
 }
 # Further derivatives, each made by itself when it is asked for.
 DERIVATIVES = {
     "stiffness": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by q; ud: u_dot, lam",
     "damping": "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by u; ud: u_dot, lam",
-    "rows_q": "derivative of the rate of the constraints, C_dot, by q",
-    "outputs_x": "derivative of the outputs by x",
-    "outputs_inputs": "derivative of the outputs by the inputs",
 }
 # The extra state of a simulation that integrates the work of the loads.
 WORK = "(work)"

@@ -71,7 +71,9 @@ def rotor_frequencies(module: Module, speed: float) -> np.ndarray:
         linear = module.linearize(at={"azimuth_dot": speed}, fixed={"azimuth": 0.0, "azimuth_dot": speed})
     else:
         params = {"Omega": speed}
-        at = module.consistent(params=params) if "p0_hub" in module.metadata["q"] else None
+        # The beam turns with the hub, and does not swing.
+        still = [u for u in module.metadata["u"] if u.startswith(("flap", "lag"))]
+        at = module.consistent(params=params, keep=still) if "p0_hub" in module.metadata["q"] else None
         linear = module.linearize(at=at, params=params)
     modes = list(linear.modes())
     return np.array([[mode.omega for mode in modes if mode.name.startswith(name)][:3] for name in ("flap", "lag")])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, Protocol
 
@@ -73,6 +74,19 @@ class Motion:
         if name not in self._memory:
             self._memory[name] = getattr(self, name)()
         return self._memory[name]
+
+    @contextmanager
+    def accelerations_given(self) -> Iterator[None]:
+        """While this lasts, what is recorded takes accelerations as arguments in place of those that the forces make."""
+        solved = self._memory.get("accelerations")
+        self._memory["accelerations"] = self.speed_rates
+        try:
+            yield
+        finally:
+            if solved is None:
+                del self._memory["accelerations"]
+            else:
+                self._memory["accelerations"] = solved
 
     def reasons(self) -> list[str]:
         """What it means, speed by speed, if a pivot of the mass matrix is not positive."""

@@ -64,7 +64,7 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
                             f"{', '.join(module.metadata['x'])}")
     if times.ndim > 1:
         raise ArgumentError(f"{module.name}: t has the shape {times.shape}; give one time, or one for each state")
-    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, {}),
+    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, module.metadata["initial"]),
               "params": parameter_rows(module, params)}
     n = together(arrays, module.name)
     xd = _result(module, states, (n, n_x), out)

@@ -82,7 +82,7 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     initial = metadata["initial"]
     q0, u0 = (take(values, metadata[what], what, {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
               for what, values in (("q", q), ("u", u)))
-    x = np.concatenate([q0, u0, np.zeros(metadata["sizes"]["z"])])
+    x = np.concatenate([q0, u0, [initial.get(n, 0.0) for n in metadata["z"]]])
     t = number(t, "a finite number of seconds as t", module.name)
     if keep is None:
         keep = ()
@@ -102,6 +102,17 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     search = _Search(module, t, p, kept)
     x = search.speeds(search.positions(x))
     return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
+
+
+def on_constraints(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> np.ndarray:
+    """The state with its coordinates moved onto the constraints, speeds as they are. Raises ArgumentError as `consistent`."""
+    return _Search(module, t, params, []).positions(x)
+
+
+def closest(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> np.ndarray:
+    """The consistent state near x. Raises ArgumentError as `consistent`."""
+    search = _Search(module, t, params, [])
+    return search.speeds(search.positions(x))
 
 
 def number(value: Any, what: str, owner: str) -> float:

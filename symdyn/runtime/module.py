@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.statics.equilibria import Equilibria
     from symdyn.runtime.statics.equilibrium import Equilibrium
     from symdyn.runtime.statics.linearize import Linearization
+    from symdyn.runtime.statics.stability import Stability
 
 Provider = Callable[[str], Unit]
 
@@ -64,7 +65,7 @@ class Module:
     # -- evaluation
 
     def rhs(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> np.ndarray:
-        """x_dot (n_x,) at time t and state x = [q; u; z]."""
+        """x_dot (n_x,) at time t and state x = [q; u; z]; inputs that are left out take their initial values, as everywhere."""
         try:
             evaluator, seen, mark = self._local.rhs
         except AttributeError:
@@ -269,19 +270,40 @@ class Module:
         return equilibria(self, starts, ranges, seed, **options)
 
     def linearize(self, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
-                  fixed: Any = None, coordinates: Sequence[Any] | None = None) -> Linearization:
-        """The linear equations about a state, by exact derivatives; constraints are eliminated by their null space.
+                  fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
+        """The linear equations about a state on the manifold of the constraints, by exact derivatives.
 
         at            an Equilibrium, with all that belongs to it; a Solution, at its time nearest to t; x in order; (q, u); or by
                       name or symbol. Default: the system's initial values
         free, fixed   as for `equilibrium`; what stays is left out
         coordinates   which changes are independent, where constraints leave a choice; default: the best conditioned
+        hold          coordinates and speeds that are held when the state is disturbed, by name or symbol; default: what `fixed`
+                      names or the equilibrium kept, but for the conditions of a trim; () holds nothing
 
         See symdyn.runtime.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
         """
         from symdyn.runtime.statics.linearize import linearize
 
-        return linearize(self, at, params, t, inputs, free, fixed, coordinates)
+        return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold)
+
+    def stability(self, at: Any = None, params: Any = None, t: float = 0.0, inputs: Any = None, free: Any = None,
+                  fixed: Any = None, hold: Any = None, period: float | None = None, start: Any = None) -> Stability:
+        """Whether small disturbances of a state of rest, a steady motion or a periodic motion die out, with the evidence.
+
+        at       an Equilibrium; or the state, as for `linearize`; where it is not on a steady motion, the periodic motion near
+                 it is found first
+        fixed    speeds (and coordinates) that are held at a value, such as {"azimuth_dot": 1.2}; the period is then 2 pi over it
+        hold     what is held when disturbed, by name; default: what `fixed` names, or the equilibrium kept
+        period   of a prescribed periodic motion, s: needed where t appears in the equations
+        start    in place of `at`: a guess of the state, by name or in order
+
+        Constant equations are judged by their eigenvalues, those that a change of variables makes constant (a rotor of three or
+        more like blades, a body that spins about its axis) after the change, others by Floquet theory. Raises ArgumentError where
+        neither holds, NoEquilibrium where no periodic motion is found.
+        """
+        from symdyn.runtime.statics.stability import stability
+
+        return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
 
     def campbell(self, speed: Any, values: Any, **options: Any) -> Campbell:
         """Natural frequencies over a rotor's speed; see symdyn.runtime.statics.campbell.campbell for all options."""
@@ -353,26 +375,33 @@ class Module:
             setattr(self._local, name, known)
         return known
 
+    def _initial(self, group: str) -> np.ndarray:
+        """What entries of a group are where they are left out: their initial values in the system, else 0."""
+        initial = self.metadata.get("initial", {})
+        return np.array([initial.get(n, 0.0) for n in self.metadata[group]], dtype=float)
+
     def _state(self, q: Any, u: Any = None) -> np.ndarray:
-        sizes = self.metadata["sizes"]
         q = self._rows(q, "q", "q")
         u = self._rows(() if u is None else u, "u", "u")
         n = max(q.ndim, u.ndim)
+        z = self._initial("z")
         if n == 1:
-            return np.concatenate([q, u, np.zeros(sizes["z"])])
+            return np.concatenate([q, u, z])
         lengths = {len(a) for a in (q, u) if a.ndim == n}
         rows = max(lengths)
         if lengths - {1, rows}:
             raise ArgumentError(f"{self.name}: q has {len(q)} rows and u has {len(u)}; give the same number")
-        return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, np.zeros(sizes["z"]))], axis=1)
+        return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, z)], axis=1)
 
     def _rows(self, values: Any, what: str, group: str, metadata: Mapping[str, Any] | None = None) -> np.ndarray:
-        """One row or rows of numbers of a group; nothing stands for zeros. Accelerations go by the names of the speeds."""
+        """One row or rows of numbers of a group; what is left out takes its initial value, accelerations 0. Accelerations go by
+        the names of the speeds."""
         about = metadata or self.metadata
         wanted = about["sizes"][group]
         names = about["u" if what == "ud" and wanted == about["sizes"]["u"] else group]
+        initial = self.metadata.get("initial", {}) if what != "ud" else {}
         if isinstance(values, Mapping):
-            return take(values, names, what, dict.fromkeys(names, 0.0), self.name)
+            return take(values, names, what, {n: initial.get(n, 0.0) for n in names}, self.name)
         try:
             array = np.asarray(values if values is not None else "", dtype=float)
         except (TypeError, ValueError):
@@ -380,7 +409,7 @@ class Module:
         if array.ndim == 0 and wanted == 1:
             array = array.reshape(1)
         if array.shape == (0,) and what != "x":
-            return np.zeros(wanted)
+            return np.array([initial.get(n, 0.0) for n in names], dtype=float)
         if array.ndim not in (1, 2) or array.shape[-1] != wanted:
             raise ArgumentError(f"{self.name}: {what} has the shape {array.shape}, needed are {wanted} numbers a state: "
                                 f"{', '.join(names)}")
@@ -399,6 +428,8 @@ class BoundModule:
         self.params = p
         self._n_x: int = module.metadata["sizes"]["x"]
         self._n_in: int = module.metadata["sizes"]["inputs"]
+        initial = module.metadata.get("initial", {})
+        self._inputs = np.array([initial.get(n, 0.0) for n in module.metadata["inputs"]], dtype=float)
         self._local = threading.local()
         self._ready("rhs")
 
@@ -420,11 +451,11 @@ class BoundModule:
         return evaluator.one(t, x, self._zeros(x, inputs))
 
     def _zeros(self, x: Any, inputs: Any) -> np.ndarray:
-        """Inputs that were left out."""
+        """Inputs that were left out: their initial values in the system, else 0."""
         if len(x) != self._n_x or len(inputs):
             raise ArgumentError(f"{self.module.name}: x has {len(x)} entries and inputs has {len(inputs)}, needed are "
                                 f"{self._n_x} and {self._n_in}")
-        return np.zeros(self._n_in)
+        return self._inputs
 
     def _ready(self, name: str) -> Any:
         evaluator = self.module.unit(name).evaluator(name)

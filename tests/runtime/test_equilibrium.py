@@ -94,7 +94,7 @@ def test_many_starts_lead_to_the_four_equilibria_of_a_double_pendulum() -> None:
     there = {tuple(np.round(np.abs(np.remainder(e.q + 1e-9, 2 * np.pi)) % (2 * np.pi), 6)) for e in found}
     assert there == {tuple(np.round(np.remainder(np.array(q) + 1e-9, 2 * np.pi), 6)) for q in expected}
     assert len(found) == 4 and sum(found.counts) == 24 and not found.failures
-    assert found[0].stable and found[0].name.startswith("1: stable at q1 = ") and len(found.stable) == 1
+    assert found[0].stable and found[0].name.startswith("1: neutral at q1 = ") and len(found.stable) == 1
     assert all(not e.stable for e in found.found[1:]) and found.iterations.max() <= 25
     assert all(e.residual_norm < 1e-12 for e in found)
     assert "4 equilibria from 24 starts" in repr(found) and found[0].name in repr(found)
@@ -105,7 +105,7 @@ def test_block_on_saturating_buoyancy_floats_where_the_closed_form_says() -> Non
     assert np.isclose(e["z"], 0.5 * np.arctanh(1 - 2 * 100 / 150), rtol=1e-13) and e.stable
     assert np.array_equal(floater().equilibrium(start=[-3.0]).q, e.q)
     assert np.array_equal(floater().equilibrium(start=e).q, e.q)
-    assert "stable equilibrium" in e.message and "z" in e.describe() and repr(e) == e.describe()
+    assert "neutral equilibrium" in e.message and "z" in e.describe() and repr(e) == e.describe()
 
 
 def test_steady_turning_shaft() -> None:
@@ -113,12 +113,12 @@ def test_steady_turning_shaft() -> None:
     module, omega = governor(), 6.0
     steady = module.equilibrium(fixed={"psi_dot": omega}, start={"theta": 1.3, "psi": 0.3})
     assert np.isclose(np.cos(steady["theta"]), 9.81 / (0.7 * omega**2), rtol=1e-13)
-    assert steady.stable and steady["psi"] == 0.3 and steady["psi_dot"] == omega and steady["theta_dot"] == 0.0
+    assert steady.verdict == "neutral" and steady["psi"] == 0.3 and steady["psi_dot"] == omega and steady["theta_dot"] == 0.0
     down = module.equilibrium(fixed={"psi_dot": omega}, start={"theta": 0.01})
-    assert abs(down["theta"]) < 1e-12 and not down.stable
+    assert abs(down["theta"]) < 1e-12 and down.verdict == "unstable" and down.stable is False
     hanging_still = module.equilibrium(fixed={"psi_dot": 2.0}, start={"theta": 0.5})
-    assert abs(hanging_still["theta"]) < 1e-12 and hanging_still.stable
-    assert "psi_dot" in steady.describe() and "kept" in steady.describe()
+    assert abs(hanging_still["theta"]) < 1e-12 and hanging_still.verdict == "neutral"
+    assert "psi_dot" in steady.describe() and "held" in steady.describe()
 
 
 def test_constraints_are_fulfilled_at_the_same_time() -> None:
@@ -154,7 +154,8 @@ def test_euler_parameters_stay_a_unit_vector_and_their_sign_does_not_count() -> 
     kept = {"omega_z_free": 0.0}
     down = module.equilibrium(fixed=kept, start={"z": 0.5, "x": 0.2, "p0": np.cos(0.3), "p1": np.sin(0.3)})
     assert np.isclose(np.linalg.norm(down.q[3:]), 1, rtol=1e-15)
-    assert np.isclose(down["z"], 2 - 1 - 2 * 9.81 / 400, rtol=1e-13) and np.abs(down.q[[0, 1]]).max() < 1e-12 and down.stable
+    assert np.isclose(down["z"], 2 - 1 - 2 * 9.81 / 400, rtol=1e-13) and np.abs(down.q[[0, 1]]).max() < 1e-12
+    assert down.verdict == "neutral"
     flipped = module.equilibrium(fixed=kept, start={"z": 0.5, "p0": -1.0})
     assert same(down, flipped) and not np.allclose(down.q, flipped.q)
 
@@ -301,7 +302,7 @@ def test_attitudes_tell_equilibria_apart_and_coordinates_have_ranges() -> None:
     module = hanging()
     found = module.equilibria([{"z": 0.5, "p0": 1.0}, {"z": 1.5, "p0": 0.0, "p1": 1.0}], fixed={"omega_z_free": 0.0})
     names = sorted(e.name.partition(" ")[2] for e in found)
-    assert names[0] == "stable at not turned" and re.fullmatch(r"unstable at turned by 180 deg about x", names[1])
+    assert names[0] == "neutral at not turned" and re.fullmatch(r"unstable at turned by 180 deg about x", names[1])
     ranged = module.equilibria(3, ranges={"z": 0.2, "omega_x_free": 0.1}, start={"z": 0.5}, fixed={"omega_z_free": 0.0})
     assert len(ranged) == 1 and ranged.counts == (3,) and np.isclose(ranged[0]["z"], 2 - 1 - 2 * 9.81 / 400, rtol=1e-12)
     with pytest.raises(ArgumentError, match="ranges: there is no 'p1'; there are ") as told:

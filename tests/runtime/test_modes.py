@@ -80,7 +80,8 @@ def test_row_of_masses() -> None:
                            shape / shape[1 if abs(shape[1]) > 0.1 else 0], atol=1e-12)
         assert np.isclose(mode.shares.sum(), 1) and np.isclose(np.abs(mode.shape).max(), 1)
     assert modes[0].name == "q3, q2, q4 (1)" and modes["q3, q2, q4 (1)"] is modes[0] and modes["q1, q3, q5"] is modes[2]
-    assert "f [Hz]" in repr(modes) and len(repr(modes).splitlines()) == 7 and "q3, q2, q4" in repr(modes[0])
+    assert "f [Hz]" in repr(modes) and len(repr(modes).splitlines()) == 8
+    assert "neutral" in repr(modes) and "q3, q2, q4" in repr(modes[0])
 
 
 def test_double_pendulum_of_points() -> None:
@@ -218,8 +219,8 @@ def test_derivatives_of_damped_gyroscopic_modes_with_a_parameter_that_is_solved_
             assert np.allclose([found.eigenvalue, found.frequency, found.damped_frequency, found.damping], expected,
                                rtol=1e-8, atol=1e-9)
     counterweight = loaded().equilibrium(free=["m"], fixed={"theta": -0.7})
-    lin = loaded().linearize(counterweight)
-    assert lin.eigenvalues.shape == (0,)
+    lin = loaded().linearize(counterweight, hold=["theta"])  # its condition is fulfilled without a force, and it is free else
+    assert lin.eigenvalues.shape == (0,) and loaded().linearize(counterweight).eigenvalues.shape == (2,)
     with pytest.raises(ArgumentError, match="mode 0 asked for; there are 0"):
         lin.derivative(0, "k")
 

@@ -173,7 +173,8 @@ def test_rhs_of_rows(double: Any) -> None:
     for rows in (x, x[:1], x[:3]):
         np.testing.assert_allclose(double.rhs(0.0, rows), [double.rhs(0.0, row) for row in rows], rtol=1e-14)
     assert double.rhs(np.zeros(6), x[0]).shape == (6, 4)
-    np.testing.assert_array_equal(double.rhs(0.0, {"q1": 0.3, "q1_dot": 1.5}), double.rhs(0.0, [0.3, 0.0, 1.5, 0.0]))
+    np.testing.assert_array_equal(double.rhs(0.0, {"q1": 0.3, "q2": 0.0, "q1_dot": 1.5, "q2_dot": 0.0}),
+                                  double.rhs(0.0, [0.3, 0.0, 1.5, 0.0]))
 
 
 @pytest.mark.parametrize(("x", "message"), [
@@ -216,7 +217,8 @@ def test_inverse_dynamics_undoes_rhs(sink: Any) -> None:
     rng = np.random.default_rng(6)
     for _ in range(3):
         q, u, inputs, t = rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 2), rng.uniform()
-        ud = sink.rhs(t, [*q, *u, 0.0, 0.0], None, inputs)[3:6]
+        states = [sink.metadata["initial"].get(z, 0.0) for z in sink.metadata["z"]]
+        ud = sink.rhs(t, [*q, *u, *states], None, inputs)[3:6]
         tau = sink.inverse_dynamics(q, u, ud, None, t, inputs)
         np.testing.assert_allclose(tau, 0, atol=1e-12 * np.abs(ud).max())
         wanted = (sink.mass_matrix(q, None, t) @ [1.0, 2.0, 3.0] + sink.k_tilde(q, u, None, t)

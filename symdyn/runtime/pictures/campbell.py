@@ -56,7 +56,7 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
     lower.set_ylim(min(least, -LEAST_DAMPING), max(most, LEAST_DAMPING))
     upper.set_ylim(0, highest)
     upper.set_xlim(*ends)
-    upper.set_ylabel("damped frequency [Hz]")
+    upper.set_ylabel(f"damped frequency, {diagram.frame} frame [Hz]")
     lower.set_ylabel("damping [%]")
     lower.axhline(0.0, color="0.3", linewidth=0.8)
     lower.set_xlabel(f"{diagram.speed} [rad/s]")

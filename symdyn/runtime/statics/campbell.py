@@ -1,4 +1,4 @@
-"""Campbell diagram: natural frequencies over the speed of a rotor.
+"""Campbell diagram: natural frequencies over the speed of a rotor, as the fixed frame sees them.
 
 Modes are followed from speed to speed by the likeness of their shapes (modal assurance criterion, weighed by the mass matrix)
 and by how near their eigenvalues are to those extrapolated.
@@ -7,19 +7,23 @@ Source: Allemang, The modal assurance criterion, Sound and Vibration (August 200
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.optimize
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.runtime.statics.analysis import decade
 from symdyn.runtime.statics.equilibrium import begin, find, settled, steps
-from symdyn.runtime.statics.linear import Reduced
-from symdyn.runtime.statics.modes import Linear, Mode, Modes, dominant, modes_of
-from symdyn.runtime.statics.multiblade import Steady, rotor_of, steady
+from symdyn.runtime.statics.manifold import Manifold, in_motion
+from symdyn.runtime.statics.modes import Mode, Modes, dominant, modes_of
+from symdyn.runtime.statics.multiblade import Averaged, Steady, rotor_of, steady
 from symdyn.runtime.statics.selection import Selection, listed, select
+from symdyn.runtime.statics.spectrum import Unknown, spectrum
+from symdyn.runtime.statics.stability import of_manifold
 from symdyn.runtime.statics.terms import Place
 
 if TYPE_CHECKING:
@@ -27,7 +31,13 @@ if TYPE_CHECKING:
 
 # A pattern of blades goes round if its cosine and sine are out of phase by so much: 1 is a round whirl, 0 a standing wave.
 LEAST_WHIRL = 0.2
-OPTIONS = ("free", "fixed", "start", "params", "t", "inputs", "blades", "azimuth", "azimuths", "max_iterations")
+# State matrices in multi-blade coordinates are the same at all azimuths if entries differ by this part of the largest, scaled.
+CONSTANT = 1e-9
+# Orders of blades that are tried where theirs makes nothing constant, at most of so many blades.
+MOST_BLADES = 6
+FRAMES = ("fixed", "rotating")
+OPTIONS = ("free", "fixed", "start", "params", "t", "inputs", "blades", "azimuth", "azimuths", "max_iterations", "frame",
+           "averaged")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +48,11 @@ class Campbell:
     eigenvalues   (n, n_modes) complex, 1/s; NaN where a mode could not be followed
     names         by the coordinates with most kinetic energy over all speeds; of blades also "collective", and "forward" or
                   "backward" where their pattern goes round with the rotor or against it, seen from the fixed frame
-    modes         at every speed, as found; equilibria: the states they are about (Equilibrium, or multiblade.Steady)
+    modes         at every speed, as found; equilibria: the states they are about (Equilibrium; multiblade.Steady, the mean over
+                  a turn;
+                  Stability of a periodic motion)
+    frame         "fixed" or "rotating": who sees these frequencies; held: names of what is held besides the speed
+    varies        of averaged equations, by what part of their largest entry they differ over a turn
     """
 
     title: str
@@ -48,6 +62,9 @@ class Campbell:
     names: tuple[str, ...]
     modes: tuple[Modes, ...]
     equilibria: tuple[Any, ...]
+    frame: str = "fixed"
+    held: tuple[str, ...] = ()
+    varies: float = 0.0
 
     @property
     def frequencies(self) -> np.ndarray:
@@ -77,7 +94,9 @@ class Campbell:
 
     def __repr__(self) -> str:
         width = [max(9, len(n)) for n in self.names]
-        lines = [f"{self.title}: damped natural frequencies, Hz",
+        held = f", held: {', '.join(self.held)}" if self.held else ""
+        mean = f", mean over the azimuth of equations that vary by {decade(self.varies)}" if self.varies > CONSTANT else ""
+        lines = [f"{self.title}: damped natural frequencies in the {self.frame} frame, Hz{held}{mean}",
                  f"{self.speed:>16}  " + "  ".join(f"{n:>{w}}" for n, w in zip(self.names, width, strict=True))]
         for value, row in zip(self.values, self.frequencies, strict=True):
             lines.append(f"{value:>16.6g}  " + "  ".join(f"{f:>{w}.5g}" for f, w in zip(row, width, strict=True)))
@@ -86,21 +105,32 @@ class Campbell:
 
 def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None,
              t: float = 0.0, inputs: Any = None, blades: Sequence[Sequence[Any]] = (), azimuth: Any = None,
-             azimuths: int = 12, max_iterations: int = 100, **others: Any) -> Campbell:
+             azimuths: int = 12, max_iterations: int = 100, frame: str = "fixed", averaged: bool = False,
+             **others: Any) -> Campbell:
     """Natural frequencies over a rotor's speed.
 
     speed      name or symbol; values: rad/s. At each the equilibrium with this speed is found, then its modes
     free, fixed, start, params, t, inputs   as for Module.equilibrium
     blades     sets of coordinates of the blades of a rotor, one set per shape: the same coordinate of every blade, in the order
                in which blades lie ahead of each other in the sense of the azimuth, such as [("flap1", "flap2", "flap3")]: modes
-               in the fixed frame by multi-blade coordinates, averaged over `azimuths` positions; accelerations of blades that
-               the rotation brings about are in the steady state
-    azimuth    the coordinate whose rate the speed is, where the names do not tell
-    Without blades the azimuth stays where it is at the start: enough for rotors that look the same at every azimuth.
-    Raises NoEquilibrium, ArgumentError.
+               are named by multi-blade coordinates. That these make the equations constant is checked at `azimuths` positions;
+               where they do not (weight on the blades), the periodic motion is found and judged by Floquet theory
+    averaged   with blades: the mean of the equations over the azimuths in place of Floquet theory where they are periodic,
+               which is
+               quicker and leaves out what is periodic; how much the entries vary is printed
+    azimuth    the coordinate whose rate the speed is, where the names do not say it
+    frame      "fixed": frequencies that the fixed frame sees; "rotating": those in the coordinates of the model, where the
+               equations are constant in them
+    Without blades a change of variables that makes the equations constant is looked for; where there is none (two blades, an
+    anisotropic rotor on anisotropic bearings), Floquet theory gives the modes. Raises NoEquilibrium, ArgumentError.
     """
     metadata, owner = module.metadata, module.name
     listed(list(others), OPTIONS, "options", owner)
+    if frame not in FRAMES:
+        raise ArgumentError(f"{owner}: frame must be 'fixed' or 'rotating', found {frame!r}")
+    if frame == "rotating" and list(blades):
+        raise ArgumentError(f"{owner}: blades are named, whose modes are seen from the fixed frame; leave them out, or "
+                            f"frame='rotating'")
     named = listed(speed, metadata["u"], "speed", owner)
     if len(named) != 1:
         raise ArgumentError(f"{owner}: speed must be one name or symbol, found {speed!r}")
@@ -116,30 +146,59 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
         raise ArgumentError(f"{owner}: azimuths must be a whole number, found {azimuths!r}")
     turned = listed(azimuth if azimuth is not None else name.removesuffix("_dot"), metadata["q"], "azimuth", owner)[0] \
         if groups or azimuth is not None else None
-    found: list[tuple[Linear, Any]] = []
+    found: list[_Found] = []
     last: Any = start
     for value in numbers:
         selection = select(module, free, {**given, name: value}, None)
-        place = begin(module, selection, None if isinstance(last, Steady) else last, params, t, inputs)
+        place = begin(module, selection, None if isinstance(last, (Steady, dict)) else last, params, t, inputs)
         selection = settled(place, selection)
+        title = f"{owner} at {name} = {value:g}"
         if groups:
             assert turned is not None
-            linear, last = _in_fixed_frame(module, place, selection, (name, turned, groups), int(azimuths), last)
+            each = _of_blades(module, place, selection, (name, turned, groups), int(azimuths), last, title, averaged)
         else:
-            last = find(place, selection, limit)
-            linear = Reduced(last.place, selection)
-        found.append((linear, last))
-    sets = [modes_of(linear, f"{owner} at {name} = {value:g}") for (linear, _), value in zip(found, numbers, strict=True)]
-    tracks = follow(sets, [linear.inertia for linear, _ in found], numbers)
+            each = _of_rotor(place, selection, limit, frame, title)
+        found.append(each)
+        last = each.start
+    sets = [each.modes for each in found]
+    tracks = follow(sets, [each.inertia for each in found], numbers)
     eigenvalues = np.full((len(numbers), len(tracks)), complex(np.nan, np.nan))
     for j, track in enumerate(tracks):
         for k, mode in track.items():
             eigenvalues[k, j] = mode.eigenvalue
-    return Campbell(owner, name, numbers, eigenvalues, _names(tracks), tuple(sets), tuple(e for _, e in found))
+    held = tuple(n for n in selection.held if n != name)
+    return Campbell(owner, name, numbers, eigenvalues, _names(tracks, numbers), tuple(sets), tuple(each.about for each in found),
+                    frame, held, max(each.varies for each in found) if averaged else 0.0)
 
 
-def _in_fixed_frame(module: Module, place: Place, selection: Selection, names: tuple[str, str, list[list[str]]], azimuths: int,
-                    last: Any) -> tuple[Linear, Steady]:
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Modes at one speed, the mass matrix that compares their shapes, what they are about, and where to begin next; varies: the
+    part of the largest entry by which averaged equations differ over a turn."""
+
+    modes: Modes
+    inertia: np.ndarray
+    about: Any
+    start: Any
+    varies: float = 0.0
+
+
+def _of_rotor(place: Place, selection: Selection, limit: int, frame: str, title: str) -> _Found:
+    """Without named blades."""
+    start: Any
+    try:
+        about: Any = find(place, selection, limit)
+        manifold, start = Manifold(in_motion(about.place, selection), selection), about
+    except NoEquilibrium as error:
+        if "module.stability" not in str(error):
+            raise
+        about, start, manifold = None, None, Manifold(in_motion(place, selection), selection)
+    found = of_manifold(manifold, rotating=frame == "rotating")
+    return _Found(Modes(title, found.modes, found.modes.notes), manifold.inertia, about or found, start)
+
+
+def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[str, str, list[list[str]]], azimuths: int,
+               last: Any, title: str, averaged: bool) -> _Found:
     speed, azimuth, groups = names
     rotor = rotor_of(module, selection, speed, azimuth, groups)
     if azimuths < 1:
@@ -154,8 +213,83 @@ def _in_fixed_frame(module: Module, place: Place, selection: Selection, names: t
         q = np.zeros(len(rotor.free))
         q[rotor.rows] = place.x[list(rotor.coordinates)]
         begun = Steady(rotor, place, np.linalg.solve(T, q), omega, at)
-    found, linear = steady(begun)
-    return linear, found
+    about, linear = steady(begun)
+    size = _scaled_size(linear)
+    varies = float(size.max(initial=0.0))
+    if varies > CONSTANT:
+        _demand_order(about, varies, groups)
+    if varies <= CONSTANT or averaged:
+        unknown = 1e-14 * np.abs(linear.A()) + (4 * linear.spread if varies <= CONSTANT else 0.0)
+        found = spectrum(linear.A(), Unknown.of(unknown))
+        return _Found(modes_of(found, linear.shapes, title), linear.M, about, about, varies)
+    state = about.at(0.0)[0]
+    manifold = Manifold(in_motion(state, selection), selection)
+    judged = of_manifold(manifold)
+    into = _into_blades(about, manifold)
+    modes = [_in_blades(mode, into, linear) for mode in judged.modes]
+    names_of = [m.name for m in modes]
+    numbered = [m if names_of.count(m.name) == 1 else replace(m, name=f"{m.name} ({names_of[:k + 1].count(m.name)})")
+                for k, m in enumerate(modes)]
+    return _Found(Modes(title, numbered, judged.modes.notes), linear.M, about, about)
+
+
+def _scaled_size(linear: Averaged) -> np.ndarray:
+    """The spread of the state matrix beside its largest entry, metres and radians on one footing."""
+    weights = np.sqrt(np.abs(np.diag(linear.M)))
+    scale = np.concatenate([weights, weights])
+    A = np.abs(linear.A()) * (scale[:, None] / scale)
+    return np.asarray(linear.spread * (scale[:, None] / scale) / max(float(A.max(initial=0.0)), 1e-300))
+
+
+def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
+    """Raises ArgumentError if the blades in another order make the equations constant, or much more nearly so."""
+    count = len(groups[0])
+    if count > MOST_BLADES or any(len(g) != count for g in groups):
+        return
+    best, order = size, tuple(range(count))
+    for tail in itertools.permutations(range(1, count)):
+        other = (0, *tail)
+        rotor = rotor_of(about.rotor.module, _selection_of(about), about.place.module.metadata["u"][about.rotor.speed],
+                         about.place.module.metadata["q"][about.rotor.azimuth], [[g[k] for k in other] for g in groups])
+        T = about.rotor.transform(0.0)[0]
+        q = T @ about.a
+        turned = Steady(rotor, about.place, np.linalg.solve(rotor.transform(0.0)[0], q), about.omega, about.azimuths)
+        found = float(_scaled_size(turned.averages()[1]).max(initial=0.0))
+        if found < 0.1 * best:
+            best, order = found, other
+    if order != tuple(range(count)):
+        right = [tuple(g[k] for k in order) for g in groups]
+        raise ArgumentError(f"{about.place.module.name}: blades: in this order multi-blade coordinates do not make the "
+                            f"equations constant "
+                            f"(entries differ by {size:.2g} of the largest over a turn); in the order {right} they differ by "
+                            f"{best:.2g}: name the blades as they lie ahead of each other in the sense of the azimuth")
+
+
+def _selection_of(about: Steady) -> Selection:
+    """A selection with the coordinates of a rotor free."""
+    module = about.place.module
+    free = {about.place.module.metadata["u"][k] for k in about.rotor.free}
+    kept = tuple(u for u in module.metadata["u"] if u not in free)
+    return Selection(module, kept, {})
+
+
+def _into_blades(about: Steady, manifold: Manifold) -> np.ndarray:
+    """Multi-blade coordinates of displacements eta at azimuth zero, (n, n_d)."""
+    rows = [manifold.displacements.index(k) for k in about.rotor.free]
+    T = about.rotor.transform(0.0)[0]
+    return np.asarray(np.linalg.inv(T)[:, np.argsort(rows)])
+
+
+def _in_blades(mode: Mode, into: np.ndarray, linear: Averaged) -> Mode:
+    """A mode named by multi-blade coordinates at azimuth zero."""
+    amplitudes = into @ mode.right[:into.shape[1]]
+    energies = np.abs(np.real(amplitudes.conj() * (linear.M @ amplitudes)))
+    if not energies.sum() > 0:
+        return mode
+    shares = energies / energies.sum()
+    leader = int(np.argmax(np.round(shares, 6)))
+    return replace(mode, shape=amplitudes / amplitudes[leader], shares=shares, name=dominant(shares, linear.labels),
+                   coordinates=linear.labels)
 
 
 def _values(values: Any, owner: str) -> np.ndarray:
@@ -199,7 +333,7 @@ def _likeness(track: dict[int, Mode], mode: Mode, M: np.ndarray, values: np.ndar
     return float((product / norms if norms > 0 else 0.0) - min(gap, 1.0))
 
 
-def _names(tracks: Sequence[dict[int, Mode]]) -> tuple[str, ...]:
+def _names(tracks: Sequence[dict[int, Mode]], values: np.ndarray) -> tuple[str, ...]:
     names: list[str] = []
     for track in tracks:
         modes = list(track.values())
@@ -207,20 +341,27 @@ def _names(tracks: Sequence[dict[int, Mode]]) -> tuple[str, ...]:
         told = dominant(shares, modes[0].coordinates).split(", ") if shares.any() else [modes[0].name]
         stems = {label.rpartition(" ")[0] for label in told if label.endswith((" cosine", " sine"))}
         for stem in sorted(stems):
-            sense = _whirl(modes, stem)
+            sense = _whirl(track, stem, values)
             if sense:
                 cyclic = [k for k, label in enumerate(told) if label in (f"{stem} cosine", f"{stem} sine")]
                 told = [f"{stem} {sense}" if k == cyclic[0] else label for k, label in enumerate(told) if k not in cyclic[1:]]
-        names.append(", ".join(told))
+        names.append(", ".join(told) + ("" if stems else _sense(modes)))
     return tuple(n if names.count(n) == 1 else f"{n} ({names[:k + 1].count(n)})" for k, n in enumerate(names))
 
 
-def _whirl(modes: Iterable[Mode], stem: str) -> str:
-    """Which way the pattern of a set of blades goes round, seen from the fixed frame, if it does."""
+def _sense(modes: Sequence[Mode]) -> str:
+    """Which way the displacements of a mode go round the axis of the rotor, if they do."""
+    whirl = float(np.mean([mode.whirl for mode in modes]))
+    return "" if abs(whirl) < LEAST_WHIRL else " forward" if whirl > 0 else " backward"
+
+
+def _whirl(track: dict[int, Mode], stem: str, values: np.ndarray) -> str:
+    """Which way the pattern of a set of blades goes round, with the rotor or against it, seen from the fixed frame, if it
+    does."""
     turning = total = 0.0
-    for mode in modes:
+    for k, mode in track.items():
         c, s = (mode.coordinates.index(f"{stem} {part}") for part in ("cosine", "sine"))
-        turning -= float(np.imag(mode.shape[c].conj() * mode.shape[s]))
+        turning -= float(np.imag(mode.shape[c].conj() * mode.shape[s])) * (1.0 if values[k] >= 0 else -1.0)
         total += float(np.sum(np.abs(mode.shape[[c, s]])**2)) / 2
     if not total or abs(turning) < LEAST_WHIRL * total:
         return ""

@@ -11,7 +11,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find, settled, steps
-from symdyn.runtime.statics.linear import natural_length
+from symdyn.runtime.statics.manifold import natural_length
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.terms import Place, coordinate_names
 
@@ -209,7 +209,7 @@ def _named(found: list[Equilibrium]) -> list[Equilibrium]:
     telling = sorted(_telling(parts))
     result = []
     for k, e in enumerate(found):
-        kind = {True: "stable", False: "unstable", None: "rigid"}[e.stable]
+        kind = e.verdict or "rigid"
         words = []
         for i in telling:
             if i < len(single):

@@ -10,23 +10,25 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning
+from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning, SymdynError
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import normalised, number
 from symdyn.runtime.masses import real_parameters
+from symdyn.runtime.statics.analysis import Analysis
 from symdyn.runtime.statics.gimbal import lock
-from symdyn.runtime.statics.linear import Reduced
-from symdyn.runtime.statics.modes import eigen, stable
+from symdyn.runtime.statics.manifold import Manifold, in_motion
+from symdyn.runtime.statics.noise import ENTRIES, EPSILON, SAFETY, SAMPLES, rounded
 from symdyn.runtime.statics.search import Search, Trial
 from symdyn.runtime.statics.selection import Selection, select
+from symdyn.runtime.statics.singular import singular_configuration
+from symdyn.runtime.statics.spectrum import ZERO
+from symdyn.runtime.statics.steady import accelerating, further_on, steadiness
 from symdyn.runtime.statics.terms import Place, coordinate_names, null_space, rest
 from symdyn.runtime.watches import WATCHES, warn
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Stiffness below this part of the largest, in the metric of the mass matrix, is none.
-LOOSE = 1e-11
 # Steady motion must fulfil the constraints up to this part of its speed.
 STEADY = 1e-9
 # Residuals that a message names, at most.
@@ -36,6 +38,33 @@ LATER = (0.37, 1.7, 7.3)
 LOCKED = ("there forces along its angles do not tell whether it is at rest; use Euler parameters (orientation='parameters' of a "
           "catalogued system, orientation=EulerParameters() of a joint), or another order of the angles")
 _FORCES = {"rad/s": "N m", "m/s": "N"}
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A verdict with its reason, and the eigenvalues (m,) or exponents that it rests on, None without."""
+
+    verdict: str
+    reason: str
+    eigenvalues: np.ndarray | None
+
+
+def judge(manifold: Manifold) -> Judged:
+    """What small disturbances of a steady state do; raises nothing."""
+    try:
+        singular = singular_configuration(manifold.place)
+        if singular:
+            return Judged("not decided", singular, None)
+        steady = steadiness(manifold)
+        if steady.kind:
+            analysis = Analysis(manifold)
+            return Judged(analysis.verdict, analysis.reason(), analysis.eigenvalues)
+        from symdyn.runtime.statics.stability import of_manifold
+
+        found = of_manifold(manifold)
+        return Judged(found.verdict, found.reason, found.exponents)
+    except SymdynError as error:
+        return Judged("not decided", str(error), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,22 +132,74 @@ class Equilibrium:
         """Parameters and inputs that were solved for, by name."""
         return {name: self[name] for name in self.selection.unknown}
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of what is held when the state is disturbed: what was kept, but for conditions of what was solved for."""
+        return self.selection.held
+
     @cached_property
+    def _manifold(self) -> Manifold:
+        return Manifold(in_motion(self.place, self.selection), self.selection)
+
+    @cached_property
+    def _judged(self) -> Judged:
+        return judge(self._manifold)
+
+    @property
     def eigenvalues(self) -> np.ndarray:
-        """Of the linearization, what is kept left out, by size, (m,) complex, 1/s."""
-        values = eigen(Reduced(self.place, self.selection))[0]
-        return np.asarray(values[np.lexsort((values.imag, np.abs(values)))])
+        """Of the linearization, what is held left out, by size, (m,) complex, 1/s; of a periodic motion its exponents.
+
+        Raises ArgumentError with the reason where there are none (a singular configuration).
+        """
+        if self._judged.eigenvalues is None:
+            raise ArgumentError(f"{self.module.name}: there are no eigenvalues here: {self._judged.reason}")
+        return self._judged.eigenvalues
+
+    @property
+    def verdict(self) -> str:
+        """"stable" (all exponents proved negative), "neutral" (none positive, those that are zero without Jordan blocks),
+        "drifts"
+        (with a Jordan block), "unstable" (one proved positive), "not decided"; "" if nothing is free to move."""
+        return self._judged.verdict
+
+    @property
+    def reason(self) -> str:
+        """What the verdict rests on, in a sentence with numbers."""
+        return self._judged.reason
 
     @cached_property
     def stable(self) -> bool | None:
-        """Whether no small motion grows, by the eigenvalues; None if nothing can move."""
-        return stable(self.eigenvalues)
+        """Whether small disturbances stay small: True where the verdict is "stable", and at a neutral state of rest at a strict
+        minimum of the energy (Lagrange and Dirichlet), where undamped oscillations stay small; False where it is "unstable" or
+        "drifts"; else None."""
+        if self.verdict in ("unstable", "drifts"):
+            return False
+        if self.verdict == "stable":
+            return True
+        return True if self.verdict == "neutral" and self._least_energy() else None
+
+    def _least_energy(self) -> bool:
+        """Whether this is rest at a strict minimum of the energy, as far as the linear equations tell: no damping, no extra
+        states,
+        and a stiffness that is symmetric and positive definite beyond rounding."""
+        manifold = self._manifold
+        if self.u.any() or not manifold.second_order:
+            return False
+        analysis = Analysis(manifold)
+        noise, K = analysis.noise, manifold.K
+        if (np.abs(manifold.C) > noise.C).any() or (np.abs(K - K.T) > noise.K + noise.K.T).any():
+            return False
+        scale = 1 / np.sqrt(np.diag(manifold.M))
+        values, vectors = np.linalg.eigh((K + K.T) / 2 * np.outer(scale, scale))
+        error = np.einsum("ik,ij,jk->k", np.abs(vectors), noise.K * np.outer(scale, scale), np.abs(vectors))
+        return bool((values > error + 1e-15 * np.abs(values).max(initial=0.0)).all())
 
     @property
     def message(self) -> str:
         """What was found, in a sentence."""
-        kind = {True: "stable equilibrium", False: "unstable equilibrium",
-                None: "equilibrium, nothing free to move,"}[self.stable]
+        kind = f"{self.verdict} equilibrium" if self.verdict else "equilibrium, nothing free to move,"
+        if self.verdict == "not decided":
+            kind = "equilibrium whose stability is not decided"
         return f"{kind} after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
 
     def __getitem__(self, name: Any) -> float:
@@ -139,9 +220,11 @@ class Equilibrium:
         lines = [f"{self.module.name}: {f'{self.name}, ' if self.name else ''}{self.message}"]
         for name in shown:
             unit = metadata["units"].get(name, "")
-            note = "  solved for" if name in self.selection.unknown else "  kept" if name in self.selection.kept else ""
+            note = "  solved for" if name in self.selection.unknown else "  held" if name in self.held else \
+                "  kept" if name in self.selection.kept else ""
             lines.append(f"  {name:<{width}} = {self[name]:>14.8g} {unit}{note}".rstrip())
-        return "\n".join(lines)
+        lines += [f"  held: {', '.join(self.held)}"] if self.held else []
+        return "\n".join([*lines, f"  {self.reason}"])
 
     def __repr__(self) -> str:
         return self.describe()
@@ -187,21 +270,31 @@ def begin(module: Module, selection: Selection, start: Any, params: Any, t: floa
     time = number(t, "a finite number of seconds as t", module.name)
     if isinstance(start, Equilibrium):
         x = start.x.copy()
-        x[len(metadata["q"]):len(metadata["q"]) + len(metadata["u"])] = 0.0
     else:
         if start is not None and not isinstance(start, Mapping) and np.shape(start) == (len(metadata["q"]),):
             start = dict(zip(metadata["q"], start, strict=True))
-        x = take(start, metadata["x"], "start",
-                 {n: 0.0 if n in metadata["u"] and n not in metadata["q"] else metadata["initial"].get(n, 0.0)
-                  for n in metadata["x"]}, module.name)
+        x = take(start, metadata["x"], "start", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
+        if isinstance(start, Mapping):
+            moving = [n for n in (str(getattr(k, "name", k)) for k in start) if n in metadata["u"] and n not in metadata["q"]
+                      and n not in selection.values and x[metadata["x"].index(n)]]
+            if moving:
+                raise ArgumentError(f"{module.name}: start gives the speed{'s' * (len(moving) > 1)} {', '.join(moving)}, but an "
+                                    "equilibrium is a state of rest; give speeds of a steady motion in fixed")
+    # Speeds are those that are given in fixed, the others zero.
+    x[len(metadata["q"]):len(metadata["q"]) + len(metadata["u"])] = 0.0
     x = normalised(module, selection.apply(x))
     if isinstance(params, Mapping) and selection.parameters:  # a guess need not be given
         given = {str(getattr(k, "name", k)) for k in params}
         known = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
         params = {**dict.fromkeys([n for n in selection.parameters if n not in given and known[n] is None], 0.0), **params}
-    free = take(inputs if inputs is not None else {}, metadata["inputs"], "inputs", dict.fromkeys(metadata["inputs"], 0.0),
-                module.name)
-    return rest(module, time, x, real_parameters(module, params), free)
+    return rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
+
+
+def given_inputs(module: Module, inputs: Any) -> np.ndarray:
+    """Inputs in order; what is left out takes its initial value, as in a simulation, else 0, (n_in,)."""
+    names = module.metadata["inputs"]
+    return take(inputs if inputs is not None else {}, names, "inputs",
+                {n: module.metadata["initial"].get(n, 0.0) for n in names}, module.name)
 
 
 def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
@@ -225,6 +318,7 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     _demand_effect(search)
     _demand_stiffness(search)
     _demand_steady(trial)
+    _demand_lasting(trial)
     _look(search)
     return Equilibrium(trial.place, selection, _left(trial), search.steps)
 
@@ -309,22 +403,43 @@ def _demand_stiffness(search: Search) -> None:
             _, sizes, Wt = np.linalg.svd(loose[:, :trial.directions.shape[1]], full_matrices=False)
             loose = Wt[sizes > 1e-6]
     else:
-        rows = np.vstack([place.C_r, trial.selection.rows(place)]) * columns
-        Z = null_space(rows)
-        K = place.by_v[:n_u] * np.outer(columns, columns)
-        reduced = Z.T @ K @ Z
-        if states:  # what extra states do at rest is stiffness, too
-            outer = place.by_v[n_u + n_c:][states] * columns
-            reduced = reduced - Z.T @ (place.by_z[:n_u][:, states] * columns[:, None]) @ np.linalg.inv(inner) @ outer @ Z
-        _, values, Vt = np.linalg.svd(reduced)
-        size = max(np.abs(K).max(initial=0.0), 1e-300)
-        loose = (Vt @ Z.T)[values <= LOOSE * size] if len(values) else Vt[:0] @ Z.T
+        Z = null_space(np.vstack([place.C_r, trial.selection.rows(place)]) * columns)
+        K, error = _stiffness(place, columns, trial.selection.states)
+        directions, _ = _without_stiffness(Z.T @ K @ Z, np.abs(Z.T) @ error @ np.abs(Z))
+        loose = directions @ Z.T
         labels = list(coordinate_names(module.metadata))
     if len(loose):
         raise EquilibriumNotUnique(
             f"{module.name}: the equilibrium is not unique: there is no stiffness along "
             + " and along ".join(_told(direction, labels) for direction in loose)
             + f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it")
+
+
+def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """K of all speeds, (n_u, n_u), scaled, with what extra states do at rest, and how much of its entries rounding may be."""
+    def at(here: Place) -> np.ndarray:
+        forces, rates = here.parts["forces"], here.parts["z_dot"]
+        K = here.by_v[forces]
+        if states:
+            inner = here.by_z[rates][states][:, states]
+            K = K - here.by_z[forces][:, states] @ np.linalg.solve(inner, here.by_v[rates][states])
+        return np.asarray(K * np.outer(columns, columns))
+
+    K, stream = at(place), np.random.default_rng(11)
+    change = np.max([np.abs(at(rounded(place, stream)) - K) for _ in range(SAMPLES)], axis=0)
+    return K, SAFETY * change + ENTRIES * EPSILON * np.abs(K)
+
+
+def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (k, n) along which K is zero as far as rounding tells, and its singular values."""
+    if not len(K):
+        return np.zeros((0, 0)), np.zeros(0)
+    rows, sums = np.abs(K).max(axis=1), np.abs(K).max(axis=0)
+    rows, sums = (1 / np.sqrt(np.where(v > 0, v, 1.0)) for v in (rows, sums))
+    U, values, Vt = np.linalg.svd(K * np.outer(rows, sums))
+    noise = np.einsum("ik,ij,kj->k", np.abs(U), error * np.outer(rows, sums), np.abs(Vt)) + EPSILON * values.max(initial=0.0)
+    found = Vt[values <= ZERO * noise] * sums
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300), values
 
 
 def _direction_names(trial: Trial) -> list[str]:
@@ -357,6 +472,24 @@ def _demand_steady(trial: Trial) -> None:
             raise NoEquilibrium(f"{place.module.name}: at t = {place.t:g} s the constraints {what} {values[k]:.6g} m/s"
                                 f"{'^2' if values is demanded else ''} ({names[k]}) at the speeds that are given: there is no "
                                 "rest there; give speeds that fit them, or simulate the motion")
+
+
+def _demand_lasting(trial: Trial) -> None:
+    """Raises NoEquilibrium where forces change along the steady motion, such as weight in the plane of a rotor."""
+    place = trial.place
+    if not place.u.any():
+        return
+    try:
+        manifold = Manifold(in_motion(place, trial.selection), trial.selection)
+        for later in further_on(manifold.place, manifold):
+            changed = accelerating(later, manifold)
+            if changed:
+                raise NoEquilibrium(
+                    f"{place.module.name}: no steady motion: the forces balance at this position, but not further on: after "
+                    f"{later.t - place.t:.4g} s {changed}. The motion with the given speeds is periodic at best: "
+                    "module.stability(fixed={...}) finds it and judges it")
+    except (EvaluationError, ArgumentError):  # a position further on that the mechanism cannot reach is told by the verdict
+        return
 
 
 def _look(search: Search) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,17 +10,21 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
-from symdyn.runtime.consistent import normalised, number
+from symdyn.runtime.consistent import NotConsistent, check_start, normalised, number
 from symdyn.runtime.masses import real_parameters
-from symdyn.runtime.statics.equilibrium import Equilibrium
-from symdyn.runtime.statics.linear import Reduced
-from symdyn.runtime.statics.modes import Modes, eigen, modes_of
-from symdyn.runtime.statics.selection import Selection, listed, select
+from symdyn.runtime.statics.analysis import Analysis, held_note
+from symdyn.runtime.statics.equilibrium import Equilibrium, given_inputs
+from symdyn.runtime.statics.manifold import Manifold, in_motion
+from symdyn.runtime.statics.modes import Modes
+from symdyn.runtime.statics.selection import Selection, holding, listed, select
 from symdyn.runtime.statics.sensitivity import Sensitivity, of_eigenvalue, shift
+from symdyn.runtime.statics.singular import singular_configuration
+from symdyn.runtime.statics.steady import Steadiness, steadiness
 from symdyn.runtime.statics.terms import Place, coordinate_names, rest
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
+    from symdyn.runtime.statics.stability import Stability
 
 
 class StateSpace(NamedTuple):
@@ -33,41 +37,42 @@ class StateSpace(NamedTuple):
 
 
 class Linearization:
-    """The linear equations about a state, in n independent velocities.
+    """The linear equations about a state on the manifold of the constraints.
 
-    M eta_ddot + C eta_dot + K eta = F_in in'   with eta (n,) the changes along `coordinates`; v = Z eta of all speeds
-    x'_dot = A x' + B in',  y' = C_out x' + D in'   with x' = [eta; zeta; z'], zeta the changes of the independent speeds
-    G   (n, n): eta_dot = zeta - G eta; zero where speeds are rates of coordinates, and at rest. With it M, C, K belong to
-        M zeta_dot + C zeta + K eta = F_in in'
-    z   extra states couple by A alone
+    x'_dot = A x' + B in',  y' = C_out x' + D in'   with x' = [eta; zeta; z']: changes of the independent displacements (n_d,),
+    of the independent speeds (n_s,) and of the extra states. Velocity constraints bind speeds only: n_s is less than n_d then.
+    A, B, C_out and D are the derivative of the flow on the manifold, at rest and along any motion. The same by forces:
+    M zeta_dot + C zeta + K eta + ... = F_in in'    M, C (n_s, n_s), K (n_s, n_d); where speeds are rates of coordinates and
+    nothing but positions is constrained, eta_dot = zeta, and this is M eta_ddot + C eta_dot + K eta = F_in in'
+    G   (n_d, n_d): eta_dot = ... - G eta; zero where speeds are rates of coordinates, and at rest
+    Z   (n_u, n_d): v = Z eta of what moves along all speeds
 
-    coordinates   names of the independent changes: of coordinates, of speeds that are no rates (turning about that axis)
-    states        names of x'; outputs: names of y', entries of vectors by number
-    Along a motion under constraints A and B hold the change of the constraints, too; M, C, K do not.
+    coordinates   names of eta: of coordinates, of speeds that are no rates (turning about that axis)
+    states        names of x'; outputs: names of y', entries of vectors by number; held: names of what is held
     """
 
-    def __init__(self, reduced: Reduced, equilibrium: Equilibrium | None) -> None:
-        self._reduced = reduced
+    def __init__(self, manifold: Manifold, equilibrium: Equilibrium | None) -> None:
+        self._manifold = manifold
+        self._analysis = Analysis(manifold)
         self.equilibrium = equilibrium
-        self.module = reduced.place.module
-        place = reduced.place
+        place = manifold.place
+        self.module = place.module
         self.t, self.x, self.params, self.inputs = place.t, place.x, place.p, place.inputs
         self.ud, self.lam = place.ud, place.lam
-        self.M, self.C, self.K, self.G = reduced.M, reduced.C, reduced.K, reduced.G
-        self.F_in, self.Z = reduced.F_in, reduced.Z
-        metadata = self.module.metadata
-        self.coordinates = reduced.labels
-        self.states = (*self.coordinates, *[metadata["u"][k] for k in reduced.independent],
-                       *[metadata["z"][k] for k in reduced.states])
+        self.M, self.C, self.K, self.G = manifold.M, manifold.C, manifold.K, manifold.G
+        self.F_in, self.Z = manifold.F_in, manifold.Z_v
+        self.coordinates = manifold.labels
+        self.states = (*manifold.labels, *manifold.speed_labels, *manifold.state_labels)
+        self.held = manifold.selection.held
 
     @cached_property
     def state_space(self) -> StateSpace:
         """(A, B, C, D); C and D have no rows without outputs."""
-        A, B = self._reduced.state_matrices()
-        if not self.module.metadata["outputs"]:
-            return StateSpace(A, B, np.zeros((0, len(A))), np.zeros((0, B.shape[1])))
-        place = self._reduced.place
-        return StateSpace(A, B, place.evaluate("outputs_x") @ self._reduced.tangent(), place.evaluate("outputs_inputs"))
+        return StateSpace(*self._manifold.matrices, *self._manifold.output_matrices())
+
+    def tangent(self) -> np.ndarray:
+        """x' of the whole state = T [eta; zeta; z'], (n_x, m)."""
+        return self._manifold.tangent()
 
     @property
     def A(self) -> np.ndarray:
@@ -94,21 +99,62 @@ class Linearization:
         return tuple(names)
 
     @cached_property
-    def eigenvalues(self) -> np.ndarray:
-        """Of A, by size, (m,) complex, 1/s."""
-        values = self._eigen[0]
-        return np.asarray(values[np.lexsort((values.imag, np.abs(values)))])
+    def units(self) -> Mapping[str, str]:
+        """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second."""
+        known = self.module.metadata["units"]
+        displaced = {label: known.get(label, known.get(self.module.metadata["u"][k], "").removesuffix("/s") or "")
+                     for label, k in zip(self.coordinates, self._manifold.displacements, strict=True)}
+        others = {n: known.get(n, "") for n in (*self.states[len(self.coordinates):], *self.module.metadata["inputs"])}
+        points = self.module.metadata.get("output_units", {})
+        return {**others, **displaced, **{n: points.get(n.partition("[")[0], "") for n in self.outputs}}
 
     @cached_property
-    def _eigen(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return eigen(self._reduced)
+    def steadiness(self) -> Steadiness:
+        """Whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason."""
+        return steadiness(self._manifold)
+
+    def _demand_steady(self, what: str) -> None:
+        """Raises ArgumentError where eigenvalues decide nothing."""
+        singular = singular_configuration(self._manifold.place)
+        if singular:
+            raise ArgumentError(f"{self.module.name}: {what} asked for at a {singular}; move the mechanism away from it")
+        if not self.steadiness.kind:
+            raise ArgumentError(f"{self.module.name}: {what} asked for at a state that is neither at rest nor in steady motion: "
+                                f"{self.steadiness.reason}. Eigenvalues decide nothing there; linearize at an equilibrium, or "
+                                f"use "
+                                "module.stability(...), which follows a periodic motion")
+
+    @cached_property
+    def eigenvalues(self) -> np.ndarray:
+        """Of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion."""
+        self._demand_steady("eigenvalues were")
+        return self._analysis.eigenvalues
 
     @cached_property
     def _modes(self) -> Modes:
-        return modes_of(self._reduced, f"{self.module.name}: modes")
+        self._demand_steady("modes were")
+        return self._analysis.modes(f"{self.module.name}: modes")
+
+    @property
+    def verdict(self) -> str:
+        """"stable", "neutral", "drifts", "unstable" or "not decided", by the eigenvalues; "" if nothing is free to move.
+
+        Raises ArgumentError where A is not constant along the motion.
+        """
+        self._demand_steady("a verdict was")
+        return self._analysis.verdict
+
+    def stability(self) -> Stability:
+        """The verdict with its evidence, also where A is not constant along the motion; see Module.stability."""
+        from symdyn.runtime.statics.stability import of_manifold
+
+        return of_manifold(self._manifold)
 
     def modes(self) -> Modes:
-        """Natural frequencies, damping ratios, periods, shapes; prints as a table. See symdyn.runtime.statics.modes."""
+        """Natural frequencies, damping ratios, periods, shapes; prints as a table. See symdyn.runtime.statics.modes.
+
+        Raises ArgumentError where A is not constant along the motion.
+        """
         return self._modes
 
     def derivative(self, mode: Any, parameter: Any) -> Sensitivity:
@@ -119,38 +165,49 @@ class Linearization:
         stays. Raises ArgumentError for double eigenvalues, and where what this needs is not constant: turning Euler parameters,
         motion under constraints, part of an orientation that is kept.
         """
-        place, selection = self._reduced.place, self._reduced.selection
+        manifold = self._manifold
+        place, selection = manifold.place, manifold.selection
         owner = self.module.name
         named = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
         if len(named) != 1:
             raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {parameter!r}")
         (name,) = named
-        rows = selection.rows(place)
-        if (self.equilibrium is None and not self._at_rest()) or self.G.any():
+        if not self.steadiness.kind or self.G.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues hold at a state of rest or of steady motion; linearize at "
                                 "an equilibrium")
+        rows = manifold.held.positions
         if (np.count_nonzero(rows, axis=1) > 1).any() and not _fixed_space(rows):
             raise ArgumentError(f"{owner}: derivatives of eigenvalues with a part of an orientation kept are not available; fix "
                                 "all of its coordinates, or none")
         if not all(self.module.metadata.get("holonomic") or [True]):
             raise ArgumentError(f"{owner}: derivatives of eigenvalues are not available with constraints of velocities")
+        if manifold.Z_u is not manifold.Z_v or manifold.W.any():
+            raise ArgumentError(f"{owner}: derivatives of eigenvalues along a motion under constraints are not available; they "
+                                f"hold "
+                                "at a state of rest")
         changes = {name: 1.0}
         if self.equilibrium is not None:
             changes |= shift(place, selection, name)
-        return of_eigenvalue(self._reduced, self.modes()[mode], self._eigen[0], changes)
-
-    def _at_rest(self) -> bool:
-        """Whether accelerations are but rounding, measured by those of a metre or radian at the highest frequency."""
-        largest = float(np.abs(self._eigen[0]).max(initial=0.0))
-        return bool(np.abs(self.ud).max(initial=0.0) <= 1e-9 * largest**2) and not (self.lam.size and self._reduced.place.u.any())
+        return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
 
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"
-        return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}>"
+        held = f", held: {', '.join(self.held)}" if self.held else ""
+        return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}{held}>"
+
+    def describe(self) -> str:
+        """The states with their units, what is held, and what the eigenvalues say, as a table."""
+        width = max([4, *map(len, self.states)])
+        lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {self.B.shape[1]} inputs"]
+        lines += [f"  {name:<{width}}  {self.units.get(name, '')}".rstrip() for name in self.states]
+        lines += held_note(self._manifold)
+        if self.steadiness.kind:
+            return "\n".join([*lines, f"{self.steadiness.kind}; {self._analysis.reason()}"])
+        return "\n".join([*lines, f"no state of rest or of steady motion: {self.steadiness.reason}"])
 
 
 def linearize(module: Module, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
-              fixed: Any = None, coordinates: Sequence[Any] | None = None) -> Linearization:
+              fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
     """See Module.linearize."""
     if isinstance(at, Equilibrium):
         given = [n for n, v in (("params", params), ("t", t), ("inputs", inputs), ("free", free), ("fixed", fixed))
@@ -160,25 +217,41 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
                                 "out, or pass at=equilibrium.x")
         if at.module is not module:
             raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; linearize with its own")
-        return Linearization(Reduced(at.place, at.selection, _independent(module, coordinates)), at)
+        place = at.place if hold is None else in_motion(at.place, holding(at.selection, hold))
+        return Linearization(Manifold(place, holding(at.selection, hold), _independent(module, coordinates)), at)
+    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    return Linearization(Manifold(place, selection, _independent(module, coordinates)), None)
+
+
+def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,
+             hold: Any) -> tuple[Place, Selection]:
+    """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints."""
     place = _place(module, at, params, t, inputs)
-    selection = select(module, free, fixed, None)
-    place = in_motion(place.at(x=selection.apply(place.x)), selection)
-    return Linearization(Reduced(place, selection, _independent(module, coordinates)), None)
+    selection = holding(select(module, free, fixed, None), hold)
+    x = selection.apply(place.x)
+    try:
+        check_start(module, place.t, x, place.p)
+    except NotConsistent as error:
+        found = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
+        raise ArgumentError(f"{found}; linear equations exist at states that fulfil the constraints: take "
+                            "q, u = module.consistent(q, u, params), and linearize((q, u))") from None
+    return in_motion(place.at(x=x), selection), selection
 
 
-def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int] | None:
+def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int] | tuple[list[int], list[int]] | None:
+    """Places of independent displacements; where rates are named, too, of independent displacements and speeds."""
     if coordinates is None:
         return None
-    labels = list(coordinate_names(module.metadata))
-    names = listed(coordinates, [*labels, *module.metadata["u"]], "coordinates", module.name)
-    return [labels.index(n) if n in labels else module.metadata["u"].index(n) for n in names]
+    labels, speeds = list(coordinate_names(module.metadata)), list(module.metadata["u"])
+    names = listed(coordinates, [*labels, *speeds], "coordinates", module.name)
+    displaced = [labels.index(n) for n in names if n in labels]
+    rates = [speeds.index(n) for n in names if n not in labels]
+    return (displaced, rates) if displaced and rates else displaced or rates
 
 
 def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
     """The state that `at` tells; without accelerations."""
     metadata = module.metadata
-    sizes = metadata["sizes"]
     if hasattr(at, "t") and hasattr(at, "x") and np.ndim(at.t) == 1:
         return _of_solution(module, at, params, t, inputs)
     time = 0.0 if t is None else number(t, "a finite number of seconds as t", module.name)
@@ -186,10 +259,9 @@ def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -
         at = {}
     if isinstance(at, tuple) and len(at) == 2 and np.ndim(at[0]) == 1:
         at = np.concatenate([take(at[0], metadata["q"], "q", {}, module.name), take(at[1], metadata["u"], "u", {}, module.name),
-                             np.zeros(sizes["z"])])
+                             [metadata["initial"].get(n, 0.0) for n in metadata["z"]]])
     x = take(at, metadata["x"], "at", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
-    free = take(inputs if inputs is not None else {}, metadata["inputs"], "inputs", dict.fromkeys(metadata["inputs"], 0.0),
-                module.name)
+    free = given_inputs(module, inputs)
     return rest(module, time, normalised(module, x), real_parameters(module, params), free)
 
 
@@ -201,24 +273,6 @@ def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: 
         raise ArgumentError(f"{module.name}: t = {time:g} s is not in the solution, from {at.t[0]:g} to {at.t[-1]:g} s")
     k = int(np.argmin(np.abs(at.t - time)))
     return rest(module, float(at.t[k]), at.x[k].copy(), module.parameters(at.params), np.asarray(at.inputs[k], dtype=float))
-
-
-def in_motion(place: Place, selection: Selection) -> Place:
-    """The place with the accelerations of its motion, what is kept being held, and multipliers of least norm."""
-    n_u, n_c = place.sizes[1], place.sizes[3]
-    rows = np.vstack([place.C_r, selection.rows(place)])
-    right = np.zeros(len(rows))
-    if n_c:
-        right[:n_c] = place.evaluate("F_d") * place.scale
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(place.M)), 1e-12 * np.abs(place.M).max(initial=1e-300)))
-    A = rows * scale
-    KKT = np.block([[place.M * np.outer(scale, scale), A.T], [A, np.zeros((len(A), len(A)))]])
-    found = np.linalg.lstsq(KKT, np.concatenate([-place.forces * scale, right]), rcond=1e-12)[0]
-    ud = scale * found[:n_u]
-    # Rest is rest: rounding is no motion.
-    level = np.abs(scale * place.forces).max(initial=0.0)
-    ud = np.where(np.abs(found[:n_u]) <= 1e-13 * max(level, 1e-300), 0.0, ud)
-    return place.at(ud=ud, lam=found[n_u:n_u + n_c] * place.scale)
 
 
 def _fixed_space(rows: np.ndarray) -> bool:

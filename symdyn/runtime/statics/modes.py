@@ -2,54 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.statics.spectrum import Spectrum
 
-# Eigenvalues below this part of the largest are zero but for rounding: double ones split by the root of it.
-ZERO = 1e-7
-# Entries of the state matrix below this part of the largest are rounding.
-NOISE = 1e-18
 # Coordinates with at least this share of the kinetic energy of the largest are named.
 NAMED = 0.35
+# Eigenvalues that differ by this part are one, several times, and share a space of shapes.
+SAME = 1e-10
 
 
-class Linear(Protocol):
-    """M zeta_dot + C zeta + K eta + ... = 0, as linear.Reduced and multiblade.Averaged give it.
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """What names eigenvectors of states [eta; zeta; z']: their kinetic energy and the speeds that they move.
 
-    inertia, Z     of all velocities v, (n_u, n_u), and v = Z eta; labels: names of eta; state_labels: of the extra states
-    second_order   whether M, C, K say all
+    M            (n, n) of what carries the energy, and Z (n_u, n) that gives all speeds from it: of eta where there are as many
+                 displacements as speeds, else of zeta (`by_speeds`)
+    sizes        numbers of eta, zeta and z'; labels: of what carries the energy; state_labels: of z'
+    displaced    (n_u, n_d) that gives what moves from eta, and names of eta: of displacements that carry no energy
     """
 
-    @property
-    def M(self) -> np.ndarray: ...
+    M: np.ndarray
+    Z: np.ndarray
+    sizes: tuple[int, int, int]
+    labels: tuple[str, ...]
+    state_labels: tuple[str, ...]
+    displaced: tuple[np.ndarray, tuple[str, ...]]
+    by_speeds: bool = False
 
-    @property
-    def C(self) -> np.ndarray: ...
-
-    @property
-    def K(self) -> np.ndarray: ...
-
-    @property
-    def Z(self) -> np.ndarray: ...
-
-    @property
-    def inertia(self) -> np.ndarray: ...
-
-    @property
-    def labels(self) -> tuple[str, ...]: ...
-
-    @property
-    def state_labels(self) -> tuple[str, ...]: ...
-
-    @property
-    def second_order(self) -> bool: ...
-
-    def state_matrices(self) -> tuple[np.ndarray, np.ndarray]: ...
+    def amplitudes(self, right: np.ndarray) -> np.ndarray:
+        """Of an eigenvector (m,), what carries the energy, (n,): displacements, or speeds where these alone move."""
+        n_d, n_s, _ = self.sizes
+        eta, zeta = right[:n_d], right[n_d:n_d + n_s]
+        if self.by_speeds:
+            return zeta if np.abs(zeta).max(initial=0.0) > 1e-8 * np.abs(right).max(initial=0.0) else np.zeros_like(zeta)
+        return eta if np.abs(eta).max(initial=0.0) > 1e-9 * np.abs(right).max(initial=0.0) else zeta
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +52,13 @@ class Mode:
     eigenvalue   1/s, of a pair the one with positive imaginary part
     shape        (n_u,) complex amplitudes of all velocities v (see linear); that of the leading coordinate is 1
     coordinates  names of the independent ones; shares: of each in the kinetic energy, sum 1, (n,)
-    kind         "oscillation", "real" (creeps back), "zero" (neither returns nor leaves) or "unstable"
+    kind         "oscillation", "real" (creeps back), "zero" (neither returns nor leaves), "unstable", or "not decided" where
+                 rounding hides whether it grows or decays
     name         coordinates with the largest shares
     right, left  eigenvectors of the state matrix
+    harmonics    of a periodic motion: (multiple k of its frequency, share of the energy) of the parts of the shape that move with
+                 exp((eigenvalue + i k 2 pi / period) t), seen from the fixed frame, the largest first
+    whirl        from -1 to 1: how round displacements go about the axis of a rotor, positive in the sense of its rotation
     """
 
     eigenvalue: complex
@@ -72,6 +69,8 @@ class Mode:
     coordinates: tuple[str, ...]
     right: np.ndarray
     left: np.ndarray
+    harmonics: tuple[tuple[int, float], ...] = ()
+    whirl: float = 0.0
 
     @property
     def omega(self) -> float:
@@ -94,20 +93,30 @@ class Mode:
         return 1 / self.damped_frequency if self.eigenvalue.imag else np.inf
 
     @property
+    def time_constant(self) -> float:
+        """1 / |Re eigenvalue|: the time in which it changes by a factor e, s; infinite if it neither grows nor decays."""
+        return 1 / abs(self.eigenvalue.real) if self.eigenvalue.real else np.inf
+
+    @property
     def damping(self) -> float:
         """Damping ratio, -Re / |eigenvalue|; 0 of a zero eigenvalue."""
         return 0.0 - self.eigenvalue.real / self.omega if self.kind != "zero" else 0.0
 
     def __repr__(self) -> str:
+        if self.kind == "zero":
+            return f"<Mode {self.name}: zero>"
+        if not self.eigenvalue.imag:
+            return f"<Mode {self.name}: time constant {self.time_constant:.6g} s, {self.kind}>"
         return f"<Mode {self.name}: {self.frequency:.6g} Hz, damping {self.damping:.3g}, {self.kind}>"
 
 
 class Modes:
     """Modes in the order of their natural frequencies; prints as a table. An index is a number, a name, or its first part."""
 
-    def __init__(self, title: str, modes: list[Mode]) -> None:
+    def __init__(self, title: str, modes: Iterable[Mode], notes: Sequence[str] = ()) -> None:
         self.title = title
         self.modes = tuple(modes)
+        self.notes = tuple(notes)
 
     def __len__(self) -> int:
         return len(self.modes)
@@ -141,62 +150,80 @@ class Modes:
     def __repr__(self) -> str:
         width = max([4, *[len(m.name) for m in self.modes]])
         lines = [self.title, f"{'':>3}  {'mode':<{width}}  {'f [Hz]':>11}  {'omega [rad/s]':>13}  {'period [s]':>11}  "
-                             f"{'damping':>9}  kind"]
+                             f"{'damping':>9}  {'time constant [s]':>17}  kind"]
         for k, m in enumerate(self.modes):
-            lines.append(f"{k:>3}  {m.name:<{width}}  {m.frequency:>11.6g}  {m.omega:>13.6g}  {m.period:>11.6g}  "
-                         f"{m.damping:>9.4g}  {m.kind}")
-        return "\n".join(lines)
+            oscillates = bool(m.eigenvalue.imag)
+            numbers = [f"{m.frequency:>11.6g}" if oscillates else f"{'':>11}",
+                       f"{m.omega:>13.6g}" if oscillates else f"{'':>13}",
+                       f"{m.period:>11.6g}" if oscillates else f"{'':>11}",
+                       f"{m.damping:>9.4g}" if oscillates else f"{'':>9}",
+                       f"{m.time_constant:>17.6g}" if np.isfinite(m.time_constant) else f"{'':>17}"]
+            lines.append(f"{k:>3}  {m.name:<{width}}  {'  '.join(numbers)}  {m.kind}")
+        return "\n".join([*lines, *self.notes])
 
 
-def eigen(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eigenvalues (m,), right (m, m) and left (m, m) eigenvectors of the state matrix, columns; w^H A = lambda w^H.
+def modes_of(spectrum: Spectrum, shapes: Shapes, title: str, notes: Sequence[str] = (), values: np.ndarray | None = None,
+             seen: Sequence[Any] = ()) -> Modes:
+    """The modes, one for each pair of complex eigenvalues; of a group of equal ones each with a shape of its own.
 
-    Without damping and with symmetric K by the symmetric problem, whose eigenvalues carry no damping from rounding.
+    values, seen   in place of the eigenvalues, and frames.Seen of each: of periodic motions, and in turning axes
     """
-    M, C, K = linear.M, linear.C, linear.K
-    size = float(np.abs(K).max(initial=0.0))
-    loose = np.abs(C).max(initial=0.0) <= 1e-14 * np.sqrt(size * np.abs(M).max(initial=0.0))
-    if linear.second_order and loose and np.abs(K - K.T).max(initial=0.0) <= 1e-11 * size:
-        squares, shapes = scipy.linalg.eigh((K + K.T) / 2, (M + M.T) / 2)
-        squares = np.where(np.abs(squares) <= ZERO**2 * np.abs(squares).max(initial=0.0), 0.0, squares)
-        roots = np.sqrt(-squares.astype(complex))
-        values = np.concatenate([roots, -roots]) + 0.0  # no negative zeros
-        right = np.vstack([np.hstack([shapes, shapes]), np.hstack([shapes * roots, -shapes * roots])])
-        # w = M x (conj(lambda), 1), up to a factor: from w^H A = lambda w^H with symmetric M and K.
-        pulled = M @ shapes
-        left = np.vstack([np.hstack([pulled * roots.conj(), -pulled * roots.conj()]), np.hstack([pulled, pulled])])
-        return values, right, left
-    A, _ = linear.state_matrices()
-    # Metres and radians on one footing.
-    scale = np.sqrt(np.abs(np.diag(M)))
-    scale = np.concatenate([scale, scale, np.ones(len(A) - 2 * len(scale))])
-    scaled = A * scale[:, None] / scale
-    # Rounding in place of zeros misleads the balancing of LAPACK, which would scale it up.
-    scaled[np.abs(scaled) < NOISE * np.abs(scaled).max(initial=0.0)] = 0.0
-    values, left, right = scipy.linalg.eig(scaled, left=True)
-    return values, right / scale[:, None], left * scale[:, None]
-
-
-def modes_of(linear: Linear, title: str) -> Modes:
-    """The modes, one for each pair of complex eigenvalues."""
-    values, right, left = eigen(linear)
-    largest = np.abs(values).max(initial=0.0)
+    values = settled_values(spectrum) if values is None else values
+    right = _parted(values, spectrum.right, spectrum.left, shapes)
+    undecided = set(spectrum.undecided.tolist())
     found = []
-    for k in np.lexsort((values.imag, np.abs(values))):
+    for k in ordered(values).tolist():
         value = complex(values[k])
-        if abs(value.imag) <= 1e-12 * abs(value):
-            value = complex(value.real)
         if value.imag < 0:
             continue
-        found.append(_mode(linear, value, right[:, k], left[:, k], largest))
+        kind = "zero" if k in set(spectrum.zeros.tolist()) else "not decided" if k in undecided else \
+            "unstable" if spectrum.signs[k] > 0 else "oscillation" if value.imag else "real"
+        mode = _mode(shapes, value, right[:, k], spectrum.left[:, k], kind)
+        found.append(replace(mode, harmonics=seen[k].harmonics, whirl=seen[k].whirl) if seen else mode)
     found = _paired(found)
     names = [m.name for m in found]
     return Modes(title, [m if names.count(m.name) == 1 else replace(m, name=f"{m.name} ({names[:k + 1].count(m.name)})")
-                         for k, m in enumerate(found)])
+                         for k, m in enumerate(found)], notes)
+
+
+def ordered(values: np.ndarray) -> np.ndarray:
+    """Places of eigenvalues by size, those of one size by frequency, growing ones before decaying ones."""
+    sizes = np.abs(values)
+    with np.errstate(divide="ignore"):
+        steps = np.where(sizes > 0, np.round(np.log(sizes), 9), -np.inf)
+    return np.asarray(np.lexsort((-values.real, values.imag, steps)))
+
+
+def settled_values(spectrum: Spectrum) -> np.ndarray:
+    """Eigenvalues without what is rounding alone: zeros are zero, undamped oscillations have no real part, (m,) complex."""
+    values = spectrum.values.copy()
+    values[spectrum.zeros] = 0.0
+    kept = [k for k in spectrum.imaginary if k not in set(spectrum.undecided.tolist())]
+    values[kept] = 1j * values[kept].imag
+    return values
+
+
+def _parted(values: np.ndarray, right: np.ndarray, left: np.ndarray, shapes: Shapes) -> np.ndarray:
+    """Eigenvectors of equal eigenvalues made different: each moves one coordinate that the others leave alone."""
+    found = right.copy()
+    scale = np.abs(values)
+    done: set[int] = set()
+    for k in range(len(values)):
+        group = [j for j in range(len(values)) if abs(values[j] - values[k]) <= SAME * max(scale[k], scale[j])]
+        if k in done or len(group) < 2:
+            continue
+        done |= set(group)
+        weights = np.concatenate([np.sqrt(np.abs(np.diag(shapes.M))), np.zeros(len(right) - len(shapes.M))])
+        rows = (right[:, group] * np.roll(weights, shapes.sizes[0] if shapes.by_speeds else 0)[:, None])
+        if np.linalg.matrix_rank(rows, tol=1e-6 * np.abs(rows).max(initial=0.0)) < len(group):
+            continue
+        pivots = scipy.linalg.qr(rows.T, mode="r", pivoting=True)[1][:len(group)]
+        found[:, group] = right[:, group] @ np.linalg.inv(right[np.ix_(pivots, group)])
+    return found
 
 
 def _paired(modes: list[Mode]) -> list[Mode]:
-    """A zero eigenvalue comes twice, once for the place and once for the speed: told once."""
+    """A zero eigenvalue comes twice, once for the place and once for the speed: listed once."""
     kept: list[Mode] = []
     for mode in modes:
         twin = [m for m in kept if mode.kind == m.kind == "zero" and abs(np.vdot(m.shape, mode.shape)) >
@@ -206,25 +233,26 @@ def _paired(modes: list[Mode]) -> list[Mode]:
     return kept
 
 
-def _mode(linear: Linear, value: complex, right: np.ndarray, left: np.ndarray, largest: float) -> Mode:
-    n = linear.Z.shape[1]
-    amplitudes = right[:n] if np.abs(right[:n]).max(initial=0.0) > 1e-9 * np.abs(right).max(initial=0.0) else right[n:2 * n]
-    shape = linear.Z @ amplitudes
-    energies = np.abs(np.real(amplitudes.conj() * (linear.M @ amplitudes)))
-    states = np.abs(right[2 * n:])
-    if energies.sum() > 0 and not (states.size and np.abs(right[:2 * n]).max(initial=0.0) <= 1e-9 * states.max()):
+def _mode(shapes: Shapes, value: complex, right: np.ndarray, left: np.ndarray, kind: str) -> Mode:
+    amplitudes = shapes.amplitudes(right)
+    shape = shapes.Z @ amplitudes
+    energies = np.abs(np.real(amplitudes.conj() * (shapes.M @ amplitudes)))
+    inner = sum(shapes.sizes[:2])
+    states = np.abs(right[inner:])
+    if energies.sum() > 0 and not (states.size and np.abs(right[:inner]).max(initial=0.0) <= 1e-9 * states.max()):
         shares = energies / energies.sum()
         leader = int(np.argmax(np.round(shares, 6)))
         shape, right = shape / amplitudes[leader], right / amplitudes[leader]
-        name = dominant(shares, linear.labels)
-    else:  # of the extra states alone
-        shares = np.zeros(n)
-        name = linear.state_labels[int(np.argmax(states))]
-    if abs(value) <= ZERO * largest:
-        kind = "zero"
-    else:
-        kind = "unstable" if grows(value, largest) else "oscillation" if value.imag else "real"
-    return Mode(value, shape, shares, kind, name, linear.labels, right, left)
+        name = dominant(shares, shapes.labels)
+    elif states.size:  # of the extra states alone
+        shares = np.zeros(len(shapes.labels))
+        name = shapes.state_labels[int(np.argmax(states))]
+    else:  # displacements that carry no energy, of velocity constraints
+        shares = np.zeros(len(shapes.labels))
+        along, names = shapes.displaced
+        leader = int(np.argmax(np.abs(right[:len(names)])))
+        shape, right, name = along @ right[:len(names)] / right[leader], right / right[leader], names[leader]
+    return Mode(value, shape, shares, kind, name, shapes.labels, right, left)
 
 
 def dominant(shares: np.ndarray, labels: tuple[str, ...]) -> str:
@@ -232,15 +260,3 @@ def dominant(shares: np.ndarray, labels: tuple[str, ...]) -> str:
     relative = shares / shares.max()
     order = np.argsort(-np.round(5 * relative), kind="stable")
     return ", ".join([labels[i] for i in order if relative[i] >= NAMED][:3])
-
-
-def grows(value: complex, largest: float) -> bool:
-    """Whether motion along an eigenvector grows: by more than rounding, which is that of the largest eigenvalue if real."""
-    oscillates = abs(value.imag) > 1e-12 * abs(value)
-    return bool(value.real > ZERO * (abs(value) if oscillates else max(abs(value), largest / 10)))
-
-
-def stable(values: np.ndarray) -> bool | None:
-    """Whether nothing grows; zero eigenvalues do not count. None without eigenvalues."""
-    largest = float(np.abs(values).max(initial=0.0))
-    return not any(grows(v, largest) for v in values if abs(v) > ZERO * largest) if len(values) else None

@@ -2,9 +2,12 @@
 
 q_k = a_0 + a_c cos psi_k + a_s sin psi_k + ..., psi_k = psi + 2 pi k / N. With q = T(psi) a and psi_dot = Omega:
     q_dot = T a_dot + Omega T' a,  q_ddot = T a_ddot + 2 Omega T' a_dot + Omega^2 T'' a,
-so the matrices in a are T^T M T, T^T (2 Omega M T' + C T), T^T (Omega^2 M T'' + Omega C T' + K T), averaged over azimuths:
-what is left of the rotation (gravity on the blades) averages out. The steady state is the a that
-balances the averaged forces, blades moving with its harmonics.
+so the matrices in a are T^T M T, T^T (2 Omega M T' + C T), T^T (Omega^2 M T'' + Omega C T' + K T). They are the same at all
+azimuths for a rotor of three or more like blades; what differs (weight on the blades) shows in their spread, and the equations
+are
+periodic then. The mean over the azimuths has a steady state, the a that balances the mean forces, where the search for the
+periodic
+motion begins.
 Source: Coleman and Feingold, NACA Report 1351 (1958); Bir, Multi-blade coordinate transformation and its application to wind
 turbine analysis, AIAA 2008-1300.
 """
@@ -21,6 +24,7 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.constraints import turning
+from symdyn.runtime.statics.modes import Shapes
 from symdyn.runtime.statics.search import LARGEST_TURN
 from symdyn.runtime.statics.selection import Selection
 from symdyn.runtime.statics.terms import Place, coordinate_names
@@ -96,31 +100,33 @@ def _harmonics(count: int) -> list[str]:
     return names + ["alternating"] * (count % 2 == 0)
 
 
+def _state_matrix(M: np.ndarray, C: np.ndarray, K: np.ndarray) -> np.ndarray:
+    n = len(M)
+    inverse = scipy.linalg.inv(M)
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]])
+
+
 @dataclass(frozen=True, eq=False)
 class Averaged:
-    """M a_ddot + C a_dot + K a = 0 of a rotor in the fixed frame, averaged; see modes.Linear."""
+    """M a_ddot + C a_dot + K a = 0 of a rotor in the fixed frame, averaged; spread (2 n, 2 n): the largest difference of an entry
+    of the state matrix at an azimuth from the mean; forces: of what is left, beside the mean, by the coordinates, scaled."""
 
     M: np.ndarray
     C: np.ndarray
     K: np.ndarray
     labels: tuple[str, ...]
+    spread: np.ndarray
+    pulsating: float
 
-    state_labels: tuple[str, ...] = ()
-    second_order = True
+    def A(self) -> np.ndarray:
+        """State matrix of [a; a_dot]."""
+        return _state_matrix(self.M, self.C, self.K)
 
     @property
-    def Z(self) -> np.ndarray:
-        return np.eye(len(self.M))
-
-    @property
-    def inertia(self) -> np.ndarray:
-        return self.M
-
-    def state_matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """A of [a; a_dot], and no inputs."""
+    def shapes(self) -> Shapes:
+        """What names its modes."""
         n = len(self.M)
-        inverse = scipy.linalg.inv(self.M)
-        return np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.K, -inverse @ self.C]]), np.zeros((2 * n, 0))
+        return Shapes(self.M, np.eye(n), (n, n, 0), self.labels, (), (np.eye(n), self.labels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,19 +154,21 @@ class Steady:
 
     def averages(self) -> tuple[np.ndarray, Averaged]:
         """Forces and matrices in the fixed frame."""
-        n, omega = len(self.rotor.free), self.omega
-        r, M, C, K = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+        omega = self.omega
         index = np.ix_(self.rotor.free, self.rotor.free)
         free = list(self.rotor.free)
+        found = []
         for psi in self.azimuths:
             place, (T, first, second) = self.at(float(psi))
             m, c, k = place.M[index], place.by_u[index], place.by_v[index]
-            r += T.T @ place.forces[free]
-            M += T.T @ m @ T
-            C += T.T @ (2 * omega * m @ first + c @ T)
-            K += T.T @ (omega**2 * m @ second + omega * c @ first + k @ T)
-        count = len(self.azimuths)
-        return r / count, Averaged(M / count, C / count, K / count, self.rotor.labels)
+            found.append((T.T @ place.forces[free], T.T @ m @ T, T.T @ (2 * omega * m @ first + c @ T),
+                          T.T @ (omega**2 * m @ second + omega * c @ first + k @ T)))
+        r, M, C, K = (np.mean([each[i] for each in found], axis=0) for i in range(4))
+        mean = _state_matrix(M, C, K)
+        spread = np.max([np.abs(_state_matrix(*each[1:]) - mean) for each in found], axis=0)
+        scale = 1 / np.sqrt(np.abs(np.diag(M)))
+        pulsating = float(np.max([np.abs(scale * (each[0] - r)) for each in found], initial=0.0))
+        return np.asarray(r), Averaged(M, C, K, self.rotor.labels, spread, pulsating)
 
     def stepped(self, step: np.ndarray, iterations: int) -> Steady:
         """After a change of a; coordinates other than the blades' move along their speeds."""

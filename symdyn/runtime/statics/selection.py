@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ class Selection:
     values       of what stays at a given number
     conditions   names among `values` whose equations hold nevertheless: one for each parameter or input solved for
     candidates   where there are more than are needed: names among which the conditions are still to be found
+    holding      what is held when the state is disturbed, if that is said apart from what stays in the search
     """
 
     module: Module
@@ -34,6 +35,19 @@ class Selection:
     inputs: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ()
     candidates: tuple[str, ...] = ()
+    holding: tuple[str, ...] | None = None
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """What forces hold when the state is disturbed: what stays, unless its own equation is fulfilled without (conditions)."""
+        if self.holding is not None:
+            return self.holding
+        return tuple(n for n in self.kept if n not in self.conditions)
+
+    @cached_property
+    def free_states(self) -> list[int]:
+        """Places of the extra states that are not held."""
+        return [k for k, name in enumerate(self.module.metadata["z"]) if name not in self.held]
 
     @cached_property
     def states(self) -> list[int]:
@@ -106,6 +120,14 @@ def select(module: Module, free: Any, fixed: Any, unknown: Any) -> Selection:
     order = [n for n in metadata["x"] if n in kept]
     return Selection(module, tuple(order), values, tuple(n for n in solved if owners[n] == "parameter"),
                      tuple(n for n in solved if owners[n] == "input"), tuple(conditions), tuple(candidates))
+
+
+def holding(selection: Selection, hold: Any) -> Selection:
+    """The selection with what is held when the state is disturbed, by name or symbol; None: what stays, but for conditions."""
+    if hold is None:
+        return selection
+    return replace(selection, holding=tuple(dict.fromkeys(listed(hold, selection.module.metadata["x"], "hold",
+                                                                 selection.module.name))))
 
 
 def _conditions(module: Module, solved: list[str], values: Mapping[str, float], free: Iterable[str]

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from symdyn.errors import ArgumentError
-from symdyn.runtime.statics.linear import Reduced
+from symdyn.runtime.statics.manifold import Manifold
 from symdyn.runtime.statics.modes import Mode
 from symdyn.runtime.statics.search import Trial
 from symdyn.runtime.statics.selection import Selection
+from symdyn.runtime.statics.spectrum import Spectrum
 from symdyn.runtime.statics.terms import Place, multiplier
 
 # Two eigenvalues closer than so many of their roundings have no derivatives of their own.
@@ -65,21 +66,22 @@ def shift(place: Place, selection: Selection, parameter: str) -> dict[str, float
     return {name: float(v) for name, v in changes.items() if v}
 
 
-def of_eigenvalue(reduced: Reduced, mode: Mode, others: np.ndarray, changes: Mapping[str, float]) -> Sensitivity:
-    """Of the eigenvalue of a mode, for the direction `changes`; others: all eigenvalues."""
-    place, n, value = reduced.place, reduced.n, mode.eigenvalue
-    near = np.sort(np.abs(others - value))[:2]
-    rounding = np.finfo(float).eps * np.abs(others).max()**2 / max(abs(value), np.finfo(float).tiny)
-    if len(near) > 1 and near[1] <= DOUBLE * rounding:
-        if mode.kind == "zero":
-            raise ArgumentError(f"{place.module.name}: mode {mode.name} has the eigenvalue zero, to rounding, whose size has no "
-                                "derivative; ask for another mode, or add a load that holds it")
+def of_eigenvalue(reduced: Manifold, spectrum: Spectrum, mode: Mode, changes: Mapping[str, float]) -> Sensitivity:
+    """Of the eigenvalue of a mode of a manifold's spectrum, for the direction `changes`."""
+    place, n, value = reduced.place, reduced.n_d, mode.eigenvalue
+    apart = np.sort(np.abs(spectrum.values - value))[:2]
+    k = int(np.argmin(np.abs(spectrum.values - value)))
+    # A defective eigenvalue moves by the root of a change: its first-order bound is no bound any more.
+    if mode.kind == "zero":
+        raise ArgumentError(f"{place.module.name}: mode {mode.name} has the eigenvalue zero, to rounding, whose size has no "
+                            "derivative; ask for another mode, or add a load that holds it")
+    if len(apart) > 1 and (apart[1] <= DOUBLE * spectrum.radii[k] or not np.isfinite(spectrum.radii[k])):
         raise ArgumentError(f"{place.module.name}: mode {mode.name} has a double eigenvalue, {value:.9g} 1/s, to rounding: it "
                             "has no derivative of its own; change a parameter a little, so that the two part")
     _, n_u, n_z, n_c = place.sizes
-    x_v, x_z = reduced.Z @ mode.right[:n], np.zeros(n_z, dtype=complex)
+    x_v, x_z = reduced.Z_v @ mode.right[:n], np.zeros(n_z, dtype=complex)
     x_z[reduced.states] = mode.right[2 * n:]
-    y_u = reduced.Z @ np.linalg.solve(reduced.M.T, mode.left[n:2 * n].conj())
+    y_u = reduced.Z_v @ np.linalg.solve(reduced.M.T, mode.left[n:2 * n].conj())
     y_z = np.zeros(n_z, dtype=complex)
     y_z[reduced.states] = mode.left[2 * n:].conj()
     mu, nu = _multipliers(reduced, value, x_v, x_z, y_u, y_z)
@@ -96,7 +98,7 @@ def of_eigenvalue(reduced: Reduced, mode: Mode, others: np.ndarray, changes: Map
     return Sensitivity(derivative, by_size / (2 * np.pi), float(damped / (2 * np.pi)), damping)
 
 
-def _multipliers(reduced: Reduced, value: complex, x_v: np.ndarray, x_z: np.ndarray, y_u: np.ndarray,
+def _multipliers(reduced: Manifold, value: complex, x_v: np.ndarray, x_z: np.ndarray, y_u: np.ndarray,
                  y_z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Right and left multipliers of the constraints in the eigenvalue problem, (n_c,) each."""
     place = reduced.place
@@ -105,7 +107,7 @@ def _multipliers(reduced: Reduced, value: complex, x_v: np.ndarray, x_z: np.ndar
         return np.zeros(0, dtype=complex), np.zeros(0, dtype=complex)
     pencil = place.by_v[:n_u] + value * place.by_u[:n_u] + value**2 * place.M
     of_z = place.by_v[n_u + n_c:] + value * place.by_u[n_u + n_c:]
-    pulls = reduced.rows.T.astype(complex)
+    pulls = reduced.P.T.astype(complex)
     right = np.linalg.lstsq(pulls, -(pencil @ x_v + place.by_z[:n_u] @ x_z), rcond=None)[0]
     left = np.linalg.lstsq(pulls, -(pencil.T @ y_u - of_z.T @ y_z), rcond=None)[0]
     return right[:n_c] * place.scale, left[:n_c] * place.scale

@@ -1,6 +1,7 @@
 """The equations at one state, split into forces, constraints and extra states, with their exact derivatives in numbers.
 
-    M u_dot + k - F + C_r^T lam = 0,  C = 0,  z_dot = 0
+    M u_dot + k - F + C_r^T lam = 0,  C = 0,  z_dot = 0      the statics
+    C_dot = 0,  C_ddot = 0,  q_dot,  q_ddot                  what a motion fulfils besides
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class Place:
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
     def along(self, name: str, **groups: Mapping[str, float]) -> np.ndarray:
-        """`variation` or `second_variation` here; arguments by name, what is left out is zero.
+        """`second_variation` here; arguments by name, what is left out is zero.
 
         vary, along   mappings from the names of what varies, and of the direction, to numbers, as in the generated header
         """
@@ -73,16 +74,37 @@ class Place:
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
     def by(self, names: Sequence[str]) -> np.ndarray:
-        """Derivatives of the balance by coordinates, speeds, states, inputs or parameters, (n_u + n_c + n_z, len(names))."""
-        about = self.module.unit("variation").metadata["ud"]
+        """Derivatives of the statics by coordinates, speeds, states, inputs or parameters, (n_u + n_c + n_z, len(names))."""
+        return self.variations(names)[:self._statics]
+
+    def variations(self, names: Sequence[str], function: str = "variation") -> np.ndarray:
+        """Derivatives of the balance (or the outputs, by `outputs_variation`) by what is named, (rows, len(names)).
+
+        Names are those of coordinates, speeds, states, inputs, parameters, accelerations ("u_dot") and multipliers.
+        """
+        about = self.module.unit(function).metadata["ud"]
         given = self._given_rates()
         rows = np.tile([given.get(n, 0.0) for n in about], (len(names), 1))
         for row, name in zip(rows, names, strict=True):
             row[about.index(f"(along {name})")] = 1.0
         if not len(names):
-            return np.zeros((len(self.balance), 0))
-        found: np.ndarray = self.module.evaluate("variation", self.t, self.x, self.p, self.inputs, rows)
+            return np.zeros((int(np.prod(self.module.shape(function))), 0))
+        found: np.ndarray = self.module.evaluate(function, self.t, self.x, self.p, self.inputs, rows)
         return found.reshape(len(names), -1).T
+
+    @property
+    def _statics(self) -> int:
+        """Number of rows of the statics, the first of the balance."""
+        _, n_u, n_z, n_c = self.sizes
+        return n_u + n_c + n_z
+
+    @cached_property
+    def parts(self) -> dict[str, slice]:
+        """Where the parts of the balance stand in it."""
+        n_q, n_u, n_z, n_c = self.sizes
+        ends = np.cumsum([0, n_u, n_c, n_z, n_c, n_c, n_q, n_q]).tolist()
+        names = ("forces", "C", "z_dot", "C_dot", "C_ddot", "q_dot", "q_ddot")
+        return {name: slice(a, b) for name, a, b in zip(names, ends, ends[1:], strict=False)}
 
     def _given_rates(self) -> dict[str, float]:
         """Accelerations and multipliers by the names that generated code has for them."""
@@ -98,25 +120,35 @@ class Place:
     @property
     def forces(self) -> np.ndarray:
         """M u_dot + k - F + C_r^T lam, (n_u,)."""
-        return self.balance[:self.sizes[1]]
+        return self.balance[self.parts["forces"]]
 
     @property
     def C(self) -> np.ndarray:
-        return self.balance[self.sizes[1]:self.sizes[1] + self.sizes[3]]
+        return self.balance[self.parts["C"]]
 
     @property
     def rates_z(self) -> np.ndarray:
-        return self.balance[self.sizes[1] + self.sizes[3]:]
+        return self.balance[self.parts["z_dot"]]
 
     @cached_property
+    def whole_x(self) -> np.ndarray:
+        """Derivatives of the balance by x, (rows, n_x)."""
+        return self.variations(self.module.metadata["x"])
+
+    @cached_property
+    def whole_inputs(self) -> np.ndarray:
+        """Derivatives of the balance by the inputs, (rows, n_in)."""
+        return self.variations(self.module.metadata["inputs"])
+
+    @property
     def balance_x(self) -> np.ndarray:
-        """By x, (n_u + n_c + n_z, n_x)."""
-        return self.by(self.module.metadata["x"])
+        """Of the statics by x, (n_u + n_c + n_z, n_x)."""
+        return self.whole_x[:self._statics]
 
-    @cached_property
+    @property
     def balance_inputs(self) -> np.ndarray:
-        """By the inputs, (n_u + n_c + n_z, n_in)."""
-        return self.by(self.module.metadata["inputs"])
+        """Of the statics by the inputs, (n_u + n_c + n_z, n_in)."""
+        return self.whole_inputs[:self._statics]
 
     @cached_property
     def M(self) -> np.ndarray:
@@ -157,7 +189,7 @@ class Place:
     @cached_property
     def turning_of_speeds(self) -> np.ndarray:
         """G of v_dot = u' - G v, (n_u, n_u), for the change u' of the speeds: zero where speeds are rates of coordinates."""
-        by_q, rate = self.evaluate("rates_q"), self.evaluate("N_dot")
+        by_q, rate = self.whole_x[self.parts["q_dot"], :self.sizes[0]], self.evaluate("N_dot")
         if not by_q.any() and not rate.any():
             return np.zeros((self.sizes[1], self.sizes[1]))
         found: np.ndarray = np.linalg.lstsq(self.N, rate - by_q @ self.N, rcond=None)[0]
@@ -183,14 +215,17 @@ def rest(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndar
 
 
 def null_space(A: np.ndarray, tolerance: float = RANK) -> np.ndarray:
-    """Orthonormal columns Z with A Z = 0, (n, n - rank); columns of the identity where every row has a single entry."""
+    """Orthonormal columns Z with A Z = 0, (n, n - rank); columns of the identity where every row has a single entry.
+
+    Entries are numbers of the size of 1, of rows that hold anything: much smaller ones are rounding.
+    """
     n = A.shape[1]
-    if not A.any():
+    if not (np.abs(A) > tolerance).any():
         return np.eye(n)
     if (np.count_nonzero(A, axis=1) <= 1).all():
         return np.eye(n)[:, ~A.any(axis=0)]
     _, values, Vt = np.linalg.svd(A)
-    rank = int((values > tolerance * values[0]).sum())
+    rank = int((values > tolerance * max(values[0], 1.0)).sum())
     basis: np.ndarray = Vt[rank:].T
     return basis
 

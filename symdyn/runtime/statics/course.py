@@ -1,0 +1,316 @@
+"""A motion over one period, held where it is held: states, accelerations and linear equations at equal steps of time.
+
+The linear equations along a periodic motion are periodic, and their values at equal steps give them everywhere by a trigonometric
+polynomial, to rounding where the motion is smooth.
+Source: Trefethen, Spectral Methods in MATLAB, chapter 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.integrate
+import scipy.interpolate
+import scipy.linalg
+
+from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
+from symdyn.runtime.consistent import closest
+from symdyn.runtime.statics.manifold import Manifold, common_partition, in_motion, natural_length, natural_scales
+from symdyn.runtime.statics.terms import Place, coordinate_names, rest
+
+# Numbers of steps that are tried; the highest harmonics must be this part of all.
+STEPS, SMOOTH = (16, 32, 64, 128), 1e-11
+# Highest harmonics beyond this leave the monodromy matrix open; up to it they count as what is not known of it.
+RESOLVED = 1e-5
+# Steps of a motion that is not periodic yet.
+OPEN_STEPS = 48
+# State matrices after a period differ at most by this part of their largest entry, scaled.
+REPEATS = 1e-7
+# Columns of state matrices below this part of the largest: nothing depends on the displacement.
+NOTHING = 1e-10
+# Error of the motion, per unit; while a closed one is looked for.
+PRECISE, ROUGH = 1e-12, 1e-8
+# What is left of a periodic motion after its period, of the size of its coordinates and speeds, before the last of Newton's
+# steps,
+# and before the motion is followed precisely; the number of steps, and the largest.
+CLOSED, NEARLY, ITERATIONS, LARGEST_STEP = 1e-9, 1e-4, 25, 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A motion over one period, from its first state on.
+
+    nodes     manifolds at equal steps of time, the last before the end; last: the state there
+    closed    whether it comes back; bundled: whether its variables are all changes [v; u'; z'], since no choice of independent
+              ones
+              serves everywhere, or those that the nodes have in common
+    """
+
+    period: float
+    nodes: tuple[Manifold, ...]
+    last: Place
+    closed: bool = True
+    bundled: bool = False
+
+    @property
+    def first(self) -> Manifold:
+        return self.nodes[0]
+
+    @property
+    def times(self) -> np.ndarray:
+        """From the start, s, (n,)."""
+        return self.period * np.arange(len(self.nodes)) / len(self.nodes)
+
+    @cached_property
+    def A(self) -> np.ndarray:
+        """State matrices, (n, m, m)."""
+        return np.array([self.matrix(node) for node in self.nodes])
+
+    def matrix(self, node: Manifold) -> np.ndarray:
+        """The state matrix of a node in the variables of the course, (m, m)."""
+        return node.bundle[2] if self.bundled else node.matrices[0]
+
+    @cached_property
+    def after(self) -> np.ndarray:
+        """The state matrix at the end of the period, (m, m)."""
+        partition = None if self.bundled else self.first.partition
+        return self.matrix(Manifold(self.last, self.first.selection, partition=partition))
+
+    def reduced(self, X: np.ndarray) -> np.ndarray:
+        """A matrix of the variables of the course that leads from the manifold at the start back there, in its own variables."""
+        if not self.bundled:
+            return X
+        T, L, _ = self.first.bundle
+        return np.asarray(L @ X @ T)
+
+    def widened(self, x: np.ndarray) -> np.ndarray:
+        """A change of the state at the start in the variables of the course."""
+        return np.asarray(self.first.bundle[0] @ x) if self.bundled else x
+
+    def displaced(self, node: Manifold) -> np.ndarray:
+        """v of the displacements among the variables, (n_u, n)."""
+        return np.eye(len(node.Z_v)) if self.bundled else node.Z_v
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of displacements, speeds and extra states among the variables."""
+        first = self.first
+        n_u = first.place.sizes[1]
+        return (n_u, n_u, len(first.states)) if self.bundled else (first.n_d, first.n_s, len(first.states))
+
+    @cached_property
+    def harmonics(self) -> np.ndarray:
+        """Coefficients of A by multiples of the frequency, (n, m, m) complex, in the order of numpy.fft."""
+        return np.asarray(np.fft.fft(self.A, axis=0) / len(self.nodes))
+
+    @cached_property
+    def tail(self) -> float:
+        """Size of the highest harmonics of A beside its largest entry, scaled: what the steps leave open."""
+        n = len(self.nodes)
+        scale = scales(self)
+        sizes = (np.abs(self.harmonics) * (scale / scale[:, None])).reshape(n, -1).max(axis=1)
+        high = np.abs(np.fft.fftfreq(n, 1 / n)) > 3 * n / 8
+        return float(sizes[high].max(initial=0.0) / sizes.max(initial=1e-300))
+
+    def rate(self) -> np.ndarray:
+        """dA/dt at the nodes, (n, m, m)."""
+        n = len(self.nodes)
+        k = np.fft.fftfreq(n, 1 / n)
+        k[np.abs(k) == n / 2] = 0.0
+        factors = (2j * np.pi / self.period * k)[:, None, None]
+        return np.asarray(np.real(np.fft.ifft(factors * self.harmonics * n, axis=0)))
+
+    def sampled(self, times: np.ndarray) -> np.ndarray:
+        """A at times from the start, (n_t, m, m): by a trigonometric polynomial, or splines where the motion is not closed."""
+        n, shape = len(self.nodes), self.A.shape[1:]
+        if not self.closed:
+            knots = np.append(self.times, self.period)
+            return np.asarray(scipy.interpolate.CubicSpline(knots, np.concatenate([self.A, self.after[None]]))(times))
+        k = np.fft.fftfreq(n, 1 / n)
+        half = k >= 0
+        weights = np.where((k[half] == 0) | (k[half] == n / 2), 1.0, 2.0)
+        angles = 2 * np.pi / self.period * np.outer(times, k[half])
+        coefficients = self.harmonics[half].reshape(int(half.sum()), -1)
+        found = (weights * np.cos(angles)) @ coefficients.real - (weights * np.sin(angles)) @ coefficients.imag
+        return np.asarray(found.reshape(len(times), *shape))
+
+
+def scales(course: Course) -> np.ndarray:
+    """Powers of two that make the entries of all A alike, (m,)."""
+    mean = np.abs(course.A).mean(axis=0)
+    sizes = course.widened(_sizes(course))
+    sizes = np.where(np.abs(sizes) > 0, np.abs(sizes), 1.0)
+    natural = mean / sizes[:, None] * sizes
+    mean[natural <= NOTHING * 1e-3 * natural.max(initial=0.0)] = 0.0  # rounding in place of zeros would be scaled up
+    _, (scale, _) = scipy.linalg.matrix_balance(mean, permute=False, separate=True)
+    return np.asarray(scale)
+
+
+def follow(start: Manifold, period: float, closed: bool = True, precise: float = PRECISE) -> Course:
+    """The course through the state of a manifold; with as many steps as its linear equations need.
+
+    closed   whether these must be the same after a period: raises ArgumentError if they are not
+    precise  relative error of the motion
+    """
+    place = start.place
+    found: Course | None = None
+    motion = _motion(place, start, period, precise)
+    partition: tuple[list[int], list[int]] | None = None
+    for n in STEPS if closed else (OPEN_STEPS,):
+        places = [motion(period * k / n) for k in range(n)]
+        if n == STEPS[0] or not closed:
+            partition = common_partition(start, places[1::max(1, n // 16)])
+        nodes = tuple(Manifold(each, start.selection, partition=partition or (start.partition if not k else None))
+                      for k, each in enumerate(places))
+        found = Course(period, nodes, motion(period), closed, partition is None)
+        if found.tail <= SMOOTH:
+            break
+    assert found is not None
+    if closed:
+        scale = scales(found)
+        into = scale / scale[:, None]
+        gap = np.abs(found.after - found.A[0]) * into
+        if gap.max(initial=0.0) > REPEATS * (np.abs(found.A) * into).max(initial=0.0):
+            i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
+            raise ArgumentError(f"{place.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
+                                f"[{i}, {j}] of A is {found.A[0][i, j]:.6g} at the start and {found.after[i, j]:.6g} then; "
+                                f"pass the "
+                                "period of the motion as period=...")
+    if closed and found.tail > RESOLVED:
+        raise ArgumentError(f"{place.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
+                            f"period "
+                            "do not resolve them; loads with kinks (tables, Piecewise) have no monodromy matrix of this kind")
+    return found
+
+
+def _motion(place: Place, manifold: Manifold, period: float, precise: float) -> Callable[[float], Place]:
+    """The motion from a place on as a function of the time since."""
+    selection, module = manifold.selection, place.module
+    n_q, n_u, *_ = place.sizes
+    states = [n_q + n_u + k for k in manifold.states]
+
+    held = _held_rates(place, selection.held)
+    free = [k for k in range(n_u) if k not in set(held or ())]
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        if not selection.held:
+            return np.asarray(module.rhs(place.t + t, x, place.p, place.inputs))
+        here = rest(module, place.t + t, x, place.p, place.inputs)
+        found = np.zeros(len(x))
+        if held is None:
+            found[n_q:n_q + n_u] = in_motion(here, selection).ud
+        else:  # forces along what is held are taken up, and it goes on as it moves
+            found[n_q:][free] = np.linalg.solve(here.M[np.ix_(free, free)], -here.forces[free])
+        found[:n_q] = here.balance[here.parts["q_dot"]]
+        found[states] = here.rates_z[manifold.states]
+        return found
+
+    size = np.maximum(np.abs(place.x), 1.0)
+    found = scipy.integrate.solve_ivp(rates, (0.0, period), place.x, "DOP853", dense_output=True, rtol=precise,
+                                      atol=precise * size)
+    if not found.success:
+        raise NoEquilibrium(f"{module.name}: the motion cannot be followed over its period: {found.message}")
+
+    def at(t: float) -> Place:
+        return in_motion(place.at(t=place.t + t, x=found.sol(t) if t else place.x), selection)
+
+    return at
+
+
+def _held_rates(place: Place, held: Sequence[str]) -> list[int] | None:
+    """Places of the speeds that are held, if each of them is the rate of a coordinate and nothing else is constrained."""
+    metadata = place.module.metadata
+    labels = coordinate_names(metadata)
+    found = []
+    for name in held:
+        places = [k for k, (label, u) in enumerate(zip(labels, metadata["u"], strict=True)) if name in (label, u)
+                  and label in metadata["q"]]
+        if place.sizes[3] or not (places or name in metadata["z"]):
+            return None
+        found += places
+    return found
+
+
+def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], np.ndarray]) -> Course:
+    """The periodic motion near a state, by shooting with the monodromy matrix. Raises NoEquilibrium where there is none near.
+
+    Displacements on which nothing depends (the way along a straight track) need not come back.
+    Source: Seydel, Practical Bifurcation and Stability Analysis, section 7.1.
+    """
+    manifold, precise = start, ROUGH
+    owner = start.place.module.name
+    try:
+        for step in range(ITERATIONS):
+            course = follow(manifold, period, closed=False, precise=precise)
+            residual = _left_open(course)
+            T = course.widened(np.eye(len(residual)))
+            scale = _sizes(course)
+            wide = np.abs(T) @ scale if course.bundled else scale
+            columns = np.abs((course.A @ T) / wide[:, None] * scale).max(axis=0).max(axis=0)
+            cyclic = columns <= NOTHING * columns.max(initial=0.0)
+            cyclic[course.first.n_d:] = False
+            counted = np.flatnonzero(~cyclic)
+            left = float((np.abs(residual) / scale)[counted].max(initial=0.0))
+            if not step and left <= NEARLY:  # perhaps closed already: not to be moved then
+                precise = PRECISE
+                residual = _left_open(follow(manifold, period, closed=False, precise=precise))
+                left = float((np.abs(residual) / scale)[counted].max(initial=0.0))
+            J = (monodromy(course) - np.eye(len(residual)))[np.ix_(counted, counted)]
+            change = np.zeros(len(residual))
+            inner = scale[counted]
+            change[counted] = -inner * np.linalg.lstsq(J * inner / inner[:, None], residual[counted] / inner, rcond=1e-9)[0]
+            largest = float(np.abs(change[:course.first.n_d] / scale[:course.first.n_d]).max(initial=0.0))
+            if left <= CLOSED and precise == PRECISE:
+                return follow(_shifted(course.first, change) if step else manifold, period)
+            precise = PRECISE if left <= NEARLY else ROUGH
+            manifold = _shifted(course.first, change * min(1.0, LARGEST_STEP / largest) if largest else change)
+    except EvaluationError as error:
+        raise NoEquilibrium(f"{owner}: no periodic motion found near the start: "
+                            f"{str(error).removeprefix(f'{owner}: ')}") from error
+    k = int(np.argmax(np.abs(residual)))
+    names = (*course.first.labels, *course.first.speed_labels, *course.first.state_labels)
+    raise NoEquilibrium(f"{owner}: no periodic motion of {period:.6g} s found near the start: after {ITERATIONS} steps "
+                        f"{names[k]} "
+                        f"differs by {residual[k]:.3g} after a period; begin elsewhere, with at=..., or check the period")
+
+
+def _left_open(course: Course) -> np.ndarray:
+    """The change of the state over a period in the coordinates of the manifold, whole turns left out, (m,)."""
+    manifold, before, after = course.first, course.first.place, course.last
+    metadata = before.module.metadata
+    gap = after.q - before.q
+    for k, name in enumerate(metadata["q"]):
+        if metadata["units"].get(name) == "rad":
+            gap[k] = np.remainder(gap[k] + np.pi, 2 * np.pi) - np.pi
+    for group in metadata.get("unit_groups", ()):
+        places = [metadata["q"].index(n) for n in group]
+        if after.q[places] @ before.q[places] < 0:
+            gap[places] = -after.q[places] - before.q[places]
+    v = np.linalg.lstsq(before.N, gap, rcond=None)[0]
+    return np.concatenate([v[manifold.displacements], (after.u - before.u)[manifold.speeds],
+                           (after.z - before.z)[manifold.states]])
+
+
+def _sizes(course: Course) -> np.ndarray:
+    """What changes of the coordinates of the manifold are compared with: 1 rad or the natural length, by the period, (m,)."""
+    manifold = course.first
+    sizes = natural_scales(manifold.place) * natural_length(manifold.place)
+    return np.concatenate([sizes[manifold.displacements], sizes[manifold.speeds] * 2 * np.pi / course.period,
+                           np.maximum(np.abs(manifold.place.z[manifold.states]), 1.0)])
+
+
+def _shifted(manifold: Manifold, change: np.ndarray) -> Manifold:
+    """The manifold at a state moved along its coordinates, back on the constraints."""
+    place = manifold.place
+    n_q = place.sizes[0]
+    along = manifold.tangent() @ change
+    v = manifold.Z_v @ change[:manifold.n_d]
+    x = place.x + along
+    x[:n_q] = place.moved(v)
+    if place.sizes[3]:
+        x = closest(place.module, place.t, x, place.p)
+    moved = in_motion(place.at(x=x), manifold.selection)
+    return Manifold(moved, manifold.selection, partition=manifold.partition)

@@ -1,0 +1,53 @@
+"""Singular configurations: positions where the constraints lose rank that they have at positions nearby.
+
+There the positions that the constraints allow are no smooth manifold: branches meet, or a mechanism passes a dead point of its
+own, and linear equations do not exist. Constraints that depend on each other everywhere (redundant ones) are no such case, so
+the rank is compared with that at positions nearby which fulfil the constraints, too.
+Source: Müller, Higher-order analysis of kinematic singularities of lower pair linkages, J. Mech. Robotics 11 (2019).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.consistent import on_constraints
+from symdyn.runtime.constraints import length as length_of
+from symdyn.runtime.constraints import names, scaled_jacobian, turning
+from symdyn.runtime.statics.terms import Place
+
+# Positions nearby are so far away, in rad or lengths of the mechanism; so many are tried.
+AWAY, TRIES = 0.03, 4
+# Singular values below this part of the largest, or of 1, are zero.
+RANK = 1e-8
+
+
+def singular_configuration(place: Place) -> str:
+    """What is singular about a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is."""
+    module = place.module
+    if not names(module):
+        return ""
+    here = _rank(place, place.x)
+    if here == len(names(module)):
+        return ""
+    stream = np.random.default_rng(5)
+    turns, size = turning(module), length_of(module, place.p)
+    n_q, n_u, *_ = place.sizes
+    most = here
+    for _ in range(TRIES):
+        change = AWAY * np.where(turns, 1.0, size) * stream.standard_normal(n_u)
+        x = place.x.copy()
+        x[:n_q] = place.moved(change)
+        try:
+            most = max(most, _rank(place, on_constraints(module, place.t, x, place.p)))
+        except (ArgumentError, EvaluationError):
+            continue
+    if most == here:
+        return ""
+    return (f"singular configuration: the constraints have rank {here} here and rank {most} at positions nearby, so that "
+            f"{most - here} more direction{'s' * (most - here > 1)} would count as free than the mechanism has")
+
+
+def _rank(place: Place, x: np.ndarray) -> int:
+    values = np.linalg.svd(scaled_jacobian(place.module, place.t, x, place.p), compute_uv=False)
+    return int((values > RANK * max(values[0], 1.0)).sum()) if len(values) else 0
