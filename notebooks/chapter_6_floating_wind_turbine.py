@@ -276,8 +276,8 @@ print(f"draft: {4 - rest['z']:.3f} m")
 #
 # ### Several equilibria
 #
-# Newton's method starts from 40 random states, up to 3 m and 20° away. Every start ends in an equilibrium; which are
-# stable is told by their eigenvalues.
+# Newton's method starts from 40 random states, up to 3 m and 20° away. Every start ends in an equilibrium; their
+# eigenvalues decide which are stable.
 
 # %%
 reach = np.radians(20)
@@ -592,10 +592,13 @@ print(f"pitch {np.degrees(windy['theta']):.3f} degrees (rigid {np.degrees(stiffe
 #
 # A rotor with three equal blades is constant in time when it is seen from the nacelle: by multi-blade coordinates, which are the
 # mean of the blades and how they lean to one side or the other. `blades` says which coordinates belong together.
+# The weight of the blades leaves small periodic terms. `averaged=True` takes the mean over the azimuth, and prints how much the
+# equations vary; without it Floquet theory follows the periodic motion at every speed, which changes these frequencies by less
+# than 0.03 per cent.
 
 # %%
 groups = [[f"blade{k}_{mode}" for k in (1, 2, 3)] for mode in ("flap1", "edge1", "flap2")]
-diagram = flexible.campbell("azimuth_dot", np.linspace(0.1, 1.4, 14), blades=groups, fixed={"yaw": 0})
+diagram = flexible.campbell("azimuth_dot", np.linspace(0.1, 1.4, 14), blades=groups, fixed={"yaw": 0}, averaged=True)
 diagram.plot(highest=1.5)
 
 # %% [markdown]
