@@ -80,7 +80,7 @@ def test_row_of_masses() -> None:
                            shape / shape[1 if abs(shape[1]) > 0.1 else 0], atol=1e-12)
         assert np.isclose(mode.shares.sum(), 1) and np.isclose(np.abs(mode.shape).max(), 1)
     assert modes[0].name == "q3, q2, q4 (1)" and modes["q3, q2, q4 (1)"] is modes[0] and modes["q1, q3, q5"] is modes[2]
-    assert "f [Hz]" in repr(modes) and len(repr(modes).splitlines()) == 8
+    assert "f [Hz]" in repr(modes) and len(repr(modes).splitlines()) == 9
     assert "neutral" in repr(modes) and "q3, q2, q4" in repr(modes[0])
 
 

@@ -52,8 +52,8 @@ class Analysis:
         return modes_of(self.spectrum, shapes_of(self.manifold), title, self.notes())
 
     def notes(self) -> list[str]:
-        """What is held, and the verdict with its reason."""
-        lines = held_note(self.manifold)
+        """Units of shapes, what is held, and the verdict with its reason."""
+        lines = [*unit_note(self.manifold), *held_note(self.manifold)]
         return [*lines, f"{self.verdict}: {self.reason()}" if self.verdict else self.reason()]
 
     def reason(self) -> str:
@@ -126,6 +126,17 @@ def shapes_of(manifold: Manifold) -> Shapes:
 def decade(error: float) -> str:
     """An error as the power of ten above it, at least 1e-15: what a reader needs of it."""
     return f"{10.0 ** np.ceil(np.log10(max(error, 1e-15)) - 1e-9):.0e}" if np.isfinite(error) else "nothing"
+
+
+def unit_note(manifold: Manifold) -> list[str]:
+    """A line with the units of what shapes of modes consist of."""
+    units = manifold.place.module.metadata["units"]
+    by_unit: dict[str, list[str]] = {}
+    speeds = manifold.place.module.metadata["u"]
+    for label, k in zip(manifold.labels, manifold.displacements, strict=True):
+        by_unit.setdefault(units.get(label) or units.get(speeds[k], "").removesuffix("/s") or "1", []).append(label)
+    parts = [", ".join(names) + f" in {unit}" for unit, names in by_unit.items()]
+    return [f"shapes: {'; '.join(parts)}"] if parts else []
 
 
 def held_note(manifold: Manifold) -> list[str]:

@@ -190,19 +190,38 @@ class Linearization:
             changes |= shift(place, selection, name)
         return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
 
+    def _table(self, name: str, matrix: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> list[str]:
+        """A matrix with its names and units; nothing where it has no entries."""
+        if not matrix.size:
+            return []
+        labels = [f"{n} [{self.units.get(n) or '1'}]" for n in columns]
+        width = max(len(f"{n} [{self.units.get(n) or '1'}]") for n in rows)
+        widths = [max(11, len(label)) for label in labels]
+        lines = [f"{name:<{width}}  " + "  ".join(f"{label:>{w}}" for label, w in zip(labels, widths, strict=True))]
+        for row, values in zip(rows, matrix, strict=True):
+            numbers = "  ".join(f"{value:>{w}.5g}" for value, w in zip(values, widths, strict=True))
+            lines.append(f"{f'{row} [{self.units.get(row) or 1}]':<{width}}  {numbers}")
+        return lines
+
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"
         held = f", held: {', '.join(self.held)}" if self.held else ""
         return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}{held}>"
 
     def describe(self) -> str:
-        """The states with their units, what is held, and what the eigenvalues say, as a table."""
-        width = max([4, *map(len, self.states)])
-        lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {self.B.shape[1]} inputs"]
-        lines += [f"  {name:<{width}}  {self.units.get(name, '')}".rstrip() for name in self.states]
+        """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
+        inputs = tuple(self.module.metadata["inputs"])
+        lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
+                 f"has the "
+                 "unit of its row by that of its column and s, of C_out and D by that of its column"]
+        for name, matrix, rows, columns in (("A", self.A, self.states, self.states), ("B", self.B, self.states, inputs),
+                                            ("C_out", self.C_out, self.outputs, self.states),
+                                            ("D", self.D, self.outputs, inputs)):
+            lines += self._table(name, matrix, rows, columns)
         lines += held_note(self._manifold)
         if self.steadiness.kind:
-            return "\n".join([*lines, f"{self.steadiness.kind}; {self._analysis.reason()}"])
+            verdict = f"{self._analysis.verdict}, " if self._analysis.verdict else ""
+            return "\n".join([*lines, f"{self.steadiness.kind}: {verdict}{self._analysis.reason()}"])
         return "\n".join([*lines, f"no state of rest or of steady motion: {self.steadiness.reason}"])
 
 
