@@ -116,8 +116,7 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
                are named by multi-blade coordinates. That these make the equations constant is checked at `azimuths` positions;
                where they do not (weight on the blades), the periodic motion is found and judged by Floquet theory
     averaged   with blades: the mean of the equations over the azimuths in place of Floquet theory where they are periodic,
-               which is
-               quicker and leaves out what is periodic; how much the entries vary is printed
+               which is quicker and leaves out what is periodic; how much the entries vary is printed
     azimuth    the coordinate whose rate the speed is, where the names do not say it
     frame      "fixed": frequencies that the fixed frame sees; "rotating": those in the coordinates of the model, where the
                equations are constant in them

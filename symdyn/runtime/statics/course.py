@@ -45,8 +45,7 @@ class Course:
 
     nodes     manifolds at equal steps of time, the last before the end; last: the state there
     closed    whether it comes back; bundled: whether its variables are all changes [v; u'; z'], since no choice of independent
-              ones
-              serves everywhere, or those that the nodes have in common
+              ones serves everywhere, or those that the nodes have in common
     """
 
     period: float
@@ -177,8 +176,7 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
             i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
             raise ArgumentError(f"{place.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
                                 f"[{i}, {j}] of A is {found.A[0][i, j]:.6g} at the start and {found.after[i, j]:.6g} then; "
-                                f"pass the "
-                                "period of the motion as period=...")
+                                "pass the period of the motion as period=...")
     if closed and found.tail > RESOLVED:
         raise ArgumentError(f"{place.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
                             f"period "

@@ -180,8 +180,7 @@ class Equilibrium:
 
     def _least_energy(self) -> bool:
         """Whether this is rest at a strict minimum of the energy, as far as the linear equations tell: no damping, no extra
-        states,
-        and a stiffness that is symmetric and positive definite beyond rounding."""
+        states, and a stiffness that is symmetric and positive definite beyond rounding."""
         manifold = self._manifold
         if self.u.any() or not manifold.second_order:
             return False

@@ -2,8 +2,7 @@
 
 y_dot = A(t) y with A(t + T) = A(t): Y(T) of Y(0) = 1 carries a disturbance over a period; its eigenvalues, the multipliers mu,
 decide. A solution is exp(lambda t) p(t) with p of period T and lambda = log(mu) / T, known but for multiples of i 2 pi / T: p
-says
-which of them a motion shows.
+says which of them a motion shows.
 Source: Meirovitch, Methods of Analytical Dynamics, section 7.4; Skjoldan and Hansen, On the similarity of the Coleman and
 Lyapunov-Floquet transformations for modal analysis of bladed rotor structures, J. Sound Vib. 327 (2009).
 """

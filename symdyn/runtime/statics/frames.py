@@ -4,11 +4,9 @@ Where a rotor is alike at every azimuth (an axisymmetric body, three or more lik
 constant
 S: y = e^(St) w gives w_dot = (A(0) - S) w with constant coefficients. S follows from dA/dt = S A - A S at many azimuths by least
 squares; it must be a generator of rotations, with eigenvalues that are whole multiples of i times the speed, and A(t) computed
-from
-it must be that of the mechanism at all azimuths: this is the proof. Of blades e^(St) is the multi-blade transformation, of a
+from it must be that of the mechanism at all azimuths: this is the proof. Of blades e^(St) is the multi-blade transformation, of a
 free body it turns body axes into fixed ones. Where several S do, that one is taken which leaves the displacements of the
-bodies, in
-fixed axes, as constant as can be.
+bodies, in fixed axes, as constant as can be.
 Source: Coleman and Feingold, NACA Report 1351 (1958); Lyapunov, The General Problem of the Stability of Motion (reducible
 systems); Skjoldan and Hansen, J. Sound Vib. 327 (2009), on the principal frequency.
 """
@@ -197,8 +195,7 @@ def axis(course: Course) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Seen:
     """A mode as an observer sees it: harmonics (multiple, share), the largest first, counted from its exponent's frequency;
-    whirl,
-    from -1 to 1: the sense in which the displacement of the largest one goes round, positive with the rotation."""
+    whirl, from -1 to 1: the sense in which the displacement of the largest one goes round, positive with the rotation."""
 
     harmonics: tuple[tuple[int, float], ...]
     whirl: float

@@ -121,8 +121,7 @@ class Linearization:
         if not self.steadiness.kind:
             raise ArgumentError(f"{self.module.name}: {what} asked for at a state that is neither at rest nor in steady motion: "
                                 f"{self.steadiness.reason}. Eigenvalues decide nothing there; linearize at an equilibrium, or "
-                                f"use "
-                                "module.stability(...), which follows a periodic motion")
+                                "use module.stability(...), which follows a periodic motion")
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
@@ -183,8 +182,7 @@ class Linearization:
             raise ArgumentError(f"{owner}: derivatives of eigenvalues are not available with constraints of velocities")
         if manifold.Z_u is not manifold.Z_v or manifold.W.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues along a motion under constraints are not available; they "
-                                f"hold "
-                                "at a state of rest")
+                                "hold at a state of rest")
         changes = {name: 1.0}
         if self.equilibrium is not None:
             changes |= shift(place, selection, name)
@@ -212,8 +210,7 @@ class Linearization:
         """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
         inputs = tuple(self.module.metadata["inputs"])
         lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
-                 f"has the "
-                 "unit of its row by that of its column and s, of C_out and D by that of its column"]
+                 "has the unit of its row by that of its column and s, of C_out and D by that of its column"]
         for name, matrix, rows, columns in (("A", self.A, self.states, self.states), ("B", self.B, self.states, inputs),
                                             ("C_out", self.C_out, self.outputs, self.states),
                                             ("D", self.D, self.outputs, inputs)):

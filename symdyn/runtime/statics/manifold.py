@@ -8,8 +8,7 @@ Small changes v along which coordinates move (q' = N v), u' of the speeds, z' of
     v_dot = u' - G v
 A velocity constraint has a row in S and none in P: it binds speeds, but not displacements. With independent displacements eta,
 v = Z_v eta, and independent speeds zeta, u' = Z_u zeta + W eta + W_z z', where the rows of the independent ones in Z_v and Z_u
-are
-those of the identity, the multipliers drop out by Z_u^T, and [eta; zeta; z'] are coordinates of the manifold: their equations
+are those of the identity, the multipliers drop out by Z_u^T, and [eta; zeta; z'] are coordinates of the manifold: their equations
 x'_dot = A x' + B in' are the derivative of the flow on it along any motion, at rest or not.
 Source: Wehage and Haug, Generalized coordinate partitioning, J. Mech. Des. 104 (1982); Neimark and Fufaev, Dynamics of
 Nonholonomic Systems, chapter V (velocity constraints near steady motion).
@@ -258,8 +257,7 @@ class Manifold:
     @cached_property
     def bundle(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Changes w = [v; u'; z'] of all speeds' displacements, all speeds and free extra states: w = T x' (k, m), x' = L w (m,
-        k),
-        and the matrix (k, k) of w_dot for changes on the manifold, which no choice of independent ones enters."""
+        k), and the matrix (k, k) of w_dot for changes on the manifold, which no choice of independent ones enters."""
         n_u, n_z = self.place.sizes[1], len(self.states)
         zeros = np.zeros
         T = np.block([[self.Z_v, zeros((n_u, self.n_s)), zeros((n_u, n_z))], [self.W, self.Z_u, self.W_z],

@@ -4,10 +4,8 @@ q_k = a_0 + a_c cos psi_k + a_s sin psi_k + ..., psi_k = psi + 2 pi k / N. With 
     q_dot = T a_dot + Omega T' a,  q_ddot = T a_ddot + 2 Omega T' a_dot + Omega^2 T'' a,
 so the matrices in a are T^T M T, T^T (2 Omega M T' + C T), T^T (Omega^2 M T'' + Omega C T' + K T). They are the same at all
 azimuths for a rotor of three or more like blades; what differs (weight on the blades) shows in their spread, and the equations
-are
-periodic then. The mean over the azimuths has a steady state, the a that balances the mean forces, where the search for the
-periodic
-motion begins.
+are periodic then. The mean over the azimuths has a steady state, the a that balances the mean forces, where the search for the
+periodic motion begins.
 Source: Coleman and Feingold, NACA Report 1351 (1958); Bir, Multi-blade coordinate transformation and its application to wind
 turbine analysis, AIAA 2008-1300.
 """

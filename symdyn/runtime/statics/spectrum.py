@@ -1,11 +1,10 @@
 """Eigenvalues judged by backward error, entry by entry: which are proved to decay or to grow, and what the others are.
 
 A matrix A in doubles stands for all matrices that differ from it by at most E, entry by entry, or by L X with |X| <= F: what is
-not
-known of stiffness and damping comes through the inverse of the mass matrix, L. A circle around an eigenvalue
+not known of stiffness and damping comes through the inverse of the mass matrix, L. A circle around an eigenvalue
 that no such change carries an eigenvalue across, because |(z - A)^-1| E + |(z - A)^-1 L| F has a spectral radius below 1 on it,
-proves on which side
-of the boundary of stability (imaginary axis, or unit circle) what is inside stays. The test does not depend on units: a
+proves on which side of the boundary of stability (imaginary axis, or unit circle) what is inside stays. The test does not
+depend on units: a
 change of scales by a diagonal D leaves the spectral radius as it is, and damping of a gram counts beside stiffness of a bridge.
 What remains lies on the boundary as far as rounding tells. Jordan blocks of the eigenvalue zero are counted by a staircase of
 null spaces, whose ranks are judged by the same E.
@@ -51,8 +50,7 @@ DISCRETE = Boundary(lambda value: abs(value) - 1.0, 1.0)
 @dataclass(frozen=True, eq=False)
 class Unknown:
     """What is not known of a matrix A (m, m): changes up to E (m, m) entry by entry; L X with |X| <= F; and L Y S A with |Y| <=
-    G,
-    of a mass matrix whose inverse is L and that acts on the rates S A x. L (m, k), F (k, m), G (k, k), S (k, m).
+    G, of a mass matrix whose inverse is L and that acts on the rates S A x. L (m, k), F (k, m), G (k, k), S (k, m).
 
     rounding (m, m): entries that are no larger are zeros but for rounding
     """

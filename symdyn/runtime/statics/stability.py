@@ -89,8 +89,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
             raise ArgumentError(f"{module.name}: the period must be more than 0 s, found {period:g}")
     if at is not None and start is not None:
         raise ArgumentError(f"{module.name}: at and start are both given; at is the motion to be judged, start a guess of it: "
-                            f"pass "
-                            "one of them")
+                            "pass one of them")
     if isinstance(at, Equilibrium):
         if at.module is not module:
             raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; use its own")
