@@ -134,7 +134,8 @@ def unit_note(manifold: Manifold) -> list[str]:
     by_unit: dict[str, list[str]] = {}
     speeds = manifold.place.module.metadata["u"]
     for label, k in zip(manifold.labels, manifold.displacements, strict=True):
-        by_unit.setdefault(units.get(label) or units.get(speeds[k], "").removesuffix("/s") or "1", []).append(label)
+        own = units.get(label, "") if label != speeds[k] else units.get(label, "").removesuffix("/s")
+        by_unit.setdefault(own or "1", []).append(label)
     parts = [", ".join(names) + f" in {unit}" for unit, names in by_unit.items()]
     return [f"shapes: {'; '.join(parts)}"] if parts else []
 
@@ -157,7 +158,10 @@ def reason(found: Spectrum) -> str:
         return f"{text}: {margins[k]:.6g} 1/s" + (f", known to {decade(known)}" if known > 1e-6 * margins[k] else "")
     if verdict == "not decided":
         k = int(found.undecided[np.argmax(found.radii[found.undecided])])
-        return f"{text}: {found.values[k].real:.3g} 1/s is known to {decade(float(found.radii[k]))} only"
+        if found.boundary.neutral:
+            return f"{text}: a multiplier has the size 1 + {margins[k]:.3g}, known to {decade(float(found.radii[k]))} only"
+        known = float(min(found.radii[k], max(abs(found.values[k]), 1e-15)))
+        return f"{text}: {found.values[k].real:.3g} 1/s is known to {decade(known)} only"
     if verdict in ("neutral", "drifts"):
         zeros, pairs = len(found.zeros), int((found.values[found.imaginary].imag > 0).sum())
         parts = [f"{zeros} zero" if zeros else "", f"{pairs} undamped oscillation{'s' * (pairs != 1)}" if pairs else ""]

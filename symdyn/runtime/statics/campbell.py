@@ -51,7 +51,7 @@ class Campbell:
     modes         at every speed, as found; equilibria: the states they are about (Equilibrium; multiblade.Steady, the mean over
                   a turn;
                   Stability of a periodic motion)
-    frame         "fixed" or "rotating": who sees these frequencies; held: names of what is held besides the speed
+    frame         "fixed" or "rotating": who sees these frequencies; held: names of what is held
     varies        of averaged equations, by what part of their largest entry they differ over a turn
     """
 
@@ -97,9 +97,13 @@ class Campbell:
         held = f", held: {', '.join(self.held)}" if self.held else ""
         mean = f", mean over the azimuth of equations that vary by {decade(self.varies)}" if self.varies > CONSTANT else ""
         lines = [f"{self.title}: damped natural frequencies in the {self.frame} frame, Hz{held}{mean}",
-                 f"{self.speed:>16}  " + "  ".join(f"{n:>{w}}" for n, w in zip(self.names, width, strict=True))]
+                 f"{self.speed + ' [rad/s]':>16}  " + "  ".join(f"{n:>{w}}" for n, w in zip(self.names, width, strict=True))]
         for value, row in zip(self.values, self.frequencies, strict=True):
             lines.append(f"{value:>16.6g}  " + "  ".join(f"{f:>{w}.5g}" for f, w in zip(row, width, strict=True)))
+        for k, name in enumerate(self.names):
+            grows = [f"{v:g}" for v, modes, value in zip(self.values, self.modes, self.eigenvalues[:, k], strict=True)
+                     if any(m.kind == "unstable" and m.eigenvalue == value for m in modes)]
+            lines += [f"unstable: {name} at {', '.join(grows)} rad/s"] if grows else []
         return "\n".join(lines)
 
 
@@ -165,7 +169,7 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
     for j, track in enumerate(tracks):
         for k, mode in track.items():
             eigenvalues[k, j] = mode.eigenvalue
-    held = tuple(n for n in selection.held if n != name)
+    held = selection.held
     return Campbell(owner, name, numbers, eigenvalues, _names(tracks, numbers), tuple(sets), tuple(each.about for each in found),
                     frame, held, max(each.varies for each in found) if averaged else 0.0)
 

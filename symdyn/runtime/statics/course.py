@@ -19,6 +19,7 @@ import scipy.linalg
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.consistent import closest
 from symdyn.runtime.statics.manifold import Manifold, common_partition, in_motion, natural_length, natural_scales
+from symdyn.runtime.statics.steady import depends_on_time
 from symdyn.runtime.statics.terms import Place, coordinate_names, rest
 
 # Numbers of steps that are tried; the highest harmonics must be this part of all.
@@ -29,6 +30,8 @@ RESOLVED = 1e-5
 OPEN_STEPS = 48
 # State matrices after a period differ at most by this part of their largest entry, scaled.
 REPEATS = 1e-7
+# Parts of the period at which forces are compared with those a period later.
+LOOKS = (0.13, 0.31, 0.47, 0.71, 0.89)
 # Columns of state matrices below this part of the largest: nothing depends on the displacement.
 NOTHING = 1e-10
 # Error of the motion, per unit; while a closed one is looked for.
@@ -107,7 +110,7 @@ class Course:
 
     @cached_property
     def tail(self) -> float:
-        """Size of the highest harmonics of A beside its largest entry, scaled: what the steps leave open."""
+        """Size of the highest harmonics of A relative to its largest entry, scaled: what the steps leave open."""
         n = len(self.nodes)
         scale = scales(self)
         sizes = (np.abs(self.harmonics) * (scale / scale[:, None])).reshape(n, -1).max(axis=1)
@@ -162,8 +165,15 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
         places = [motion(period * k / n) for k in range(n)]
         if n == STEPS[0] or not closed:
             partition = common_partition(start, places[1::max(1, n // 16)])
-        nodes = tuple(Manifold(each, start.selection, partition=partition or (start.partition if not k else None))
-                      for k, each in enumerate(places))
+        try:
+            nodes = tuple(Manifold(each, start.selection, partition=partition or (start.partition if not k else None))
+                          for k, each in enumerate(places))
+        except ArgumentError:  # the choice fails between the positions that it was compared at
+            if partition is None:
+                raise
+            partition = None
+            nodes = tuple(Manifold(each, start.selection, partition=None if k else start.partition)
+                          for k, each in enumerate(places))
         found = Course(period, nodes, motion(period), closed, partition is None)
         if found.tail <= SMOOTH:
             break
@@ -177,6 +187,8 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
             raise ArgumentError(f"{place.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
                                 f"[{i}, {j}] of A is {found.A[0][i, j]:.6g} at the start and {found.after[i, j]:.6g} then; "
                                 "pass the period of the motion as period=...")
+    if closed:
+        _demand_repetition(found)
     if closed and found.tail > RESOLVED:
         raise ArgumentError(f"{place.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
                             f"period "
@@ -244,13 +256,8 @@ def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], 
         for step in range(ITERATIONS):
             course = follow(manifold, period, closed=False, precise=precise)
             residual = _left_open(course)
-            T = course.widened(np.eye(len(residual)))
             scale = _sizes(course)
-            wide = np.abs(T) @ scale if course.bundled else scale
-            columns = np.abs((course.A @ T) / wide[:, None] * scale).max(axis=0).max(axis=0)
-            cyclic = columns <= NOTHING * columns.max(initial=0.0)
-            cyclic[course.first.n_d:] = False
-            counted = np.flatnonzero(~cyclic)
+            counted = np.flatnonzero(~_cyclic(course))
             left = float((np.abs(residual) / scale)[counted].max(initial=0.0))
             if not step and left <= NEARLY:  # perhaps closed already: not to be moved then
                 precise = PRECISE
@@ -273,6 +280,42 @@ def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], 
     raise NoEquilibrium(f"{owner}: no periodic motion of {period:.6g} s found near the start: after {ITERATIONS} steps "
                         f"{names[k]} "
                         f"differs by {residual[k]:.3g} after a period; begin elsewhere, with at=..., or check the period")
+
+
+def _demand_repetition(course: Course) -> None:
+    """Raises ArgumentError where forces that depend on time are others a period later, at the same positions."""
+    if not depends_on_time(course.first.place):
+        return
+    owner, n = course.first.place.module.name, len(course.nodes)
+    for k in sorted({int(part * n) for part in LOOKS}):
+        node = course.nodes[k]
+        later = in_motion(node.place.at(t=node.place.t + course.period), node.selection)
+        sizes = natural_scales(later) * (2 * np.pi / course.period) ** 2
+        gap = np.abs(later.ud - node.place.ud) / np.maximum(np.abs(node.place.ud), sizes)
+        other = Manifold(later, node.selection, partition=node.partition).matrices[0]
+        mine = node.matrices[0]
+        if (gap > REPEATS).any() or np.abs(other - mine).max(initial=0.0) > REPEATS * np.abs(mine).max(initial=0.0):
+            raise ArgumentError(f"{owner}: the linear equations do not repeat after {course.period:.6g} s: forces at t = "
+                                f"{node.place.t:.4g} s and at t = {later.t:.4g} s differ at the same position; pass the period "
+                                "of the motion as period=...")
+
+
+def comes_back(course: Course) -> bool:
+    """Whether the motion is where it was after the period, but for displacements on which nothing depends."""
+    left, scale = _left_open(course), _sizes(course)
+    counted = ~_cyclic(course)
+    return bool((np.abs(left[counted]) <= 100 * CLOSED * scale[counted]).all())
+
+
+def _cyclic(course: Course) -> np.ndarray:
+    """Which coordinates of the manifold are displacements on which nothing depends, (m,)."""
+    scale = _sizes(course)
+    T = course.widened(np.eye(len(scale)))
+    wide = np.abs(T) @ scale if course.bundled else scale
+    columns = np.abs((course.A @ T) / wide[:, None] * scale).max(axis=0).max(axis=0)
+    found = columns <= NOTHING * columns.max(initial=0.0)
+    found[course.first.n_d:] = False
+    return np.asarray(found)
 
 
 def _left_open(course: Course) -> np.ndarray:

@@ -411,7 +411,9 @@ def _demand_stiffness(search: Search) -> None:
         raise EquilibriumNotUnique(
             f"{module.name}: the equilibrium is not unique: there is no stiffness along "
             + " and along ".join(_told(direction, labels) for direction in loose)
-            + f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it")
+            + f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it"
+            + (f"; or begin with other values of {', '.join(trial.selection.unknown)}, in params or inputs: where they are "
+               "zero they may have no effect" if trial.selection.unknown else ""))
 
 
 def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:

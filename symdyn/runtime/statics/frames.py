@@ -29,6 +29,8 @@ ROUNDED = 1e-12
 WHOLE = 1e-6
 # Singular values, squared, below this part of the largest leave S open.
 OPEN = 1e-13
+# The mean of the motion in fixed axes names a frequency if its share is this part of the largest harmonic's.
+MEAN = 0.25
 # Bodies that do not spin name a frequency if they have this part of the motion.
 SEEN = 1e-6
 
@@ -237,6 +239,15 @@ class Observer:
                 found[start:start + 3], found[start + 3:start + 6] = R @ field[start:start + 3], R @ field[start + 3:start + 6]
         return found
 
+    def in_fixed_axes(self, turned: np.ndarray) -> bool:
+        """Whether variables w with displacements e^(st) w, s at the nodes (n, n_d, n_d), are those of the fixed frame: what the
+        bodies move in all is constant then, for a body that spins as for a set of blades."""
+        if self.blind:
+            return False
+        fields = self.fields @ turned
+        whole = fields.reshape(len(fields), -1, self.per_body, fields.shape[2]).sum(axis=1)
+        return bool(np.ptp(whole, axis=0).max(initial=0.0) <= SEEN * np.abs(fields).max(initial=1e-300))
+
     def seen(self, shapes: np.ndarray, fixed: bool) -> Seen:
         """A mode from its motion p(t) at the nodes, (n, m) complex.
 
@@ -253,24 +264,31 @@ class Observer:
         if total <= 0:
             return Seen(((0, 1.0),), 0.0)
         multiples = np.round(np.fft.fftfreq(n, 1 / n)).astype(int)
+        alone = 0.0
         if not self.rotating:
             if self.still.any() and energies[:, self.still].sum() > SEEN * total:
                 energies = energies * self.still
             elif fixed:
                 return Seen(((0, 1.0),), self._whirl(harmonics[0]))
+            else:
+                alone = MEAN
         shares = energies.sum(axis=1) / energies.sum()
         order = sorted(range(n), key=lambda k: (-round(float(shares[k]), 9), abs(multiples[k]), -multiples[k]))
+        if shares[0] > alone * shares[order[0]] > 0:  # part of the motion is seen with the frequency of the exponent itself
+            order.remove(0)
+            order.insert(0, 0)
         kept = tuple((int(multiples[k]), float(shares[k])) for k in order if shares[k] > 1e-6)[:8]
         return Seen(kept, self._whirl(harmonics[order[0]] * (energies[order[0]] > 0)))
 
     def _whirl(self, amplitudes: np.ndarray) -> float:
         """Twice the area that displacements and tilts go round per cycle, over the sum of their squares, about the axis."""
         parts = amplitudes.reshape(-1, self.per_body)
-        if self.per_body == 3:
-            vectors = np.hstack([parts[:, :2], np.zeros((len(parts), 1))])
-        else:
-            vectors = np.concatenate([parts[:, :3], parts[:, 3:]])
-        across = vectors - np.outer(vectors @ self.axis, self.axis)
-        area = -np.imag(np.cross(across.conj(), across) @ self.axis).sum()
-        size = float((np.abs(across) ** 2).sum())
-        return float(area / size) if size > 0.5 * float((np.abs(vectors) ** 2).sum()) else 0.0
+        kinds = [np.hstack([parts[:, :2], np.zeros((len(parts), 1))])] if self.per_body == 3 else [parts[:, :3], parts[:, 3:]]
+        areas, whole = [], 0.0
+        for vectors in kinds:  # displacements and tilts each have a sense
+            across = vectors - np.outer(vectors @ self.axis, self.axis)
+            areas.append((-float(np.imag(np.cross(across.conj(), across) @ self.axis).sum()), float((np.abs(across) ** 2).sum())))
+            whole += float((np.abs(vectors) ** 2).sum())
+        area, size = sum(a for a, _ in areas), sum(n for _, n in areas)
+        against = any(a * area < 0 and abs(a) > 0.01 * abs(area) for a, _ in areas)
+        return area / size if size > 0.5 * whole and not against else 0.0

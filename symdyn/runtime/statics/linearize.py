@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
-from symdyn.runtime.consistent import NotConsistent, check_start, normalised, number
+from symdyn.runtime.consistent import NotConsistent, check_start, consistent, normalised, number
 from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.statics.analysis import Analysis, held_note
 from symdyn.runtime.statics.equilibrium import Equilibrium, given_inputs
@@ -188,18 +188,17 @@ class Linearization:
             changes |= shift(place, selection, name)
         return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
 
-    def _table(self, name: str, matrix: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> list[str]:
-        """A matrix with its names and units; nothing where it has no entries."""
-        if not matrix.size:
-            return []
-        labels = [f"{n} [{self.units.get(n) or '1'}]" for n in columns]
-        width = max(len(f"{n} [{self.units.get(n) or '1'}]") for n in rows)
-        widths = [max(11, len(label)) for label in labels]
-        lines = [f"{name:<{width}}  " + "  ".join(f"{label:>{w}}" for label, w in zip(labels, widths, strict=True))]
-        for row, values in zip(rows, matrix, strict=True):
-            numbers = "  ".join(f"{value:>{w}.5g}" for value, w in zip(values, widths, strict=True))
-            lines.append(f"{f'{row} [{self.units.get(row) or 1}]':<{width}}  {numbers}")
-        return lines
+    def _labelled_states(self) -> tuple[str, ...]:
+        """Names of x' with units; a displacement along a speed that is no rate of a coordinate is marked."""
+        units = self.module.metadata["units"]
+        speeds = self.module.metadata["u"]
+        found = []
+        for label, k in zip(self.coordinates, self._manifold.displacements, strict=True):
+            if label == speeds[k]:
+                found.append(f"displacement along {label} [{units.get(label, '').removesuffix('/s') or '1'}]")
+            else:
+                found.append(f"{label} [{units.get(label) or '1'}]")
+        return (*found, *[f"{n} [{units.get(n) or '1'}]" for n in self.states[len(self.coordinates):]])
 
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"
@@ -211,15 +210,33 @@ class Linearization:
         inputs = tuple(self.module.metadata["inputs"])
         lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
                  "has the unit of its row by that of its column and s, of C_out and D by that of its column"]
-        for name, matrix, rows, columns in (("A", self.A, self.states, self.states), ("B", self.B, self.states, inputs),
-                                            ("C_out", self.C_out, self.outputs, self.states),
-                                            ("D", self.D, self.outputs, inputs)):
-            lines += self._table(name, matrix, rows, columns)
+        states = self._labelled_states()
+        others = [(f"{n} [{self.units.get(n) or '1'}]" for n in names) for names in (inputs, self.outputs)]
+        ins, outs = (tuple(each) for each in others)
+        A = np.where(np.abs(self.A) <= self._analysis.noise.A.rounding, 0.0, self.A)
+        for name, matrix, rows, columns in (("A", A, states, states), ("B", self.B, states, ins),
+                                            ("C_out", self.C_out, outs, states), ("D", self.D, outs, ins)):
+            lines += _table(name, matrix, rows, columns)
         lines += held_note(self._manifold)
+        singular = singular_configuration(self._manifold.place)
+        if singular:
+            return "\n".join([*lines, singular])
         if self.steadiness.kind:
             verdict = f"{self._analysis.verdict}, " if self._analysis.verdict else ""
             return "\n".join([*lines, f"{self.steadiness.kind}: {verdict}{self._analysis.reason()}"])
         return "\n".join([*lines, f"no state of rest or of steady motion: {self.steadiness.reason}"])
+
+
+def _table(name: str, matrix: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """A matrix with labels of rows and columns; nothing where it has no entries."""
+    if not matrix.size:
+        return []
+    width, widths = max(map(len, rows)), [max(11, len(label)) for label in columns]
+    lines = [f"{name:<{width}}  " + "  ".join(f"{label:>{w}}" for label, w in zip(columns, widths, strict=True))]
+    for row, values in zip(rows, matrix + 0.0, strict=True):
+        numbers = "  ".join(f"{value:>{w}.5g}" for value, w in zip(values, widths, strict=True))
+        lines.append(f"{row:<{width}}  {numbers}")
+    return lines
 
 
 def linearize(module: Module, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
@@ -240,17 +257,24 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
 
 
 def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,
-             hold: Any) -> tuple[Place, Selection]:
-    """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints."""
+             hold: Any, guess: bool = False) -> tuple[Place, Selection]:
+    """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints.
+
+    guess   the state may be moved onto the constraints
+    """
     place = _place(module, at, params, t, inputs)
     selection = holding(select(module, free, fixed, None), hold)
     x = selection.apply(place.x)
+    if guess and place.sizes[3]:
+        kept = [n for n in selection.values if n in module.metadata["q"] or n in module.metadata["u"]]
+        q, u = consistent(module, x[:place.sizes[0]], x[place.sizes[0]:place.sizes[0] + place.sizes[1]], place.p, place.t, kept)
+        x = np.concatenate([q, u, x[len(q) + len(u):]])
     try:
         check_start(module, place.t, x, place.p)
     except NotConsistent as error:
         found = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
         raise ArgumentError(f"{found}; linear equations exist at states that fulfil the constraints: take "
-                            "q, u = module.consistent(q, u, params), and linearize((q, u))") from None
+                            "q, u = module.consistent(q, u, params), and pass (q, u)") from None
     return in_motion(place.at(x=x), selection), selection
 
 

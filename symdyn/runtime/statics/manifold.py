@@ -319,7 +319,8 @@ def _factorized(M: np.ndarray, name: str) -> Callable[[np.ndarray], np.ndarray]:
         factors = scipy.linalg.cho_factor(M)
     except np.linalg.LinAlgError:
         raise ArgumentError(f"{name}: the mass matrix of the independent velocities is not positive definite: its smallest "
-                            f"eigenvalue is {np.linalg.eigvalsh(M)[0]:.3g}; give masses to what moves") from None
+                            f"eigenvalue is {np.linalg.eigvalsh(M)[0]:.3g}; give masses to what moves, or leave gimbal lock of "
+                            "three angles by orientation=EulerParameters()") from None
 
     def solve(right: np.ndarray) -> np.ndarray:
         return np.asarray(scipy.linalg.cho_solve(factors, right))

@@ -149,13 +149,13 @@ class Modes:
 
     def __repr__(self) -> str:
         width = max([4, *[len(m.name) for m in self.modes]])
-        lines = [self.title, f"{'':>3}  {'mode':<{width}}  {'f [Hz]':>11}  {'omega [rad/s]':>13}  {'period [s]':>11}  "
+        lines = [self.title, f"{'':>3}  {'mode':<{width}}  {'f [Hz]':>11}  {'omega [rad/s]':>13}  {'damped period [s]':>17}  "
                              f"{'damping':>9}  {'time constant [s]':>17}  kind"]
         for k, m in enumerate(self.modes):
             oscillates = bool(m.eigenvalue.imag)
             numbers = [f"{m.frequency:>11.6g}" if oscillates else f"{'':>11}",
                        f"{m.omega:>13.6g}" if oscillates else f"{'':>13}",
-                       f"{m.period:>11.6g}" if oscillates else f"{'':>11}",
+                       f"{m.period:>17.6g}" if oscillates else f"{'':>17}",
                        f"{m.damping:>9.4g}" if oscillates else f"{'':>9}",
                        f"{m.time_constant:>17.6g}" if np.isfinite(m.time_constant) else f"{'':>17}"]
             lines.append(f"{k:>3}  {m.name:<{width}}  {'  '.join(numbers)}  {m.kind}")

@@ -5,8 +5,8 @@ not known of stiffness and damping comes through the inverse of the mass matrix,
 that no such change carries an eigenvalue across, because |(z - A)^-1| E + |(z - A)^-1 L| F has a spectral radius below 1 on it,
 proves on which side of the boundary of stability (imaginary axis, or unit circle) what is inside stays. The test does not
 depend on units: a
-change of scales by a diagonal D leaves the spectral radius as it is, and damping of a gram counts beside stiffness of a bridge.
-What remains lies on the boundary as far as rounding tells. Jordan blocks of the eigenvalue zero are counted by a staircase of
+change of scales by a diagonal D leaves the spectral radius as it is, and damping of a gram counts next to stiffness of a bridge.
+What remains lies on the boundary, but for rounding. Jordan blocks of the eigenvalue zero are counted by a staircase of
 null spaces, whose ranks are judged by the same E.
 Source: Higham, Accuracy and Stability of Numerical Algorithms, chapter 7 (componentwise errors); Hinrichsen and Pritchard,
 Mathematical Systems Theory I, section 5.3 (spectral value sets); Golub and Wilkinson, Ill-conditioned eigensystems and the
@@ -149,8 +149,12 @@ class Spectrum:
         places = []
         for k in self.imaginary:
             acts = float(self.driven[k]) if len(self.driven) else 0.0
-            stands = abs(self.values[k].imag) > ZERO * self.radii[k] or abs(self.boundary.margin(complex(self.values[k]))) == 0
-            if not stands or (acts > 0 and self.radii[k] > DECIDED * acts):
+            radius = float(self.radii[k])
+            if (np.abs(self.values - self.values[k]) <= np.sqrt(EPSILON) * abs(self.values[k])).sum() > 1:
+                # A group of equal ones: where they have a Jordan block, the root of what is not known.
+                radius = min(radius, float(np.sqrt(EPSILON)) * abs(complex(self.values[k])))
+            stands = abs(self.values[k].imag) > ZERO * radius or abs(self.boundary.margin(complex(self.values[k]))) == 0
+            if not stands or (acts > 0 and radius > DECIDED * acts):
                 places.append(int(k))
         return np.array(places, dtype=int)
 
@@ -245,6 +249,8 @@ def _rounded(value: object) -> complex:
 
 
 def _unit(columns: np.ndarray) -> np.ndarray:
+    sizes = np.abs(columns).max(axis=0, initial=0.0)
+    columns = columns / np.where(sizes > 0, sizes, 1.0)
     norms = np.linalg.norm(columns, axis=0)
     return np.asarray(columns / np.where(norms > 0, norms, 1.0))
 

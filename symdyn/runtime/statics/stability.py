@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.linalg
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.consistent import number
 from symdyn.runtime.statics.analysis import WORDS, Analysis, decade, held_note, reason, shapes_of
-from symdyn.runtime.statics.course import Course, closed_course, follow, scales
-from symdyn.runtime.statics.equilibrium import Equilibrium
+from symdyn.runtime.statics.course import Course, closed_course, comes_back, follow, scales
+from symdyn.runtime.statics.equilibrium import Equilibrium, equilibrium
 from symdyn.runtime.statics.floquet import exponents, fundamental, monodromy, multipliers
 from symdyn.runtime.statics.frames import ROUNDED, Change, Observer, Seen, constant_change, spinning
 from symdyn.runtime.statics.manifold import Manifold, in_motion
@@ -22,7 +22,7 @@ from symdyn.runtime.statics.modes import Modes, modes_of, ordered, settled_value
 from symdyn.runtime.statics.selection import holding
 from symdyn.runtime.statics.singular import singular_configuration
 from symdyn.runtime.statics.spectrum import CONTINUOUS, Spectrum, spectrum
-from symdyn.runtime.statics.steady import accelerating, depends_on_time, steadiness
+from symdyn.runtime.statics.steady import accelerating, depends_on_time, fastest, steadiness
 from symdyn.runtime.statics.terms import coordinate_names
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # Speeds of several rotors have a common period if their ratio is one of whole numbers up to this.
 WHOLE = 60
+# Turns of the fastest speed that a period may have.
+MOST_TURNS = 1000
 KINDS = ("rest", "steady motion", "periodic motion")
 
 
@@ -46,7 +48,8 @@ class Stability:
     multipliers  (m,) complex, what a disturbance is multiplied by in a period; None without a period
     modes        with shapes at the start, and harmonics
     evidence     sentences: what was checked and found; reason: the last of them
-    motion       t (n,) and x (n, n_x) over a period, where the equations are not constant in the coordinates of the model
+    motion       the pair (t, x), t (n,) and x (n, n_x) over a period, where the equations are not constant in the coordinates
+                 of the model
     """
 
     title: str
@@ -83,6 +86,8 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
     """See Module.stability."""
     from symdyn.runtime.statics.linearize import state_of
 
+    if isinstance(period, bool):
+        raise ArgumentError(f"{module.name}: pass a period in seconds, found {period!r}")
     if period is not None:
         period = number(period, "a period in seconds", module.name)
         if period <= 0:
@@ -98,11 +103,16 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
             raise ArgumentError(f"{module.name}: {', '.join(given)} given with an equilibrium, which has its own; leave them out")
         selection = holding(at.selection, hold)
         return of_manifold(Manifold(in_motion(at.place, selection), selection), period)
+    speeds = {str(getattr(k, "name", k)) for k in fixed} & set(module.metadata["u"]) if isinstance(fixed, Mapping) else set()
+    if start is not None and period is None and not speeds:
+        rest = equilibrium(module, free, fixed, start, params, t, inputs)
+        return of_manifold(Manifold(in_motion(rest.place, holding(rest.selection, hold)), holding(rest.selection, hold)))
+    guess = start is not None or at is None
     if start is not None:
         at = start
     if at is None and isinstance(fixed, Mapping):
         at = _still(module)
-    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold, guess)
     return of_manifold(Manifold(place, selection), period)
 
 
@@ -119,13 +129,22 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
     """
     place = manifold.place
     title = f"{place.module.name}: stability"
+    if not manifold.n_d + manifold.n_s + len(manifold.states):
+        nothing = np.zeros(0, dtype=complex)
+        return Stability(title, "", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
+                         (*held_note(manifold), WORDS[""]), manifold.selection.held, None)
     singular = singular_configuration(place)
     if singular:
         nothing = np.zeros(0, dtype=complex)
         return Stability(title, "not decided", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
                          (*held_note(manifold), singular), manifold.selection.held, None)
     steady = steadiness(manifold)
-    length = period if period is not None else common_period(manifold)
+    if period is not None and fastest(place) * period > 2 * np.pi * MOST_TURNS:
+        raise ArgumentError(f"{place.module.name}: a period of {period:g} s is more than {MOST_TURNS} turns of the fastest "
+                            "speed; pass the period of the motion")
+    length = period if period is not None else found_period(manifold)
+    if steady.kind == "rest" and not depends_on_time(place):
+        return _constant(manifold, steady.kind, title)
     if steady.kind and length is None:
         return _constant(manifold, steady.kind, title)
     if length is None:
@@ -139,6 +158,8 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
         return _turned(course, change, steady.kind, title, seen_by) if change else _named(course, steady.kind, title, seen_by)
     if accelerating(place, manifold) or any(accelerating(node.place, node) for node in follow(manifold, length, False).nodes):
         course, kind = closed_course(manifold, length, monodromy), "periodic motion"
+        if not any(accelerating(node.place, node) for node in course.nodes):
+            kind = "steady motion" if course.first.place.u.any() else "rest"
     else:
         course, kind = follow(manifold, length), "steady motion" if place.u.any() else "rest"
     change = constant_change(course)
@@ -146,7 +167,9 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
               np.array([*[node.place.x for node in course.nodes], course.last.x]))
     seen_by = Observer(course, rotating)
     found = _periodic(course, kind, title, seen_by) if change is None else _turned(course, change, kind, title, seen_by)
-    return replace(found, motion=motion)
+    moved = float(np.abs(course.first.place.x - place.x).max(initial=0.0))
+    said = (found.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state", *found.evidence[1:])
+    return replace(found, motion=motion, evidence=said if moved else found.evidence)
 
 
 def _constant(manifold: Manifold, kind: str, title: str) -> Stability:
@@ -180,12 +203,14 @@ def _turned(course: Course, change: Change, kind: str, title: str, observer: Obs
     found = spectrum(course.reduced(course.A[0] - change.S), analysis.noise.A.plus(np.abs(L) @ change.error @ np.abs(T)),
                      driven=lambda right, left: analysis.driven(right, left, S, ROUNDED * 2 * np.pi / course.period))
     turned = bool(np.abs(change.S).max(initial=0.0) > 1e-9 * np.abs(course.A).max(initial=0.0))
-    powers = [scipy.linalg.expm(change.S * t) for t in course.times]
+    powers = np.array([scipy.linalg.expm(change.S * t) for t in course.times])
+    n_d = course.sizes[0]
+    fixed = turned and observer.in_fixed_axes(powers[:, :n_d, :n_d])
 
     def shape(k: int) -> np.ndarray:
         return np.array([P @ course.widened(found.right[:, k]) for P in powers])
 
-    values, seen = _as_seen(observer, settled_values(found), shape, turned)
+    values, seen = _as_seen(observer, settled_values(found), shape, fixed)
     how = "after a change of variables that turns steadily" if turned else "along the motion in the coordinates of the model"
     evidence = (f"{kind}, period {course.period:.6g} s",
                 f"the linear equations are constant {how}, checked at {len(course.nodes)} positions to "
@@ -230,13 +255,33 @@ def _finished(course: Course, found: Spectrum, values: np.ndarray, seen: list[Se
 def _as_seen(observer: Observer, values: np.ndarray, shape: Callable[[int], np.ndarray],
              fixed: bool) -> tuple[np.ndarray, list[Seen]]:
     """Exponents with the multiple of the frequency that their largest harmonic has, and the harmonics counted from there."""
-    shifted, found = values.astype(complex), []
-    for k in range(len(values)):
+    shifted = values.astype(complex)
+    found: dict[int, Seen] = {}
+    for k in np.argsort(-values.imag, kind="stable").tolist():
+        partner = _partner(values, k)
+        if partner in found and partner != k:  # the two of a pair are seen alike, with opposite signs
+            other = found[partner]
+            main = round(float((shifted[partner] - values[partner]).imag * observer.course.period / (2 * np.pi)))
+            shifted[k] -= 2j * np.pi / observer.course.period * main
+            found[k] = Seen(tuple((-multiple, share) for multiple, share in other.harmonics), other.whirl)
+            continue
         seen = observer.seen(shape(k), fixed)
         main = seen.harmonics[0][0]
         shifted[k] += 2j * np.pi / observer.course.period * main
-        found.append(Seen(tuple((multiple - main, share) for multiple, share in seen.harmonics), seen.whirl))
-    return shifted, found
+        found[k] = Seen(tuple((multiple - main, share) for multiple, share in seen.harmonics), seen.whirl)
+    return shifted, [found[k] for k in range(len(values))]
+
+
+def _partner(values: np.ndarray, k: int) -> int:
+    """The place of the complex conjugate of a value; k of a real one. Of equal ones the one with the same rank among them."""
+    value = values[k]
+    if abs(value.imag) <= 1e-12 * abs(value) or not value.imag:
+        return k
+    tolerance = 1e-9 * abs(value)
+    alike = [j for j in range(len(values)) if abs(values[j] - value) <= tolerance]
+    conjugate = [j for j in range(len(values)) if abs(values[j] - value.conjugate()) <= tolerance]
+    rank = alike.index(k)
+    return conjugate[rank] if rank < len(conjugate) else k
 
 
 def _relative(change: Change, course: Course) -> float:
@@ -249,16 +294,34 @@ def _return(course: Course) -> float:
     return float(np.abs(course.after - course.A[0]).max(initial=0.0) / max(np.abs(course.A).max(initial=0.0), 1e-300))
 
 
-def common_period(manifold: Manifold) -> float | None:
-    """A period of what turns: 2 pi over the speed, of several speeds the least common one; None if there is none."""
+def found_period(manifold: Manifold) -> float | None:
+    """The period of speeds that are held; else one after which the motion is where it was, of all that turns or of parts of it.
+
+    None where there is none: a motion that nothing holds is not moved onto one of another period.
+    """
     place = manifold.place
     metadata = place.module.metadata
     labels = coordinate_names(metadata)
-    speeds = [abs(float(u)) for u, name, label in zip(place.u, metadata["u"], labels, strict=True)
-              if u and metadata["units"].get(label, metadata["units"].get(name)) in ("rad", "rad/s")
-              and (name in manifold.selection.held or label in manifold.selection.held)]
-    if not speeds:
-        speeds = [float(w) for w in spinning(manifold) if w > 0]
+    turning = {name: abs(float(u)) for u, name, label in zip(place.u, metadata["u"], labels, strict=True)
+               if u and metadata["units"].get(label, metadata["units"].get(name)) in ("rad", "rad/s")}
+    held = [speed for (name, speed), label in ((each, labels[metadata["u"].index(each[0])]) for each in turning.items())
+            if name in manifold.selection.held or label in manifold.selection.held]
+    if held:
+        return common_period(held)
+    bodies = [float(w) for w in spinning(manifold) if w > 0]
+    candidates = [common_period([*turning.values()]), common_period(bodies),
+                  *[2 * np.pi / speed for speed in sorted({*turning.values(), *bodies})]]
+    for candidate in dict.fromkeys(c for c in candidates if c is not None):
+        try:
+            if comes_back(follow(manifold, candidate, closed=False)):
+                return candidate
+        except (ArgumentError, EvaluationError, NoEquilibrium):
+            continue
+    return None
+
+
+def common_period(speeds: Sequence[float]) -> float | None:
+    """2 pi over a speed, of several speeds the least common period; None if there is none."""
     if not speeds:
         return None
     largest = max(speeds)

@@ -69,7 +69,7 @@ def steadiness(manifold: Manifold) -> Steadiness:
 
 
 def accelerating(place: Place, manifold: Manifold) -> str:
-    """The largest acceleration, or rate of an extra state, that is more than rounding beside what single loads make; "" if
+    """The largest acceleration, or rate of an extra state, that is more than rounding of what single loads make; "" if
     none."""
     metadata = place.module.metadata
     names = [*metadata["parameters"], *metadata["inputs"]]
