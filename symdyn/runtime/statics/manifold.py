@@ -32,6 +32,8 @@ from symdyn.runtime.statics.terms import Place, coordinate_names, null_space
 UNIT_ROW = 1e-13
 # Dependent changes may be this many times the independent ones where a choice is to serve along a motion.
 SERVES = 30.0
+# Masses below this part of the largest are none.
+MASSLESS = 1e-6
 # Independent velocities that determine the others worse than by this condition are rejected.
 CONDITION = 1e8
 
@@ -382,6 +384,13 @@ def natural_length(place: Place) -> float:
     return float(np.sqrt(masses[turns].max(initial=0.0) / masses[~turns].max())) or 1.0
 
 
+def acceleration_size(place: Place, forces: np.ndarray) -> float:
+    """The largest acceleration that forces make of what has mass, in natural units of displacements, 1/s^2."""
+    masses = np.abs(np.diag(place.M))
+    heavy = masses > MASSLESS * masses.max(initial=0.0)
+    return float((forces[heavy] / masses[heavy] / natural_scales(place)[heavy]).max(initial=0.0))
+
+
 def in_motion(place: Place, selection: Selection) -> Place:
     """The place with the accelerations of its motion, what is held being held, and multipliers of least norm."""
     place = place.at(ud=np.zeros(place.sizes[1]), lam=np.zeros(place.sizes[3]))
@@ -399,12 +408,14 @@ def in_motion(place: Place, selection: Selection) -> Place:
         elif name in metadata["u"]:
             rows.append(np.eye(n_u)[[metadata["u"].index(name)]])
             right.append(np.zeros(1))
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(place.M)), 1e-12 * np.abs(place.M).max(initial=1e-300)))
+    masses = np.abs(np.diag(place.M))
+    scale = 1 / np.sqrt(np.maximum(masses, MASSLESS * masses.max(initial=1e-300)))
     A = np.vstack(rows) * scale
     KKT = np.block([[place.M * np.outer(scale, scale), A.T], [A, np.zeros((len(A), len(A)))]])
     found = np.linalg.lstsq(KKT, np.concatenate([-place.forces * scale, *right]), rcond=1e-12)[0]
     ud = scale * found[:n_u]
     # Rest is rest: rounding is no motion.
-    level = max(np.abs(scale * place.forces).max(initial=0.0), np.abs(np.concatenate(right)).max(initial=0.0))
-    ud = np.where(np.abs(found[:n_u]) <= 1e-13 * max(level, 1e-300), 0.0, ud)
+    sizes = natural_scales(place)
+    level = max(acceleration_size(place, np.abs(place.forces)), float(np.abs(np.concatenate(right)).max(initial=0.0)))
+    ud = np.where(np.abs(ud / sizes) <= 1e-13 * level, 0.0, ud)
     return place.at(ud=ud, lam=found[n_u:n_u + n_c] * place.scale)

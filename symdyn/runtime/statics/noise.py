@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse.csgraph
 
 from symdyn.runtime.statics.manifold import Manifold, in_motion, natural_length, natural_scales
 from symdyn.runtime.statics.spectrum import Unknown
@@ -22,6 +23,8 @@ SAMPLES, SAFETY = 4, 4.0
 # Units in the last place by which data differ, and those of the entries themselves.
 DATA, ENTRIES = 1.0, 4.0
 EPSILON = float(np.finfo(float).eps)
+# Units in the last place of the largest entry among states that act on each other, for what is left of it.
+FLOOR = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,35 @@ def noise(manifold: Manifold) -> Noise:
     direct[rates] = 0.0
     inverse = np.zeros_like(A)
     inverse[rates] = np.abs(np.diag(1 / np.diag(manifold.M))) @ np.hstack([of_K, of_C, of_z])
-    return Noise(Unknown(direct, L, F, M, S, A + inverse), C, K)
+    floor = _floor(manifold, A + inverse)
+    return Noise(Unknown(direct + floor, L, F, M, S, A + inverse + floor), C, K)
+
+
+def _floor(manifold: Manifold, rounding: np.ndarray) -> np.ndarray:
+    """Rounding of entries that are left of larger ones that cancel: a part of the largest among the states that act on each
+    other,
+    displacements and times in natural units; exact zeros are left alone."""
+    A = np.abs(manifold.matrices[0])
+    n_d, n_s = manifold.n_d, manifold.n_s
+    if not A.size:
+        return A
+    lengths = natural_scales(manifold.place) * natural_length(manifold.place)
+    sizes = np.concatenate([lengths[manifold.displacements], lengths[manifold.speeds], np.ones(len(manifold.states))])
+    scaled = A * sizes / sizes[:, None]
+    rates = np.zeros(len(A), dtype=bool)
+    rates[n_d:n_d + n_s] = True
+    found = np.zeros_like(A)
+    _, parts = scipy.sparse.csgraph.connected_components(rounding < A, directed=False)
+    for part in np.unique(parts):
+        inner = parts == part
+        stiff = float(scaled[np.ix_(inner & rates, inner & ~rates)].max(initial=0.0))
+        quick = float(scaled[np.ix_(inner & rates, inner & rates)].max(initial=0.0))
+        clock = max(float(np.sqrt(stiff)), quick) or 1.0
+        units = sizes * np.where(rates, clock, 1.0)
+        among = np.ix_(inner, inner)
+        largest = float((A * units / units[:, None])[among].max(initial=0.0))
+        found[among] = (FLOOR * EPSILON * largest * units[:, None] / units)[among]
+    return np.asarray(np.where(A > 0, found, 0.0))
 
 
 def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,7 +16,14 @@ import scipy.integrate
 
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.constraints import turning
-from symdyn.runtime.statics.manifold import Manifold, common_partition, in_motion, natural_length, natural_scales
+from symdyn.runtime.statics.manifold import (
+    Manifold,
+    acceleration_size,
+    common_partition,
+    in_motion,
+    natural_length,
+    natural_scales,
+)
 from symdyn.runtime.statics.terms import Place, rest
 
 # Positions further on: so many radians, or lengths of the mechanism, of the fastest speed; and seconds, where time counts.
@@ -78,12 +85,11 @@ def accelerating(place: Place, manifold: Manifold) -> str:
     acting = by[place.parts["forces"]]
     if place.sizes[3]:
         acting = acting + np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(place.M)), 1e-12 * np.abs(place.M).max(initial=1e-300)))
     # Where single loads vanish, too, rounding of what a radian, or the natural length, would bring about.
     lengths = natural_scales(place) * natural_length(place)
     acting = acting + ROUNDING / STILL * (np.abs(place.by_v[place.parts["forces"]]) @ lengths)
-    level = float(np.abs(acting * scale).max(initial=0.0))
-    sizes = np.abs(place.ud / scale)
+    level = acceleration_size(place, acting)
+    sizes = np.abs(place.ud / natural_scales(place))
     if sizes.max(initial=0.0) > STILL * level:
         k = int(np.argmax(sizes))
         return f"{metadata['u'][k]} changes by {place.ud[k]:.4g} a second"
