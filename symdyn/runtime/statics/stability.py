@@ -311,6 +311,8 @@ def found_period(manifold: Manifold) -> float | None:
     bodies = [float(w) for w in spinning(manifold) if w > 0]
     candidates = [common_period([*turning.values()]), common_period(bodies),
                   *[2 * np.pi / speed for speed in sorted({*turning.values(), *bodies})]]
+    if not place.u.any():
+        return None
     longest = 2 * np.pi * WHOLE / fastest(place)
     for candidate in dict.fromkeys(c for c in candidates if c is not None and c <= longest):
         try:
