@@ -237,7 +237,7 @@ def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[
 
 
 def _scaled_size(linear: Averaged) -> np.ndarray:
-    """The spread of the state matrix beside its largest entry, metres and radians on one footing."""
+    """The spread of the state matrix relative to its largest entry, metres and radians on one footing."""
     weights = np.sqrt(np.abs(np.diag(linear.M)))
     scale = np.concatenate([weights, weights])
     A = np.abs(linear.A()) * (scale[:, None] / scale)

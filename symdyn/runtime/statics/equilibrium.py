@@ -432,7 +432,7 @@ def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np
 
 
 def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (k, n) along which K is zero as far as rounding tells, and its singular values."""
+    """Directions (k, n) along which K is zero but for rounding, and its singular values."""
     if not len(K):
         return np.zeros((0, 0)), np.zeros(0)
     rows, sums = np.abs(K).max(axis=1), np.abs(K).max(axis=0)
@@ -489,7 +489,7 @@ def _demand_lasting(trial: Trial) -> None:
                     f"{place.module.name}: no steady motion: the forces balance at this position, but not further on: after "
                     f"{later.t - place.t:.4g} s {changed}. The motion with the given speeds is periodic at best: "
                     "module.stability(fixed={...}) finds it and judges it")
-    except (EvaluationError, ArgumentError):  # a position further on that the mechanism cannot reach is told by the verdict
+    except (EvaluationError, ArgumentError):  # a position further on that the mechanism cannot reach is reported by the verdict
         return
 
 
