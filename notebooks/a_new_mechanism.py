@@ -170,7 +170,7 @@ times = np.array([0, ramp, ramp + cruise, 2 * ramp + cruise])
 speeds = np.array([0, speed, speed, 0])
 stop = times[-1]
 
-move = module.simulate(np.linspace(0, 25, 1001), still, inputs=(times, speeds))
+move = module.simulate(np.linspace(0, 25, 1001), still, inputs=(times, speeds), extend="hold")
 print(move)
 move.plot()
 
@@ -184,7 +184,7 @@ move.plot()
 swings = {}
 figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
 for length in (4.0, 6.0, 8.0):
-    run = module.simulate(move.t, {**still, "r": length + sag}, params={l: length}, inputs=(times, speeds))
+    run = module.simulate(move.t, {**still, "r": length + sag}, params={l: length}, inputs=(times, speeds), extend="hold")
     swing = run.outputs["container"][:, 0] - run.q[:, 0]
     swings[length] = np.abs(swing[run.t > stop]).max()
     axes.plot(run.t, swing, label=f"l = {length:g} m")

@@ -205,7 +205,7 @@ assert difference < 1e-7
 omega = sp.Symbol("omega")
 inclination = omega * sd.t
 slope = sd.embedding([q1], [q1 * sp.cos(inclination), -q1 * sp.sin(inclination)], [m, m], weight, name="slope_in_motion")
-r_t = sp.Matrix(slope.explicit("r")).diff(sd.t)
+r_t = sd.partial_rate(sp.Matrix(slope.explicit("r")))
 virtual = sp.simplify((slope.J.T * slope.F_c)[0])
 power = sp.simplify((r_t.T * slope.F_c)[0])
 display(Math(rf"\mathbf J^T \mathbf F^c = {latex(virtual)} \qquad \mathbf r_t^T \mathbf F^c = {latex(power)}"))

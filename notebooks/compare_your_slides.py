@@ -42,8 +42,8 @@ sd.compare(sd.Case("pendulum", printed={
 
 # %% [markdown]
 # An entry is equal if it is the same after renaming, if the difference vanishes by limited simplification, or if it vanishes at
-# five random points with 50 digits. One point where the values differ decides that entries are different; the text form tells
-# which. That a simplification did not finish decides nothing.
+# random points of many sizes with 50 digits. One point where the values differ decides that entries are different; the text form
+# reports it. That a simplification did not finish decides nothing.
 
 # %% [markdown]
 # ## 2. Places, other letters, states

@@ -11,8 +11,9 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "symdyn.model.symbols": ("coordinates", "inputs", "parameters", "speeds"),
-    "symdyn.model.bodies": ("acceleration", "bias_acceleration", "jacobian", "position", "velocity"),
+    "symdyn.model.symbols": ("coordinates", "inputs", "parameters", "partial_rate", "speeds"),
+    "symdyn.model.points": ("acceleration", "bias_acceleration", "jacobian", "position", "velocity"),
+    "symdyn.model.quantity": ("angular_velocity", "distance", "multiplier", "reaction", "rotation_matrix"),
     "symdyn.model.joints": ("Custom", "Cylindrical", "Fixed", "Free", "Helical", "Planar", "Prismatic", "Revolute",
                             "Spherical", "Universal"),
     "symdyn.model.elements.added_mass": ("AddedMass",),
@@ -21,7 +22,9 @@ _HOME = {
                               "WaveExcitation"),
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
     "symdyn.model.external": ("External",),
+    "symdyn.runtime.inputs": ("Smooth",),
     "symdyn.model.system": ("System",),
+    "symdyn.runtime.sampled": ("Sampled",),
     "symdyn.formulation.explicit": ("embedding",),
     "symdyn.formulation.explicit_augmented": ("augmented",),
     "symdyn.report.full": ("full_report",),
@@ -32,11 +35,12 @@ _HOME = {
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
-    "symdyn.errors": ("ArgumentError", "CaseError", "CompileError", "CompilerNotFound", "EnsembleStopped",
-                      "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock", "MissingExtra",
-                      "ModelError", "ModelWarning", "NoEquilibrium", "NotARotation", "NotNormalized", "RotationError",
-                      "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase", "UnsupportedExpression",
-                      "ZeroAxis"),
+    "symdyn.runtime.tables": ("Table",),
+    "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",
+                      "EnsembleStopped", "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock",
+                      "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium", "NotARotation", "NotNormalized",
+                      "RotationError", "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase",
+                      "UnsupportedExpression", "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {

@@ -17,8 +17,10 @@ from symdyn.formulation.augmented import augment
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.recursion import recursive
+from symdyn.kinds import flag
 from symdyn.model.record import Model, joint_speeds
 from symdyn.pipeline import function_tape
+from symdyn.shown import shown
 from symdyn.tape.cycles import WIDTH, Schedule, schedule
 from symdyn.tape.node import PARAMETER
 from symdyn.tape.ops import OPERATIONS
@@ -102,7 +104,7 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto", coordina
     The result's `candidates` is the table. Raises ModelError as the formulations do; CompilerNotFound if there is no
     compiler to tune with.
     """
-    if tune:
+    if flag(tune, "tune"):
         from symdyn.runtime.compiler import require_compiler
 
         require_compiler()
@@ -131,11 +133,12 @@ def formulated(system: System, formulation: str = "auto", tune: bool = False,
     coordinates   of the augmented formulation, see System.augmented; absolute ones imply it
     Raises SymdynError for an unknown name, and for absolute coordinates of another formulation.
     """
-    if formulation not in FORMULATIONS:
-        raise SymdynError(f"formulation {formulation!r} asked for; there are {', '.join(FORMULATIONS)}")
-    if coordinates != "relative":
+    if not isinstance(formulation, str) or formulation not in FORMULATIONS:
+        raise SymdynError(f"formulation {shown(formulation)} asked for; there are {', '.join(FORMULATIONS)}")
+    if not isinstance(coordinates, str) or coordinates != "relative":
         if formulation not in ("auto", "augmented"):
-            raise SymdynError(f"coordinates {coordinates!r} asked for with the formulation {formulation!r}; they are for "
+            raise SymdynError(f"coordinates {shown(coordinates)} asked for with the formulation {shown(formulation)}; they are "
+                              "for "
                               "'augmented' alone")
         formulation = "augmented"
     if tune or formulation == "auto":

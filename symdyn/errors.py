@@ -32,6 +32,14 @@ class CompileError(SymdynError):
     """A C compiler rejected generated code, or the library it built cannot be loaded."""
 
 
+class CacheError(CompileError):
+    """Generated code cannot be kept in the cache folder: the disk is full, or something else has its name."""
+
+
+class CacheWarning(UserWarning):
+    """The cache folder is open to others, so that nothing is loaded from it; the message names the folder that is used."""
+
+
 class CompilerNotFound(SymdynError):
     """There is no usable C compiler, or not the one that was asked for."""
 

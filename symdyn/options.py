@@ -6,6 +6,8 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from symdyn.shown import shown
+
 
 def wrong_option(name: str, function: Callable[..., Any], options: Mapping[str, Any]) -> str:
     """Of the first option that a function does not take, or not of this kind, what is wrong; empty if all are right.
@@ -18,11 +20,11 @@ def wrong_option(name: str, function: Callable[..., Any], options: Mapping[str, 
     for key, value in options.items():
         if key not in known:
             takes = ", ".join(f"{p.name}={p.default}" for p in known.values() if p.default is not p.empty)
-            return f"{name} has no option {key!r}; it has {takes or 'none'}"
+            return f"{name} has no option {shown(key)}; it has {takes or 'none'}"
         default = known[key].default
         kinds: tuple[type, ...] = (int, float) if type(default) is float else (type(default),)
         if isinstance(default, (bool, int, float, str)) and type(value) not in kinds:
-            return f"option {key} of {name} must be of the kind {type(default).__name__}, such as {default}; found {value!r}"
+            return f"option {key} of {name} must be of the kind {type(default).__name__}, such as {default}; found {shown(value)}"
     return ""
 
 

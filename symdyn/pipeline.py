@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn import kinds
 from symdyn.backend.methods import method_of
 from symdyn.backend.source import CORRECTIONS, Content, Source, render
 from symdyn.collector import collector_paused
@@ -29,8 +30,11 @@ from symdyn.runtime.arguments import some
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
 from symdyn.runtime.methods import split_name
 from symdyn.runtime.module import Module
+from symdyn.runtime.paths import as_path
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+from symdyn.shown import name_of, shown
 from symdyn.tape.balance import balance
+from symdyn.tape.jumps import Jump, description, jumps
 from symdyn.tape.node import Node
 from symdyn.tape.passes import specialize as specialize_tape
 from symdyn.tape.tape import Output, Tape
@@ -62,6 +66,8 @@ FUNCTIONS = {
     "F_d": ("F_d", "right side of C_r u_dot = F_d"),
     "lam": ("lam", "multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde"),
     "reactions": ("reactions", "force and moment of every joint on its child, at the joint's point on it, n-frame"),
+    "cut_loads": ("cut_loads", "the whole load in every joint: its reaction, and what acts along its speeds, likewise"),
+    "ground_rotation": ("ground_rotation", "rotation of the ground's frame, which moves, to the n-frame"),
     "reactions_by_lam": ("reactions_by_lam", "derivatives of the reactions, row by row, by the multipliers"),
     "C_scale": ("C_scale", "factors that make every constraint a length"),
     "length": ("length", "the mechanism's length, m"),
@@ -78,11 +84,15 @@ FUNCTIONS = {
     "watches": ("watches", "values that loads want to be looked at: draft, tilt and the like"),
     "events": ("events", "what vanishes at the events, in their order"),
     "event_resets": ("event_resets", "what entries of the state become at events that reset them"),
+    "switches": ("switches", "what passes zero where the right-hand side may jump"),
     "drawn_lengths": ("drawn_lengths", "lengths in pictures that follow from parameters, m"),
     "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
     "jacobian_inputs": ("jacobian_inputs", "exact derivative of x_dot by the inputs"),
     "jacobian_params": ("jacobian_params", "exact derivative of x_dot by the parameters"),
+    "input_matrix": ("input_matrix", "exact derivative of F_tilde by the inputs"),
 }
+# What the header adds where there are constraints, which these functions leave out.
+OF_THE_CUT_TREE = {"inverse_dynamics": ", of the tree: loops cut, without constraints"}
 # Of statics and linearization, compiled together, with what they are used with; the headers' words.
 STATICS = {
     "balance": "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot; C_dot; C_ddot; q_dot; q_ddot]; ud: u_dot, lam",
@@ -112,7 +122,7 @@ OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
-         batch: bool = False, method: str = "dop853") -> Source:
+         batch: bool = False, method: str = "dop853", states: int = 2) -> Source:
     """The source of the named functions (default: STANDARD and OF_CONSTRAINTS, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -120,6 +130,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
     batch        C only: also rhs and integrator of many states at once, a state in each lane of the processor's vectors
     method       C only: the integrator's, one of symdyn.backend.methods.METHODS; what it needs besides rhs is emitted with it
+    states       how many random states the reference vectors of a standalone source begin with
 
     Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
     """
@@ -127,22 +138,32 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         equations = equations.again()
     bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
     usual = (*STANDARD, *(OF_CONSTRAINTS if equations.constraints else ()))
+    listed = isinstance(functions, (list, tuple)) and functions and all(isinstance(n, str) for n in functions)
+    if functions is not None and not listed:
+        raise SymdynError(f"{equations.name}: functions is {shown(functions)}; pass a list of names such as "
+                          "['rhs', 'mass_matrix']")
+    kinds.text(backend, f"{equations.name}: the backend", "c")
+    method_of(method)
+    if templates is not None:
+        as_path(templates, "of the templates", "my_templates")
     names = tuple(functions) if functions is not None else tuple(n for n in usual if has_function(equations, n))
     if integrator and "rhs" in names and backend == "c":
         names = tuple(dict.fromkeys((*names, *method_of(method).needs)))
     unknown = [n for n in names if not has_function(equations, n)]
     if unknown:
         there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
-        raise SymdynError(f"{equations.name} has no function {', '.join(unknown)}; it has {there}")
+        raise SymdynError(f"{equations.name} has no function {', '.join(n[:80] for n in unknown)}; it has {there}")
     with collector_paused():
         content = _content(equations, names, standalone, bound, work, baumgarte)
-        return render(content, backend, templates, standalone, integrator, batch, method)
+        return render(content, backend, templates, standalone, integrator, batch, method, states)
 
 
 def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
     if name == "outputs":
         return any(q.startswith("output_") for q in equations.quantities)
+    if name == "switches":
+        return bool(switches(equations))
     return _quantity(name) in equations.quantities
 
 
@@ -163,12 +184,14 @@ def compile_equations(equations: Equations, backend: str | None = None, template
     Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
     """
     fallback = ""
-    compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
+    if templates is not None:
+        as_path(templates, "of the templates", "my_templates")
+    compiler = require_compiler() if isinstance(backend, str) and backend == "c" else find_compiler() if backend is None else None
     if backend is None:
         backend = "c" if compiler is not None else "numpy"
         fallback = "" if compiler is not None else no_compiler_reason()
-    if backend not in ("c", "numpy"):
-        raise SymdynError(f"backend {backend!r} asked for; modules can be loaded from 'c' and 'numpy'; "
+    if not isinstance(backend, str) or backend not in ("c", "numpy"):
+        raise SymdynError(f"backend {shown(backend)} asked for; modules can be loaded from 'c' and 'numpy'; "
                           "emit() writes source for others")
 
     def source_of(name: str) -> Source:
@@ -180,8 +203,9 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 group = (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
             return emit(equations, backend, group, templates, standalone=False, specialize=specialize)
         needed = ("rhs", *CORRECTIONS) if equations.constraints else ("rhs",)
-        if name == "rhs" and "watches" in equations.quantities:  # looked at after every simulation
-            needed = (*needed, "watches")
+        if name == "rhs":  # looked at in or after every simulation
+            needed = (*needed, *(["watches"] if "watches" in equations.quantities else []),
+                      *(["switches"] if switches(equations) else []))
         needed = (*needed, *(n for n in ("events", "event_resets") if n in equations.quantities))
         field, method = split_name(name)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in field,
@@ -213,11 +237,13 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "reaction_bodies": [[parent, child] for _, parent, child, _ in equations.joints],
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
+                "implicit_loads": list(equations.implicit_loads), "of_reactions": list(equations.of_reactions),
                 "charts": [list(chart) for chart in equations.charts],
                 "masses": {p.name: body for p, body in equations.symbols.masses.items()},
                 "output_units": dict(equations.symbols.point_units),
                 "events": event_records(equations),
                 "not_smooth": not_smooth(equations.quantity("rhs").tolist()),
+                "switches": [description(jump, equations.printed_leaves()) for jump in switches(equations)],
                 "watches": [[w.label, w.least, w.most, w.message] for w in equations.watched()],
                 "functions": [n for n in FUNCTIONS if has_function(equations, n)],
                 "conservative": "power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node)}
@@ -267,7 +293,8 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * baumgarte]}
     outputs = [(n, tuple(shape)) for n, shape in output_shapes(equations)] if "outputs" in names else []
     told = {**{n: title for n, (_, title) in FUNCTIONS.items()}, **STATICS, **VARIATIONS, **DERIVATIVES}
-    titles = {n: told.get(n, n) for n in names}
+    cut = OF_THE_CUT_TREE if equations.constraints else {}
+    titles = {n: told.get(n, n) + cut.get(n, "") for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
@@ -310,6 +337,11 @@ def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
     return given
 
 
+def switches(equations: Equations) -> list[Jump]:
+    """Where the right-hand side may jump along a motion."""
+    return jumps(equations.recorder, equations.quantity("rhs").tolist())
+
+
 def function_tape(equations: Equations, name: str) -> Tape:
     """The tape behind a function of a module, as it is emitted."""
     return balance(tape_as_derived(equations, name))
@@ -317,6 +349,9 @@ def function_tape(equations: Equations, name: str) -> Tape:
 
 def tape_as_derived(equations: Equations, name: str) -> Tape:
     """The quantities that a function of a module returns."""
+    if name == "switches":
+        surfaces = np.array([jump.surface for jump in switches(equations)], dtype=object)
+        return Tape(equations.recorder, {name: Output.of(name, surfaces)})
     if name != "outputs":
         return equations.tape(_quantity(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
@@ -332,6 +367,6 @@ def _together(tapes: Mapping[str, Tape], change: Callable[[Tape], Tape]) -> dict
 
 
 def _by_name(values: Any) -> dict[str, float]:
-    return {str(getattr(key, "name", key)): float(value) for key, value in values.items()}
+    return {name_of(key): float(value) for key, value in values.items()}
 
 

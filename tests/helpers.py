@@ -16,6 +16,7 @@ import pytest
 import sympy as sp
 
 from symdyn.formulation.equations import Equations
+from symdyn.model.symbols import symbols_of
 from symdyn.tape import Node, Tape
 from symdyn.tape.evaluate import evaluate
 
@@ -86,7 +87,7 @@ def exact(tape: Tape, name: str, values: Mapping[str, Fraction]) -> Fraction:
 
 def in_sympy(expression: sp.Expr, values: Mapping[str, Fraction], digits: int = 40) -> Any:
     """A SymPy expression in numbers, as mpmath's."""
-    at = {s: sp.Rational(values[s.name].numerator, values[s.name].denominator) for s in expression.free_symbols}
+    at = {s: sp.Rational(values[s.name].numerator, values[s.name].denominator) for s in symbols_of(expression)}
     value = sp.N(expression.doit().xreplace(at), digits, maxn=200)
     with mpmath.workdps(digits):
         return mpmath.mpf(str(value)) if value.is_real else complex(value)

@@ -153,3 +153,19 @@ def split_by_fixed_joint(split: bool) -> sd.System:
     if split:
         s.add_joint(sd.Fixed("weld", second, s.add_body("third", mass=n, com=[2 * b, 0])))
     return s
+
+
+def four_bar_linkage() -> sd.System:
+    """The four-bar linkage of the README: 0.125 m open at its initial angles."""
+    q1, q2, q3 = sd.coordinates("q1:4")
+    g, m, l1, l2, l3, d = sd.parameters("g m l1 l2 l3 d", positive=True)
+    s = sd.System("linkage", gravity=[0, -g])
+    parent, at = s.ground, [0, 0]
+    for hinge, q, l in zip("ABC", (q1, q2, q3), (l1, l2, l3), strict=True):
+        bar = s.add_body(f"bar {hinge}", mass=m, inertia=m * l**2 / 12, com=[l / 2, 0])
+        s.add_joint(sd.Revolute(hinge, parent, bar, q, parent_point=at))
+        parent, at = bar, [l, 0]
+    s.close_loop(sd.Revolute("D", s.ground, bar, parent_point=[d, 0], child_point=at))
+    s.defaults = {g: 9.81, m: 1, l1: 0.8, l2: 1.8, l3: 1.6, d: 2}
+    s.initial = {q1: 1, "q2": -0.5, q3: -2}
+    return s

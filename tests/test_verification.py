@@ -6,6 +6,9 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.lab import wrong_equations
+from symdyn.verification import checks_of, judged
+from symdyn.verification.states import samples
 
 PRINTED = {
     "M_tilde": ["kinetic energy is quadratic"],
@@ -256,3 +259,49 @@ def test_a_wrong_reaction_of_one_joint_is_found(linkage):
         wrong[k] = -wrong[k]
         spoilt = dataclasses.replace(linkage, _recorded={**linkage._recorded, "reactions": wrong}, _printed={})
         assert "reactions, loads and weight move every body" in failed_of(spoilt)
+
+
+# -- false alarms, and what must be found all the same
+
+
+@pytest.mark.parametrize("make", wrong_equations.SYSTEMS, ids=lambda make: make.__name__)
+def test_right_equations_raise_no_alarm_and_wrong_ones_are_found(make):
+    """Rotations and beams in doubles, coordinates that drive others, loops, named speeds; a few of the wrong entries each."""
+    tally = wrong_equations.sweep(make(), quantities=("k_tilde", "energy", "F_d"), every=9)
+    assert tally.alarms == [] and tally.accepted == []
+    assert tally.found == tally.tried and tally.found.total() >= 2
+
+
+def test_what_rounding_of_constants_explains_is_reported():
+    result = wrong_equations.chain().verify(states=1)
+    checks = {check.name: check for check in result.checks}
+    work = checks["kinetic energy is quadratic in u with M_tilde"]
+    assert result.passed and "constants are rounded to doubles" in str(result)
+    assert 1e-20 < work.residual < 1e-15 and work.residual < work.tolerance < 1e-13
+
+
+def test_lost_digits_are_told_from_wrong_equations():
+    """A mass matrix of the condition 1e24: at 30 digits the accelerations have six."""
+    q1, q2 = sd.coordinates("q1 q2")
+    system = sd.System("light", gravity=[0, -10, 0])
+    first = system.add_body("first", mass=1, com=[1, 0, 0])
+    second = system.add_body("second", mass=sp.Rational(1, 10**24), com=[1, 0, 0])
+    system.add_joint(sd.Revolute("j1", system.ground, first, q1))
+    system.add_joint(sd.Revolute("j2", first, second, q2, parent_point=[1, 0, 0]))
+    system.add_joint_force("j2", -q2 / 10**24)
+    drawn = samples(system.embedding(), 1, 30, None, 1)
+    row = next(row for row in checks_of(drawn[0].equations) if row[0].startswith("rate of energy"))
+    judgement = judged(drawn, *row)
+    assert judgement.passed and row[1](drawn[0]) < 1
+
+
+def test_reactions_of_joints_that_drive_others():
+    """The motor of a gear works against what holds the wheel, and the sum of both is zero; a wrong reaction is found."""
+    equations = wrong_equations.geared()
+    check = next(row for row in checks_of(equations) if "do no work" in row[0])
+    drawn = samples(equations, 1, 30, None, 1)
+    assert check[1](drawn[0]) < 1e-18
+    wrong = equations.quantity("reactions") * 1
+    wrong[2, 5] = wrong[2, 5] * (1 + 1e-9)
+    spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, "reactions": wrong}, _printed={})
+    assert check[1](samples(spoilt, 1, 30, None, 1)[0]) > 1e-13

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from symdyn.backend.dialect import Dialect
-from symdyn.tape.evaluate import constant
+from symdyn.tape.evaluate import constant, double
 from symdyn.tape.node import Node
 
 _COMPARE = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
@@ -43,7 +43,7 @@ class Printer:
     def _literal(self, value: Any) -> tuple[str, int]:
         if isinstance(value, bool):
             return self.dialect.number(float(value)), _ATOM
-        number = float(value)
+        number = double(value)
         return (f"-{self.dialect.number(-number)}", _SIGN) if number < 0 else (self.dialect.number(number), _ATOM)
 
     def _negative(self, value: Any) -> tuple[str, int]:

@@ -16,6 +16,7 @@ import jinja2
 import numpy as np
 
 import symdyn
+from symdyn import panels
 from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.function import Function, Part
@@ -26,8 +27,10 @@ from symdyn.backend.user_functions import header as header_of_user_functions
 from symdyn.backend.user_functions import texts as texts_of_user_functions
 from symdyn.errors import SymdynError
 from symdyn.folders import templates_folder
-from symdyn.tape.kernels import CLEANINGS, MASSLESS, ROUNDS, SMOOTHED
+from symdyn.shown import shown
+from symdyn.tape.kernels import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
+from symdyn.turning import is_angle, turns
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
            "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c"}
@@ -93,7 +96,7 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True, batch: bool = False, method: str = "dop853") -> Source:
+           integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2) -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -101,12 +104,13 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     integrator   C only: with the compiled integrator (needs the function rhs)
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
+    states       how many random states the reference vectors begin with
     Raises SymdynError for an unknown backend or a broken template.
     """
     folders = template_folders(templates)
     known = backends(templates)
     if backend not in known:
-        raise SymdynError(f"there is no backend {backend!r}; there are {', '.join(known)}; "
+        raise SymdynError(f"there is no backend {shown(backend)}; there are {', '.join(known)}; "
                           "a folder with a dialect.toml and templates adds one, in the folder that is given as templates")
     folder = next(f / backend for f in folders if (f / backend / "dialect.toml").is_file())
     dialect = read_dialect(folder)
@@ -121,7 +125,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
         lanes = batch_of(shipped.parent, dialect, program, content.tapes, content.titles, places, content.otherwise)
     integrator = integrator and "rhs" in content.tapes
-    context = _context(content, program, dialect, standalone, integrator, lanes, method)
+    context = _context(content, program, dialect, standalone, integrator, lanes, method, states)
     gather = method_of(method).gather
     if integrator and backend == "c" and gather is not None:
         context |= gather(content, program, dialect, places)
@@ -172,7 +176,7 @@ def _template_fault(template: str, error: Exception) -> str:
 
 
 def _context(content: Content, program: Program, dialect: Dialect, standalone: bool, integrator: bool,
-             lanes: Batch | None, method: str) -> dict[str, Any]:
+             lanes: Batch | None, method: str, states: int) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
@@ -180,7 +184,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     name = identifier(content.name, set(sys.stdlib_module_names))
     written = [way for f in program.functions for way in (f, f.regular, f.otherwise) if way is not None]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
-    reference = make_reference(content.tapes, groups, content.defaults, calls) if standalone else None
+    reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if standalone else None
     uses = {f.name: f.arguments for f in program.functions}
 
     def signature(f: Function) -> str:
@@ -217,8 +221,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     projection = None
     if all(n in uses for n in CORRECTIONS):
         projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
-                      "turning": [content.units.get(n) in ("rad/s", "1/s") for n in groups["u"]],
-                      "angles": [content.units.get(n) in ("rad", "1") for n in groups["q"]]}
+                      "turning": [turns(content.units.get(n)) for n in groups["u"]],
+                      "angles": [is_angle(content.units.get(n)) for n in groups["q"]]}
 
     metadata = {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
@@ -239,6 +243,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
         "method": method_of(method), "m": f"{name}_{method}", "has_events": EVENTS in uses, "events": content.events,
+        "panels": panels,
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
@@ -250,7 +255,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "rows_call": rows_call, "shape_text": _shape_text,
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
-        "smoothed": SMOOTHED, "massless": MASSLESS, "rounds": ROUNDS, "cleanings": CLEANINGS,
+        "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call, "arguments_of": uses, "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],

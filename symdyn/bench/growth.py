@@ -85,7 +85,7 @@ def _derive(system: System, formulation: str) -> tuple[Equations, float, str]:
 def _compile(text: str) -> float:
     """Seconds that the compiler takes, nothing cached."""
     begun = clock.perf_counter()
-    cache.build(f"{text}// measured at {clock.time_ns()}\n", "growth", require_compiler()).unlink()
+    cache.discard(cache.build(f"{text}// measured at {clock.time_ns()}\n", "growth", require_compiler()))
     return clock.perf_counter() - begun
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import tempfile
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.stored import write_whole
 
 
 def read(path: Path) -> Any:
@@ -25,12 +25,7 @@ def write(path: Path, data: Any) -> None:
     """Write a file, innermost lists on one line each; whoever reads it meanwhile finds it as it was or as it will be."""
     path.parent.mkdir(parents=True, exist_ok=True)
     text = re.sub(r"\[\s+([^\[\]{}]+?)\s+\]", lambda m: "[" + re.sub(r",\s+", ", ", m[1]) + "]", json.dumps(data, indent=1))
-    partial = path.with_name(f".{path.name}-{os.getpid()}.tmp")
-    try:
-        partial.write_text(text + "\n", encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_whole(path, lambda file: file.write((text + "\n").encode()))
 
 
 def put(path: Path, name: str, data: Mapping[str, Any]) -> None:

@@ -224,6 +224,9 @@ CASES = {case.label: case for case in (
     Case("double_wishbone"),
     Case("rolling_disc"),
     Case("skate", reference=_skate),
+    Case("sleigh", long=10.0),  # it swings to and fro ever further
+    Case("bicycle"),
+    Case("stewart_platform", long=1.0),  # its legs push on, whatever their lengths
     Case("flyball_governor", reference=_governor, atol=1e-11, bounds={"error_q": 1e-7, "error_u": 1e-7}),
     Case("flyball_governor", {"links": "rods"}),
 )}

@@ -54,10 +54,12 @@ def _pretty(value: Any) -> str:
 
     import sympy as sp
 
+    from symdyn.model.symbols import symbols_of
+
     wide = (sys.stdout.encoding or "").lower().startswith("utf")
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     if wide:
-        value = value.xreplace({x: _dotted(x.name) for x in value.free_symbols if x.name.endswith("_dot")})
+        value = value.xreplace({x: _dotted(x.name) for x in symbols_of(value) if x.name.endswith("_dot")})
     return str(sp.pretty(value, use_unicode=wide, wrap_line=columns is not None, num_columns=columns))
 
 

@@ -49,14 +49,30 @@ def find_equations(arguments: argparse.Namespace,
 
 
 def find_module(arguments: argparse.Namespace) -> Module:
-    """The numeric module; one of the catalogue is remembered from run to run."""
-    from symdyn import systems
+    """The numeric module of the command line's system with its options; see `module_of`."""
+    return module_of(arguments.system, options_of(arguments), arguments.backend, arguments.formulation, arguments.coordinates)
 
-    if arguments.system not in systems.names():
-        return find_equations(arguments).compile(arguments.backend)  # type: ignore[no-any-return]
+
+def module_of(name: str, options: Mapping[str, Any], backend: str | None, formulation: str, coordinates: str) -> Module:
+    """The numeric module of a system with options; one of the catalogue is remembered from run to run.
+
+    name   of the catalogue, or the path of a Python file, which is run: it must come from the user, not from a data file
+    """
+    if not is_of_catalogue(name):
+        from symdyn.choice import formulated
+
+        system = find_system(name, options)
+        return formulated(system, formulation, coordinates=coordinates).compile(backend)  # type: ignore[no-any-return]
+    from symdyn import systems
     from symdyn.runtime.recall import recall
 
-    options = options_of(arguments)
     if options:
-        check_options(arguments.system, getattr(systems, arguments.system), options)
-    return recall(arguments.system, options, arguments.backend, arguments.formulation, arguments.coordinates)
+        check_options(name, getattr(systems, name), options)
+    return recall(name, options, backend, formulation, coordinates)
+
+
+def is_of_catalogue(name: str) -> bool:
+    """Whether the catalogue has a system of this name."""
+    from symdyn import systems
+
+    return name in systems.names()

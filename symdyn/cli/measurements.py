@@ -6,10 +6,10 @@ import argparse
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from symdyn.cli.messages import FAILED
+from symdyn.cli.values import path
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,15 @@ def _number(flag: str, parameter: str, text: str, kind: type = int, metavar: str
 
 
 def _folder(name: str) -> Option:
-    return Option("folder", "--output", {"metavar": "DIR", "type": Path, "help": f"folder for files (default: generated/{name})"})
+    return Option("folder", "--output", {"metavar": "DIR", "type": path, "help": f"folder for files (default: generated/{name})"})
 
 
 _ONLY = _names("--only", "only", "some of the groups of figures", "GROUP")
 _TIMED = _number("--repeats", "repeats", "timed runs, of which the median counts (default: 5)")
 _LEAST = _number("--repeats", "repeats", "timed runs, of which the least time is compared (default: 5)")
 _BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
-_JSON = Option("to_json", "--json", {"metavar": "FILE", "type": Path, "help": "write everything that was measured into a file"})
-_STORE = Option("file", "--store", {"metavar": "FILE", "type": Path,
+_JSON = Option("to_json", "--json", {"metavar": "FILE", "type": path, "help": "write everything that was measured into a file"})
+_STORE = Option("file", "--store", {"metavar": "FILE", "type": path,
                                     "help": "file to store them in beside what it holds (default: the package's own)"})
 
 MEASUREMENTS: dict[str, Measurement] = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from symdyn.cli import bench
@@ -20,7 +19,7 @@ from symdyn.cli.report import report
 from symdyn.cli.simulate import simulate
 from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
-from symdyn.cli.values import stabilization
+from symdyn.cli.values import path, stabilization
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -115,13 +114,13 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
                         "baumgarte, baumgarte=GAIN (1/s) or none (default: projection; with BDF and LSODA baumgarte)")
     parser.add_argument("--no-picture", action="store_true", help="save data only")
     parser.add_argument("--gif", action="store_true", help="save an animation too")
-    parser.add_argument("--report", metavar="FILE", type=Path, help="write a report of the run: one HTML file, no network needed")
+    parser.add_argument("--report", metavar="FILE", type=path, help="write a report of the run: one HTML file, no network needed")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
     _add_output(parser)
 
 
 def _add_sweep(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.toml", type=Path, help="what varies, and what is kept of each motion")
+    parser.add_argument("file", metavar="FILE.toml", type=path, help="what varies, and what is kept of each motion")
     parser.add_argument("--system", metavar="NAME", help="in the place of the file's: a system of the catalogue, or a Python "
                         "file that defines system()")
     parser.add_argument("--jobs", metavar="N", type=int, help="motions that are computed at a time (default: one a processor)")
@@ -138,7 +137,7 @@ def _add_full(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--full", action="store_true", help="write a page that works offline: equations, operations, condition "
                         "of the mass matrix along a motion, work against error, stability under stress, proof")
     parser.add_argument("--budget", metavar="SECONDS", type=float, help="with --full, for work against error (default: 20)")
-    parser.add_argument("--output", metavar="DIR", type=Path, help="with --full, folder for report.html (default: "
+    parser.add_argument("--output", metavar="DIR", type=path, help="with --full, folder for report.html (default: "
                         "generated/NAME)")
 
 
@@ -157,7 +156,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="the whole lecture: prints one table, writes reports and errata")
     parser.add_argument("--jobs", metavar="N", type=int, help="processes that share the cases of the lecture (default: 1, "
                         "with --all one a processor)")
-    parser.add_argument("--output", metavar="DIR", type=Path, help="folder for the reports (default with --all: "
+    parser.add_argument("--output", metavar="DIR", type=path, help="folder for the reports (default with --all: "
                         "generated/compare)")
 
 
@@ -225,4 +224,4 @@ def _add_stress(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_output(parser: argparse.ArgumentParser, default: str = "generated/NAME") -> None:
-    parser.add_argument("--output", metavar="DIR", type=Path, help=f"folder for the files (default: {default})")
+    parser.add_argument("--output", metavar="DIR", type=path, help=f"folder for the files (default: {default})")

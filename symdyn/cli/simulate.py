@@ -26,7 +26,7 @@ def simulate(arguments: argparse.Namespace) -> int:
     if arguments.t is not None and len(arguments.t) > 2:
         raise Stop(f"--t takes END or START END, found {len(arguments.t)} times")
     t = None if arguments.t is None else (0.0, *arguments.t)[-2:]
-    values = {what: numbers(items, flag) for what, flag, items in (
+    values: dict[str, Any] = {what: numbers(items, flag) for what, flag, items in (
         ("params", "--set", arguments.set), ("q", "--q", arguments.q), ("u", "--u", arguments.u), ("z", "--z", arguments.z),
         ("inputs", "--input", arguments.input))}
     if arguments.keep and not arguments.consistent:

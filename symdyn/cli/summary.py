@@ -57,7 +57,9 @@ def _energy(solution: Solution) -> str:
     if kept:
         # Loads that could do work did none: energy_error() would ask for the work in their case.
         scale, rests = solution.energy_scale
-        change = abs(solution.energy - solution.energy[0]).max()
+        resets = solution.reset_energy
+        change = abs(solution.energy - solution.energy[0] - sum(resets.values())).max()
+        took = "".join(f", but for {rows[-1]:.6g} J by resets of {name}" for name, rows in resets.items())
         of = "its potential energy: it rests" if rests else "its largest part"
-        return f"energy is kept to {change / scale if scale > 0 else 0.0:.2g} of {of}"
+        return f"energy is kept to {change / scale if scale > 0 else 0.0:.2g} of {of}{took}"
     return f"energy goes from {solution.energy[0]:.6g} J to {solution.energy[-1]:.6g} J by loads and drives"

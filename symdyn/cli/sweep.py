@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import difflib
 import os
+import shlex
 import time as clock
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symdyn.cli.find import find_module
+from symdyn.cli.find import is_of_catalogue, module_of
 from symdyn.cli.messages import FAILED, INTERRUPTED, WRONG, Stop, complain
 from symdyn.errors import ArgumentError, EnsembleStopped, MissingExtra, SymdynError
 
@@ -37,7 +39,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     faults: list[str] = []
     asked = read_sweep(arguments.file, faults)
     module = _checked(arguments, asked, faults)
-    folder = arguments.output or Path(asked.values.get("output", Path("generated") / arguments.file.stem))
+    folder = arguments.output or asked.folder or Path("generated") / arguments.file.stem
     begun = clock.perf_counter()
     with _executor(arguments, module) as executor:
         try:
@@ -58,19 +60,25 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _checked(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> Module:
-    """The module, if there is no fault in the file. Raises Stop with all of them."""
+    """The module, if there is no fault in the file. Raises Stop with all of them.
+
+    The file may name a system of the catalogue only: it is data, and whatever else a name stands for is a program.
+    """
     from symdyn.ensembles.measures import output_times, read_measures
 
-    name = arguments.system or asked.values.get("system")
+    name = arguments.system
+    if name is None and "system" in asked.values:
+        if is_of_catalogue(asked.values["system"]):
+            name = asked.values["system"]
+        else:
+            faults.append(_not_of_catalogue(asked.values["system"], arguments.file))
     module = None
     if name is None and not any(f.startswith(("system", "not TOML", "there is no such", "cannot be read")) for f in faults):
-        faults.append("system: is missing; name one of the catalogue, or give a Python file by --system")
+        faults.append("system: is missing; name one of the catalogue, or pass a Python file by --system")
     if name is not None:
-        options = asked.values.get("options", {})
         try:
-            module = find_module(argparse.Namespace(
-                system=str(name), option=[f"{k}={v}" for k, v in options.items()], backend=arguments.backend,
-                formulation=asked.values.get("formulation", "auto"), coordinates=asked.values.get("coordinates", "relative")))
+            module = module_of(name, asked.values.get("options", {}), arguments.backend,
+                               asked.values.get("formulation", "auto"), asked.values.get("coordinates", "relative"))
             faults += asked.unknown_names(module.metadata)
         except (Stop, SymdynError) as error:
             faults.append(f"system: {error}")
@@ -88,6 +96,19 @@ def _checked(arguments: argparse.Namespace, asked: Sweep, faults: list[str]) -> 
         head = f"{arguments.file} has {len(faults)} faults:\n  - " if several else f"{arguments.file}: "
         raise Stop(head + "\n  - ".join(faults), WRONG)
     return module
+
+
+def _not_of_catalogue(name: str, file: Path) -> str:
+    """The fault of a sweep file that asks for anything but a system of the catalogue, with what to do about it."""
+    from symdyn import systems
+
+    near = difflib.get_close_matches(name, systems.names(), 3, cutoff=0.5)
+    program = name if name.endswith(".py") and name.isprintable() else "my_mechanism.py"
+    return (f"system: must be a system of the catalogue (see symdyn list), found {name!r:.80}"
+            + (f", did you mean {' or '.join(near)}?" if near else "")
+            + "; a sweep file is data, and runs no program. To sweep a system of your own, leave the key out and name its Python "
+            f"file on the command line: symdyn sweep {shlex.quote(str(file))} --system {shlex.quote(program)}; or call "
+            "symdyn.ensemble(system, symdyn.Samples(...), t, outcomes) from Python")
 
 
 def _check_scatter(asked: Sweep, labels: list[str], faults: list[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable
+from pathlib import Path
 
 from symdyn.cli.messages import Stop
 
@@ -44,6 +45,13 @@ def stabilization(text: str) -> str | tuple[str, float]:
         return way, float(gain)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r}: {gain!r} is not a number; write baumgarte=GAIN, 1/s") from None
+
+
+def path(text: str) -> Path:
+    """The path of a file or folder."""
+    if "\0" in text or not text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no path; give that of a file or folder")
+    return Path(text)
 
 
 def value_of(text: str) -> bool | int | float | str:

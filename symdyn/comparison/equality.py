@@ -1,40 +1,52 @@
 """Whether two formulas are the same: after renaming, by limited simplification, at random points.
 
 Numbers come first as a refutation, since two expressions that differ at one point differ; that a simplification did not
-finish says nothing.
+finish proves nothing. Points lie at ordinary sizes, at tiny, huge and mixed ones, near special values, and in every branch of a
+Piecewise that a search reaches; the words of a decision name what was covered.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 import sympy as sp
 
-from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, points
+from symdyn.comparison.branches import Branch, Visits, branches
+from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points, wide_points
 from symdyn.errors import UnsupportedExpression
+from symdyn.model.symbols import symbols_of
 from symdyn.report.simplify import shown_zero
 
-POINTS = 12
+# Points of ordinary sizes and of other ones at which values must agree.
+POINTS, WIDE = 12, 12
 FEWEST = 3
 # Differences that are rounding for sure, relative to the values; others are looked at again with twice the digits.
 ROUNDING = 1e-45
-# Where a decimal fraction such as 9.81 stands in a formula, it was given with the digits of a float.
-SAME_DECIMAL, OTHER_DECIMAL = 1e-13, 1e-9
+# A decimal fraction such as 9.81 in a formula has the digits of a float. Differences count relative to what the formulas change
+# by where each of their floats changes by its own size: below the first they are the rounding of floats, above the second the
+# numbers are others.
+SAME_DECIMAL, OTHER_DECIMAL, DECIMAL_DIGITS = 1e-13, 1e-9, 13
+# The change of a float, relative to it, that measures this, and the digits in which it is done.
+NUDGE, NUDGE_DIGITS = 1e-20, 60
 # Operations from which simplification is not tried.
 LONGEST = 60
 
 
 @dataclass(frozen=True)
 class Decision:
-    """equal: True, False or None (not decided); how it was decided; for unequal ones a point with both values."""
+    """equal: True, False or None (not decided); how it was decided; for unequal ones a point with both values.
+
+    agreed   values were the same at all points tried, so that simplification is worth a try
+    """
 
     equal: bool | None
     how: str
     point: dict[str, float] | None = None
     values: tuple[float, float] | None = None
+    agreed: bool = False
 
 
 def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int | None = None) -> list[Decision]:
@@ -51,8 +63,7 @@ def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int
     result = []
     for (a, b), decision in zip(pairs, found):
         assert decision is not None
-        if decision.equal and decision.how.startswith("equal at") and decimals is None \
-                and not (_long(a) or _long(b)) and _vanishes(a - b):
+        if decision.agreed and decimals is None and not (_long(a) or _long(b)) and _vanishes(a - b):
             decision = Decision(True, "by simplification")
         result.append(decision)
     return result
@@ -80,71 +91,187 @@ def _by_numbers(pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> l
 
 
 class _Comparison:
-    """Pairs of expressions at random points, until each is decided."""
+    """Pairs of expressions at points, until each is decided."""
 
     def __init__(self, pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> None:
         self.pairs, self.decimals = pairs, decimals
-        self.given = [a.has(sp.Float) or b.has(sp.Float) for a, b in pairs]
-        sizes = [_size(a) + _size(b) if given else sp.S.Zero for (a, b), given in zip(pairs, self.given)]
-        self.expressions = Expressions([e for pair, size in zip(pairs, sizes) for e in (*pair, size)])
-        self.symbols = {s for pair in pairs for e in pair for s in e.free_symbols}
+        self.expressions = Expressions([e for pair in pairs for e in pair])
+        self.symbols = {s for pair in pairs for e in pair for s in symbols_of(e)}
+        self.floats = _Floats(pairs)
+        self.entries = [_Entry(pair) for pair in pairs]
 
     def decisions(self) -> list[Decision]:
-        agreeing, doubtful = [0] * len(self.pairs), [0] * len(self.pairs)
-        decided: dict[int, Decision] = {}
-        for point in points(self.symbols):
-            values = self.expressions.at(point)
-            precise: list[Any] | None = None
-            for k, (a, b) in enumerate(self.pairs):
-                x, y = values[3 * k:3 * k + 2]
-                if k in decided or x is None or y is None:
-                    continue
-                if precise is None and self._unclear(k, values):
-                    precise = self.expressions.at(point, 2 * DIGITS)
-                same = self._same(k, values, precise)
-                if same is False:
-                    shown = {s.name: float(point[s.name]) for s in sorted(a.free_symbols | b.free_symbols, key=str)}
-                    decided[k] = Decision(False, "different at a point", shown, (float(x), float(y)))
-                elif same is None:
-                    doubtful[k] += 1
-                else:
-                    agreeing[k] += 1
-                    if agreeing[k] == POINTS or not self.symbols:
-                        decided[k] = self._agreed(k, agreeing[k])
-            if len(decided) == len(self.pairs) or not self.symbols:
+        self._through(points(self.symbols), POINTS)
+        if self.decimals is None and self.symbols:
+            for entry in self.entries:
+                entry.ordinary = entry.agreeing
+            self._through(wide_points(self.symbols), WIDE)
+            self._into_branches()
+        return [entry.decision(self.decimals) for entry in self.entries]
+
+    def _through(self, sequence: Iterator[dict[str, Any]], count: int) -> None:
+        """Compare all undecided entries at the points, until each was judged at `count` more."""
+        wanted = {id(entry): entry.judged + count for entry in self.entries}
+        for point in sequence:
+            open_ones = [k for k, e in enumerate(self.entries) if e.different is None and e.judged < wanted[id(e)]]
+            if not open_ones:
                 break
-        for k in range(len(self.pairs)):
-            if k not in decided:
-                enough = agreeing[k] >= FEWEST and not doubtful[k]
-                decided[k] = self._agreed(k, agreeing[k]) if enough else Decision(None, (
-                    f"values agree at {agreeing[k]} points, at {doubtful[k]} they are too near to tell; elsewhere there are no "
-                    "real values"))
-        return [decided[k] for k in range(len(self.pairs))]
+            self._compare(open_ones, point)
+            if not self.symbols:
+                break
 
-    def _unclear(self, k: int, values: list[Any]) -> bool:
-        x, y = values[3 * k:3 * k + 2]
-        return self.decimals is None and not self.given[k] and bool(abs(x - y) > ROUNDING * max(abs(x), abs(y)))
+    def _into_branches(self) -> None:
+        """Points in those branches of Piecewise expressions in which no point was."""
+        open_ones = [k for k, entry in enumerate(self.entries) if entry.different is None and entry.branches]
+        if not open_ones:
+            return
+        visits = Visits([b for k in open_ones for b in self.entries[k].branches], self.symbols)
+        held = [(point, visits.hold(point)) for k in open_ones for point in self.entries[k].seen]
+        for k in open_ones:
+            entry = self.entries[k]
+            reached = [held_there for point, held_there in held if any(point is seen for seen in entry.seen)]
+            for branch in entry.branches:
+                if any(there.issuperset(branch.conditions) for there in reached):
+                    continue
+                for point in visits.search(branch):
+                    before = entry.agreeing
+                    if entry.different is None:
+                        self._compare([k], point)
+                    if entry.agreeing > before:
+                        reached.append(visits.hold(point))
+            entry.unvisited = [b for b in entry.branches if not any(there.issuperset(b.conditions) for there in reached)
+                               and not b.empty]
 
-    def _same(self, k: int, values: list[Any], precise: list[Any] | None) -> bool | None:
-        """Whether the values of a pair are the same; None: too near to tell."""
-        x, y, size = values[3 * k:3 * k + 3]
-        difference = abs(x - y)
-        if self.decimals is not None:
-            return bool(difference <= 0.5000001 * 10.0**-self.decimals)
-        if self.given[k]:
-            size = size or abs(x) + abs(y)
-            return True if difference <= SAME_DECIMAL * size else False if difference > OTHER_DECIMAL * size else None
-        if not self._unclear(k, values):
-            return True
-        assert precise is not None
-        again = precise[3 * k:3 * k + 2]
-        return again[0] is not None and again[1] is not None and bool(abs(again[0] - again[1]) <= REMAINDER * difference)
+    def _compare(self, open_ones: list[int], point: dict[str, Any]) -> None:
+        values = self.expressions.at(point)
+        precise: list[Any] | None = None
+        for k in open_ones:
+            entry, (x, y) = self.entries[k], values[2 * k:2 * k + 2]
+            if x is None or y is None:
+                continue
+            difference = abs(x - y)
+            if self.decimals is not None:
+                entry.count(point, bool(difference <= 0.5000001 * 10.0**-self.decimals), x, y)
+                continue
+            if difference > ROUNDING * max(abs(x), abs(y)):
+                precise = precise or self.expressions.at(point, 2 * DIGITS)
+                a, b = precise[2 * k:2 * k + 2]
+                if a is None or b is None:
+                    continue
+                if abs(a - b) > REMAINDER * difference:
+                    reach = self.floats.reach(k, point) if entry.has_floats else abs(a - b)
+                    if reach is None:
+                        continue
+                    part = float(abs(a - b) / reach)
+                    entry.floats_part = max(entry.floats_part, part if part <= OTHER_DECIMAL else 0.0)
+                    entry.count(point, True if part <= SAME_DECIMAL else None if part <= OTHER_DECIMAL else False, x, y)
+                    continue
+            entry.count(point, True, x, y)
 
-    def _agreed(self, k: int, count: int) -> Decision:
-        if self.decimals is not None:
-            return Decision(True, f"equal when rounded to {self.decimals} decimals")
-        digits = 13 if self.given[k] else DIGITS
-        return Decision(True, f"equal at {count} random points, {digits} digits" if count > 1 else f"equal to {digits} digits")
+
+class _Entry:
+    """What was seen of a pair: points that agree, that are in doubt, one that differs; branches and the sizes of the symbols."""
+
+    def __init__(self, pair: tuple[sp.Expr, sp.Expr]) -> None:
+        self.names = sorted(s.name for s in symbols_of(pair[0]) | symbols_of(pair[1]))
+        self.has_floats = any(e.has(sp.Float) for e in pair)
+        self.branches: list[Branch] = branches(pair)
+        self.unvisited: list[Branch] = []
+        self.seen: list[dict[str, Any]] = []
+        self.ordinary = self.doubtful = 0
+        self.floats_part = 0.0
+        self.different: tuple[dict[str, float], tuple[float, float]] | None = None
+
+    @property
+    def agreeing(self) -> int:
+        return len(self.seen)
+
+    @property
+    def judged(self) -> int:
+        return self.agreeing + self.doubtful
+
+    def count(self, point: dict[str, Any], same: bool | None, x: Any, y: Any) -> None:
+        if same:
+            self.seen.append(point)
+        elif same is None:
+            self.doubtful += 1
+        else:
+            self.different = {name: float(point[name]) for name in self.names}, (float(x), float(y))
+
+    def decision(self, decimals: int | None) -> Decision:
+        digits = DECIMAL_DIGITS if self.floats_part else DIGITS
+        covered = f"{_points(self.agreeing)}{self._sizes()}"
+        if self.different is not None:
+            # Where values agree at ordinary sizes, a reader wonders about a verdict that only other sizes give.
+            elsewhere = f"; the same to {digits} digits at {covered}" if self.ordinary else ""
+            return Decision(False, f"different at a point{elsewhere}", *self.different)
+        if decimals is not None and (self.agreeing >= (FEWEST if self.names else 1)):
+            return Decision(True, f"equal when rounded to {decimals} decimals" + (f" at {covered}" if self.names else ""))
+        if not self.names and self.agreeing:
+            return Decision(True, f"equal to {digits} digits", agreed=True)
+        if self.doubtful:
+            return Decision(None, f"values agree at {_points(self.agreeing)}; at {self.doubtful} they differ by "
+                                  f"up to {self.floats_part:.0e} of what the floats in them make up: above "
+                                  f"{SAME_DECIMAL:g}, which is rounding, and below {OTHER_DECIMAL:g}, which is another number")
+        if self.agreeing < FEWEST:
+            return Decision(None, f"values agree at {_points(self.agreeing)}; elsewhere there are no real values")
+        if self.unvisited:
+            named = "; ".join(branch.text for branch in self.unvisited)
+            return Decision(None, f"equal at {covered}, {digits} digits, none of which lies in the "
+                                  f"branch{'es' if len(self.unvisited) > 1 else ''} {named}", agreed=True)
+        return Decision(True, f"equal at {covered}, {digits} digits", agreed=True)
+
+    def _sizes(self) -> str:
+        sizes = [abs(point[name]) for point in self.seen for name in self.names if point[name]]
+        if not sizes:
+            return ""
+        return f" with symbols of size {float(f'{float(min(sizes)):.0e}'):g} to {float(f'{float(max(sizes)):.0e}'):g}"
+
+
+def _points(count: int) -> str:
+    return f"{count} random point{'' if count == 1 else 's'}"
+
+
+class _Floats:
+    """How far the floats in pairs of expressions reach: the sum of what the values change by, per relative change of each."""
+
+    def __init__(self, pairs: list[tuple[sp.Expr, sp.Expr]]) -> None:
+        self.symbols: dict[sp.Float, sp.Symbol] = {}
+        named = [tuple(self._named(e) for e in pair) for pair in pairs]
+        self.names = [sorted({s.name for e in pair for s in symbols_of(e)} & {s.name for s in self.symbols.values()})
+                      for pair in named]
+        self.expressions = [Expressions([*pair, _size(pair[0]) + _size(pair[1])] if names else []) for pair, names
+                            in zip(named, self.names)]
+        self.values = {symbol.name: float(number) for number, symbol in self.symbols.items()}
+
+    def reach(self, k: int, point: dict[str, Any]) -> Any:
+        """Of pair k at a point; None where a value ends within the change of a float.
+
+        At least the sum of the sizes of the terms: sums of floats leave rounding in coefficients that should have vanished.
+        """
+        expressions, own = self.expressions[k], context(NUDGE_DIGITS)
+        at = {**point, **{name: own.mpf(self.values[name]) for name in self.names[k]}}
+        *before, size = expressions.at(at, NUDGE_DIGITS)
+        if None in (*before, size):
+            return None
+        total = own.zero
+        for name in self.names[k]:
+            *after, _ = expressions.at({**at, name: at[name] * (1 + own.mpf(NUDGE))}, NUDGE_DIGITS)
+            if None in after:
+                return None
+            total += sum(abs(a - b) for a, b in zip(after, before)) / own.mpf(NUDGE)
+        return max(total, size)
+
+    def _named(self, e: Any) -> Any:
+        """The expression with a symbol for every float; exponents such as 2.0 and 0.5 stay, since they are exact."""
+        if isinstance(e, sp.Float):
+            return self.symbols.setdefault(e, sp.Symbol(f"float {len(self.symbols)}", real=True))
+        if not e.has(sp.Float):
+            return e
+        if isinstance(e, sp.Pow) and isinstance(e.exp, sp.Float) and (2 * e.exp) % 1 == 0:
+            return sp.Pow(self._named(e.base), sp.nsimplify(e.exp), evaluate=False)
+        return e.func(*map(self._named, e.args), evaluate=False) if isinstance(e, (sp.Add, sp.Mul, sp.Pow)) \
+            else e.func(*map(self._named, e.args))
 
 
 def _size(e: sp.Expr) -> sp.Expr:

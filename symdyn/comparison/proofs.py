@@ -15,6 +15,7 @@ import sympy as sp
 from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points
 from symdyn.comparison.values import Value, by_name, canonical, renaming, taken
 from symdyn.errors import CaseError, SymdynError
+from symdyn.model.symbols import symbols_of
 
 POINTS = 4
 # With decimal fractions in it, the residual of a right formula is the rounding of a float, and that of a wrong one stands out.
@@ -134,7 +135,7 @@ def _largest(residuals: list[Residual]) -> float:
 
 
 def _names(formula: Any) -> set[str]:
-    return {s.name for s in getattr(formula, "free_symbols", ())}
+    return {s.name for s in symbols_of(formula)} if hasattr(formula, "free_symbols") else set()
 
 
 def _minus(formula: Any, value: Any, what: str) -> Any:
@@ -162,7 +163,7 @@ def limit(sentence: str, at: Mapping[Any, Any], value: Any) -> Proof:
         raise CaseError(faults)
 
     def put(e: sp.Expr) -> sp.Expr:
-        return e.subs({s: names[s.name] for s in e.free_symbols if s.name in names}, simultaneous=True)
+        return e.subs({s: names[s.name] for s in symbols_of(e) if s.name in names}, simultaneous=True)
 
     def residual(formula: Any) -> Any:
         own = taken(formula, "the formula")
@@ -190,7 +191,7 @@ def dimensions(sentence: str, units: Mapping[Any, Sequence[float]], unit: Sequen
         return sp.Mul(*[f ** sp.nsimplify(e) for f, e in zip(factors, exponents)])
 
     def change(e: sp.Expr) -> sp.Expr:
-        return e.xreplace({s: s * scale(powers[s.name]) for s in e.free_symbols if s.name in powers}) - scale(unit) * e
+        return e.xreplace({s: s * scale(powers[s.name]) for s in symbols_of(e) if s.name in powers}) - scale(unit) * e
 
     def residual(formula: Any) -> Any:
         own = taken(formula, "the formula")

@@ -12,6 +12,7 @@ import sympy as sp
 
 from symdyn.comparison.case import Slide
 from symdyn.comparison.verdict import ErratumResult, FormulaResult, Verdict
+from symdyn.counting import counted
 
 COLUMNS = {Verdict.EQUAL: "equal", Verdict.CONVENTION: "convention", Verdict.WRONG: "wrong", Verdict.UNREADABLE: "unreadable",
            Verdict.DIFFERENT: "different", Verdict.UNDECIDED: "not decided"}
@@ -150,11 +151,6 @@ def _text(value: Any) -> str:
     if isinstance(value, tuple):
         return " = ".join(map(_text, value))
     return str(value.tolist()) if isinstance(value, sp.MatrixBase) else str(value)
-
-
-def counted(n: int, one: str, many: str) -> str:
-    """A number with its noun."""
-    return f"{n} {one if n == 1 else many}"
 
 
 def _entries(counts: Counter[Verdict]) -> str:

@@ -11,7 +11,7 @@ import sympy as sp
 from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 
 from symdyn.errors import CaseError, ModelError
-from symdyn.model.symbols import as_expression, take_over
+from symdyn.model.symbols import as_expression, symbols_of, take_over
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _equation(left: Any, right: Any, what: str, faults: list[str]) -> Value | No
 
 def canonical(*groups: Iterable[sp.Expr]) -> dict[sp.Symbol, sp.Symbol]:
     """Symbols of the same name -> one real symbol, positive if one of them is: slides do not tell assumptions."""
-    symbols = sorted({s for group in groups for e in group for s in e.free_symbols}, key=lambda s: (s.name, str(type(s))))
+    symbols = sorted({s for group in groups for e in group for s in symbols_of(e)}, key=lambda s: (s.name, str(type(s))))
     positive = {s.name for s in symbols if s.is_positive}
     return {s: sp.Symbol(s.name, positive=True) if s.name in positive else sp.Symbol(s.name, real=True) for s in symbols}
 
@@ -148,7 +148,7 @@ def renaming(given: Mapping[Any, Any], what: str, faults: list[str]) -> dict[str
 
 def by_name(value: Value, replacements: Mapping[str, sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
     """Those replacements that the value's symbols ask for."""
-    symbols = {s for e in value.entries for s in e.free_symbols}
+    symbols = {s for e in value.entries for s in symbols_of(e)}
     if value.sides is not None:
-        symbols |= {s for side in value.sides for e in side.entries for s in e.free_symbols}
+        symbols |= {s for side in value.sides for e in side.entries for s in symbols_of(e)}
     return {s: replacements[s.name] for s in symbols if s.name in replacements}

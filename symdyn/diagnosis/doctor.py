@@ -18,6 +18,7 @@ from symdyn.formulation.dependent_rows import ranks
 from symdyn.model.loop_check import CARRIER
 from symdyn.runtime.arguments import some, take
 from symdyn.runtime.consistent import number
+from symdyn.shown import shown
 from symdyn.tape.floats import evaluate_rows
 
 if TYPE_CHECKING:
@@ -48,12 +49,12 @@ def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, 
     from symdyn.formulation.contradictions import contradictions
     from symdyn.formulation.tree_equations import tree_of, tree_result
 
-    if coordinates not in COORDINATES:
-        raise SymdynError(f"coordinates {coordinates!r} asked for; there are {' and '.join(map(repr, COORDINATES))}")
+    if not isinstance(coordinates, str) or coordinates not in COORDINATES:
+        raise SymdynError(f"coordinates {shown(coordinates)} asked for; there are {' and '.join(map(repr, COORDINATES))}")
     t = number(t, "a finite number of seconds as t", system.name)
     asked, reach = reach, number(reach, f"an angle from 0 on as reach, rad (default: {REACH:.4g})", system.name)
     if reach < 0:
-        raise ArgumentError(f"{system.name}: pass an angle from 0 on as reach, rad (default: {REACH:.4g}), found {asked!r}")
+        raise ArgumentError(f"{system.name}: pass an angle from 0 on as reach, rad (default: {REACH:.4g}), found {shown(asked)}")
     model = system.check()
     if coordinates == "absolute":
         rewritten = in_absolute_coordinates(model)

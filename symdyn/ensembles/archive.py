@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
+
+from symdyn.runtime.stored import write_whole
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 # Bytes that are read at a time.
@@ -45,21 +46,6 @@ def write_archive(path: Path, entries: Iterable[Entry]) -> None:
                         member.write(np.ascontiguousarray(piece, dtype=dtype).tobytes())
 
     write_whole(path, fill)
-
-
-def write_whole(path: Path, fill: Callable[[IO[bytes]], None]) -> None:
-    """Write a file beside its place, to the disk, and move it there in one step."""
-    scratch = path.with_name(f".{path.name}.tmp")
-    try:
-        with scratch.open("wb") as file:
-            fill(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(scratch, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            scratch.unlink(missing_ok=True)
-        raise
 
 
 @contextlib.contextmanager

@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.errors import ArgumentError
+from symdyn.real_numbers import NotReal, number, real
+from symdyn.runtime.memory import demand
+from symdyn.shown import shown
+
 # Random numbers stay inside (0, 1), where every distribution has a finite value.
 SMALLEST = 2.0**-53
 
@@ -48,7 +53,7 @@ DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 def _quantile(name: str, a: Mapping[str, float]) -> Callable[[np.ndarray], np.ndarray]:
-    from scipy.special import ndtr, ndtri
+    from scipy.special import ndtri
 
     if name == "uniform":
         return lambda p: a["from"] + (a["to"] - a["from"]) * p
@@ -59,11 +64,24 @@ def _quantile(name: str, a: Mapping[str, float]) -> Callable[[np.ndarray], np.nd
     if name == "lognormal":
         return lambda p: a["median"] * np.exp(a["sigma"] * ndtri(p))
     if name == "truncated_normal":
-        low, high = (ndtr((a[end] - a["mean"]) / a["std"]) for end in ("from", "to"))
-        return lambda p: np.clip(a["mean"] + a["std"] * ndtri(low + (high - low) * p), a["from"], a["to"])
+        low, high = ((a[end] - a["mean"]) / a["std"] for end in ("from", "to"))
+        return lambda p: np.clip(a["mean"] + a["std"] * _between(low, high, p), a["from"], a["to"])
     width, left = a["to"] - a["from"], a["mode"] - a["from"]
     return lambda p: np.where(p * width < left, a["from"] + np.sqrt(p * width * left),
                               a["to"] - np.sqrt((1 - p) * width * (width - left)))
+
+
+def _between(low: float, high: float, p: np.ndarray) -> np.ndarray:
+    """Values of the standard normal distribution between low and high, at probabilities p within that range.
+
+    Logarithms of the probability below and above a value keep their digits in the far tails, where the probabilities themselves
+    are next to 0 or 1; each value comes from the smaller one, the upper tail as the mirror image of the lower.
+    """
+    from scipy.special import log_ndtr, ndtri_exp
+
+    below = np.logaddexp(log_ndtr(low) + np.log1p(-p), log_ndtr(high) + np.log(p))
+    above = np.logaddexp(log_ndtr(-low) + np.log1p(-p), log_ndtr(-high) + np.log(p))
+    return np.where(below < above, ndtri_exp(below), -ndtri_exp(above))
 
 
 def _fits(name: str, a: Mapping[str, float]) -> bool:
@@ -86,19 +104,27 @@ def read_axis(value: Any, where: str, faults: list[str]) -> Axis | None:
     """
     if isinstance(value, Mapping):
         return _from_mapping(value, where, faults)
-    if isinstance(value, (str, bool)) or (isinstance(value, (list, tuple)) and any(isinstance(v, (str, bool)) for v in value)):
-        array = None
-    else:
+    array, why = None, ""
+    if not isinstance(value, bool) and not (isinstance(value, (list, tuple)) and any(isinstance(v, bool) for v in value)):
         try:
-            array = np.array(value, dtype=float)
-        except (TypeError, ValueError):
-            array = None
+            array = np.array(real(value))
+        except NotReal as error:
+            why = f": {error}"
     if array is None or array.ndim > 1 or array.size == 0:
         faults.append(f"{where}: give a number, a list of numbers, {{from, to, count}} or {{distribution, ...}}, "
-                      f"found {value!r:.80}")
+                      f"found {shown(value, 80)}{why}")
         return None
     array = array.reshape(-1)
     return listed(array, array.tolist() if len(array) <= 64 else array)
+
+
+def _finite(value: Any) -> float | None:
+    """A finite number; None for anything else."""
+    try:
+        found = number(value)
+    except NotReal:
+        return None
+    return found if np.isfinite(found) and not isinstance(value, (bool, np.bool_)) else None
 
 
 def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Axis | None:
@@ -109,7 +135,7 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
         wanted = DISTRIBUTIONS[name][0]
     else:
         near = difflib.get_close_matches(str(name), DISTRIBUTIONS, 1)
-        faults.append(f"{where}.distribution: there is no {name!r}" + (f", did you mean {near[0]}?" if near else
+        faults.append(f"{where}.distribution: there is no {shown(name)}" + (f", did you mean {near[0]}?" if near else
                       f"; there are {', '.join(DISTRIBUTIONS)}"))
         return None
     before = len(faults)
@@ -122,17 +148,22 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
     for key in wanted:
         if key not in value:
             faults.append(f"{where}.{key}: is missing")
-        elif isinstance(value[key], (bool, str)) or not isinstance(value[key], (int, float, np.number)) \
-                or not np.isfinite(value[key]):
-            faults.append(f"{where}.{key}: must be a finite number, found {value[key]!r}")
+        elif (found := _finite(value[key])) is None:
+            faults.append(f"{where}.{key}: must be a finite number, found {shown(value[key])}")
         else:
-            numbers[key] = float(value[key])
+            numbers[key] = found
     if len(numbers) < len(wanted):
         return None
     told = {"distribution": name, **numbers}
     if "count" in wanted:
         if numbers["count"] < 2 or numbers["count"] != int(numbers["count"]):
-            faults.append(f"{where}.count: must be a whole number from 2 on, found {value['count']!r}")
+            faults.append(f"{where}.count: must be a whole number from 2 on, found {shown(value['count'])}")
+            return None
+        try:
+            demand(2 * int(numbers["count"]), where, f"a list of {int(numbers['count'])} values", "give a smaller count, or a "
+                   "distribution, which takes none")
+        except ArgumentError as error:
+            faults.append(str(error))
             return None
         if len(faults) > before:
             return None

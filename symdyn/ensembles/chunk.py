@@ -19,6 +19,7 @@ from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.module import Module
 from symdyn.runtime.outcome import Outcome
 from symdyn.runtime.solution import Solution
+from symdyn.shown import shown
 
 GROUPS = ("q", "u", "z", "parameters", "inputs")
 # Longer messages of failed members are cut.
@@ -183,7 +184,7 @@ def _groups(setting: Setting, samples: np.ndarray) -> dict[str, np.ndarray]:
 
 def _fitting(measure: Measure, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     if value.shape != shape:
-        raise ArgumentError(f"outcome {measure.label!r} has the shape {value.shape}, elsewhere {shape}")
+        raise ArgumentError(f"outcome {shown(measure.label)} has the shape {value.shape}, elsewhere {shape}")
     return value
 
 

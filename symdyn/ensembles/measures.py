@@ -12,7 +12,10 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import length_of, real_of
+from symdyn.runtime.memory import demand
 from symdyn.runtime.simulate import N_POINTS
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -52,7 +55,8 @@ class Measure:
     def of(self, solution: Solution) -> np.ndarray:
         """Its value. Whatever a function of the user raises passes through."""
         if self.function is not None:
-            return np.asarray(self.function(solution), dtype=float)
+            return real_of(self.function(solution), solution.module.name,
+                           f"values of the outcome {shown(self.label)} must be numbers")
         return self.reduce(solution.t, values_of(solution, self.name))
 
     def reduce(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -102,7 +106,7 @@ def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure
     if asked is None:
         asked = [f"end {name}" for name in module.metadata["x"]]
     if isinstance(asked, str) or not isinstance(asked, (Sequence, Mapping)) or not asked:
-        faults.append(f"outcomes must be a list of texts such as 'max q1', or a mapping, found {asked!r:.80}")
+        faults.append(f"outcomes must be a list of texts such as 'max q1', or a mapping, found {shown(asked, 80)}")
         return []
     found: list[Measure] = []
     for label, value in asked.items() if isinstance(asked, Mapping) else [(text, text) for text in asked]:
@@ -110,7 +114,7 @@ def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure
         if measure is None:
             continue
         if measure.label in RESERVED or "/" in measure.label or measure.label in [m.label for m in found]:
-            faults.append(f"outcome {measure.label!r}: the name is taken; names must differ from each other and from "
+            faults.append(f"outcome {shown(measure.label)}: the name is taken; names must differ from each other and from "
                           f"{', '.join(RESERVED)}, and have no /")
         found.append(measure)
     return found
@@ -120,19 +124,19 @@ def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measu
     if callable(value) and isinstance(label, str):
         return Measure(label, "function", function=value)
     if not isinstance(value, str) or not isinstance(label, str):
-        faults.append(f"outcome {label!r}: {value!r:.80} is neither a text such as 'max q1' nor a function")
+        faults.append(f"outcome {shown(label)}: {shown(value, 80)} is neither a text such as 'max q1' nor a function")
         return None
     by_kind, at = _ASKED.fullmatch(value.strip()), _AT.fullmatch(value.strip())
     match = by_kind or at
     if match is None:
-        faults.append(f"outcome {value!r}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time")
+        faults.append(f"outcome {shown(value)}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time")
         return None
     name, metadata = match["name"], module.metadata
     known = [*metadata["x"], *metadata["inputs"], *(n for n, _ in metadata["outputs"]),
              *(["energy"] if "energy" in metadata["functions"] else ()), *metadata["constraints"]]
     if name not in known:
         near = difflib.get_close_matches(name, known, 3)
-        faults.append(f"outcome {value!r}: there is no {name!r}; "
+        faults.append(f"outcome {shown(value)}: there is no {shown(name)}; "
                       + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"))
         return None
     if by_kind is not None:
@@ -140,7 +144,7 @@ def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measu
     try:
         return Measure(label, "at", name, float(match["time"]))
     except ValueError:
-        faults.append(f"outcome {value!r}: {match['time']!r} is not a time")
+        faults.append(f"outcome {shown(value)}: {shown(match['time'])} is not a time")
         return None
 
 
@@ -151,14 +155,14 @@ def output_times(t: Any, measures: Sequence[Measure], module: Module) -> np.ndar
     Raises ArgumentError for times that do not fit.
     """
     t = (0.0, module.metadata["duration"]) if t is None else t
-    try:
-        times = np.array(t, dtype=float)
-    except (TypeError, ValueError):
-        times = np.zeros(0)
+    n = length_of(t)
+    if n is not None:
+        demand(4 * n, module.name, f"{n} output times", "pass fewer, or (start, end)")
+    times = real_of(t, module.name, "t must be (start, end) or an array of times")
     way = np.sign(times[-1] - times[0]) if times.ndim == 1 and len(times) > 1 else 0.0
     if not (way and np.isfinite(times).all() and (np.diff(times) * way > 0).all()):
         raise ArgumentError(f"{module.name}: t must be (start, end) or an array of increasing or decreasing times, "
-                            f"found {t!r:.80}")
+                            f"found {shown(t, 80)}")
     special = [m.time for m in measures if m.kind == "at"]
     outside = [f"{s:.6g}" for s in special if not min(times) <= s <= max(times)]
     if outside:

@@ -7,7 +7,6 @@ import hashlib
 import json
 import zlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from symdyn.errors import SymdynError
@@ -36,8 +35,7 @@ class PortableModule:
 
     def _provide(self, name: str) -> Unit:
         unit: Any = self._given.unit(name)
-        text = unit.source if isinstance(unit, CUnit) else Path(unit.module.__file__).read_text(encoding="utf-8")
-        self._units[name] = {"source": text, "metadata": dict(unit.metadata)}
+        self._units[name] = {"source": unit.source, "metadata": dict(unit.metadata)}
         return unit  # type: ignore[no-any-return]
 
     def key(self) -> str:

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.counting import counted
 from symdyn.ensembles.archive import reading
 from symdyn.ensembles.store import RESULT, read_failures
 from symdyn.errors import ArgumentError
+from symdyn.shown import name_of, shown
 
 
 class Ensemble:
@@ -46,14 +48,14 @@ class Ensemble:
 
         Raises ArgumentError for an unknown name.
         """
-        name = str(getattr(name, "name", name))
+        name = name_of(name)
         if name in self.labels:
             with reading(self.file) as archive:
                 return archive[name]  # type: ignore[no-any-return]
         if name in self.names:
             return self.samples[:, self.names.index(name)]
         near = difflib.get_close_matches(name, [*self.labels, *self.names], 3)
-        raise ArgumentError(f"{self.path} has no {name!r}; " + (f"did you mean {' or '.join(near)}?" if near else
+        raise ArgumentError(f"{self.path} has no {shown(name)}; " + (f"did you mean {' or '.join(near)}?" if near else
                             f"it has {', '.join([*self.labels, *self.names])}"))
 
     @property
@@ -81,4 +83,4 @@ class Ensemble:
 
     def __repr__(self) -> str:
         failed = f", {self.n_failed} failed" if self.n_failed else ""
-        return f"<Ensemble of {self.name}: {self.count} members{failed}, {', '.join(self.labels)} in {self.file}>"
+        return f"<Ensemble of {self.name}: {counted(self.count, 'member')}{failed}, {', '.join(self.labels)} in {self.file}>"

@@ -26,12 +26,12 @@ from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped
+from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.runtime.batch import UNIT
 from symdyn.runtime.module import Module
+from symdyn.shown import shown
 
-# What is handed on to `simulate`.
-OPTIONS = ("rtol", "atol", "method", "max_step", "first_step", "max_steps", "stabilization", "events")
 # Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
 CHUNK, PARTS = 1000, 16
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
@@ -43,7 +43,9 @@ VECTORS_FROM = 2000
 def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: Any = None, u: Any = None, z: Any = None,
              params: Any = None, inputs: Any = None, executor: Any = None, chunk: int | None = None, path: Any = None,
              resume: bool = False, progress: bool = False, consistent: bool = False, outstanding: int | None = None,
-             functions: tuple[str, ...] = (), **options: Any) -> Ensemble:
+             functions: tuple[str, ...] = (), rtol: float | None = None, atol: Any = None, method: Any = None,
+             max_step: float | None = None, first_step: float | None = None, max_steps: int | None = None,
+             stabilization: Any = None, events: Any = None) -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -64,20 +66,22 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
     outstanding chunks that are handed to the executor at a time; default: three for every worker
     functions   of the module that functions of a Solution call in other processes only
-    options     of `simulate`: rtol, atol, method, max_step, first_step, max_steps, stabilization, events
+    rtol, atol, method, max_step, first_step, max_steps, stabilization, events   of `simulate`; None: as there
 
     From 2000 samples on motions are integrated several at once on the processor's vectors, where `simulate_batch` does so.
     A member that fails has no numbers in its row, and is told in `failures`; warnings of single motions are not given. Returns an
     Ensemble. Raises ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an
     executor died or the disk is full: what was done is kept, if there is a path.
     """
+    resume, progress, consistent = (flag(v, f"an ensemble: {what}") for v, what in (
+        (resume, "resume"), (progress, "progress"), (consistent, "consistent")))
     module = system if isinstance(system, Module) else system.compile() if hasattr(system, "compile") else None
     if module is None:
-        raise ArgumentError(f"an ensemble needs a Module or a System, found {system!r:.80}")
+        raise ArgumentError(f"an ensemble needs a Module or a System, found {shown(system, 80)}")
     drawn = samples if isinstance(samples, Samples) else Samples(samples, "paired")
-    unknown = [o for o in options if o not in OPTIONS]
-    if unknown:
-        raise ArgumentError(f"{module.name}: an ensemble has no option {', '.join(unknown)}")
+    asked = {"rtol": rtol, "atol": atol, "method": method, "max_step": max_step, "first_step": first_step,
+             "max_steps": max_steps, "stabilization": stabilization, "events": events}
+    options = {name: value for name, value in asked.items() if value is not None}
     measures = take_measures(outcomes, module)
     times = output_times(t, measures, module)
     vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
@@ -88,7 +92,7 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)
     if path is not None:
         if not isinstance(path, (str, Path)) or "\0" in str(path):
-            raise ArgumentError(f"{module.name}: the path is {path!r}; pass that of a folder, as text or a Path")
+            raise ArgumentError(f"{module.name}: the path is {shown(path)}; pass that of a folder, as text or a Path")
         with OneRun(Path(path)):
             return _in_folder(Path(path), setting, drawn, executor, size, ahead, resume, progress, True)
     folder = Path(tempfile.mkdtemp(prefix="symdyn-ensemble-"))
@@ -185,7 +189,7 @@ class _Run:
             return (lambda: given), False, own
         if given is not None and not callable(given):
             raise ArgumentError("an executor must be a concurrent.futures.Executor, or a function that makes one, "
-                                f"found {given!r}")
+                                f"found {shown(given)}")
 
         def make() -> Executor:
             own.append(ThreadPoolExecutor(os.cpu_count() or 1) if given is None else given())
@@ -244,7 +248,7 @@ def _whole(value: Any, what: str, module: Module) -> int | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise ArgumentError(f"{module.name}: {what} must be a whole number from 1 on, found {value!r}")
+        raise ArgumentError(f"{module.name}: {what} must be a whole number from 1 on, found {shown(value)}")
     return int(value)
 
 

@@ -11,11 +11,15 @@ import numpy as np
 
 from symdyn.ensembles.axes import SMALLEST, Axis, read_axis
 from symdyn.errors import ArgumentError
+from symdyn.runtime.memory import in_bytes
+from symdyn.shown import name_of, shown
 
 SAMPLINGS = ("paired", "grid", "random", "latin_hypercube", "sobol")
 # Rounds of the network that permutes numbers; from four on it is as good as random.
 ROUNDS = 6
 SOBOL_LIMIT = 2**30
+# Bytes that all samples may take on the disk, in the results of an ensemble.
+MOST = 2**40
 
 
 class Samples:
@@ -29,7 +33,9 @@ class Samples:
                Default: "random" where there is a count or a distribution, else "grid"
     seed       of the last three
 
-    Sample k depends on the seed and k alone, and `block` takes memory for its own samples only.
+    A random or Sobol sample k depends on the seed and k alone: with a larger count the first ones stay. A Latin hypercube depends
+    on the count as well: it has one value in each of `count` equally probable intervals of every quantity, which move with the
+    count, so that more samples are another design. `block` takes memory for its own samples only, whatever the sampling.
     Raises ArgumentError with all that is wrong.
     """
 
@@ -38,9 +44,10 @@ class Samples:
         faults: list[str] = []
         axes: dict[str, Axis] = {}
         if not isinstance(values, Mapping) or not values:
-            raise ArgumentError(f"{where}: give a mapping from names to values, with one name at least; found {values!r:.80}")
+            raise ArgumentError(f"{where}: give a mapping from names to values, with one name at least; found "
+                                f"{shown(values, 80)}")
         for key, value in values.items():
-            name = str(getattr(key, "name", key))
+            name = name_of(key)
             axis = read_axis(value, f"{where}.{name}", faults)
             if axis is not None:
                 axes[name] = axis
@@ -50,19 +57,19 @@ class Samples:
         self.names = tuple(axes)
         self.sampling = sampling
         self._axes = tuple(axes.values())
-        drawn = sampling in ("random", "latin_hypercube", "sobol")
-        if sampling not in SAMPLINGS:
-            faults.append(f"{where}: sampling {sampling!r} asked for; there are {', '.join(SAMPLINGS)}")
+        drawn = isinstance(sampling, str) and sampling in ("random", "latin_hypercube", "sobol")
+        if not isinstance(sampling, str) or sampling not in SAMPLINGS:
+            faults.append(f"{where}: sampling {shown(sampling)} asked for; there are {', '.join(SAMPLINGS)}")
         elif drawn and (isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1):
-            faults.append(f"{where}: {sampling} needs a count, a whole number from 1 on, found {count!r}")
+            faults.append(f"{where}: {sampling} needs a count, a whole number from 1 on, found {shown(count)}")
         elif not drawn and free:
             faults.append(f"{where}: {sampling} needs lists or {{from, to, count}}; {', '.join(free)} "
                           f"{'have' if len(free) > 1 else 'has'} a distribution, for which there are random, latin_hypercube "
                           "and sobol")
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            faults.append(f"{where}: the seed must be a whole number from 0 on, found {seed!r}")
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**128:
+            faults.append(f"{where}: the seed must be a whole number from 0 on, below 2^128, found {shown(seed)}")
         lengths = {n: len(a.values) for n, a in axes.items() if a.values is not None and a.varies}
-        if sampling == "paired" and len(set(lengths.values())) > 1:
+        if isinstance(sampling, str) and sampling == "paired" and len(set(lengths.values())) > 1:
             faults.append(f"{where}: paired values must be as many of each, found "
                           + ", ".join(f"{n}: {k}" for n, k in lengths.items()))
         if not faults and not drawn:
@@ -70,7 +77,12 @@ class Samples:
             if count is not None and count != found:
                 faults.append(f"{where}: the {sampling} has {found} samples, but the count is {count}; leave the count out")
             count = found
-        if sampling == "sobol" and not faults and int(count or 0) > SOBOL_LIMIT:
+        taken = 0 if faults else 8 * len(axes) * int(count or 0)
+        if taken > MOST:
+            faults.append(f"{where}: {shown(count)} samples of {len(axes)} numbers take {in_bytes(taken)}; the most is "
+                          f"{in_bytes(MOST)}: give "
+                          "a smaller count")
+        if not faults and sampling == "sobol" and int(count or 0) > SOBOL_LIMIT:
             faults.append(f"{where}: sobol has {SOBOL_LIMIT} points at most, found the count {count}")
         if faults:
             raise ArgumentError("\n".join(faults))

@@ -17,9 +17,10 @@ from typing import IO, Any
 
 import numpy as np
 
-from symdyn.ensembles.archive import Entry, reading, write_archive, write_whole
+from symdyn.ensembles.archive import Entry, reading, write_archive
 from symdyn.ensembles.chunk import Done
 from symdyn.errors import ArgumentError
+from symdyn.runtime.stored import write_whole
 
 RESULT, FAILURES, MANIFEST = "ensemble.npz", "failures.jsonl", "manifest.json"
 
@@ -150,7 +151,7 @@ def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
     """Write what was asked."""
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(manifest, indent=1, sort_keys=True)
-    write_whole(folder / MANIFEST, lambda file: _write(file, text))
+    write_whole(folder / MANIFEST, lambda file: file.write(text.encode()))
 
 
 def read_failures(folder: Path, most: int | None = None) -> list[dict[str, Any]]:
@@ -162,10 +163,6 @@ def read_failures(folder: Path, most: int | None = None) -> list[dict[str, Any]]
                 break
             found.append(json.loads(line))
     return found
-
-
-def _write(file: IO[bytes], text: str) -> None:
-    file.write(text.encode())
 
 
 def _short(value: Any) -> str:

@@ -1,4 +1,6 @@
-"""Sweep files: a TOML text that tells which system, what varies and what is kept. Every fault is told with its key.
+"""Sweep files: a TOML text that names the system, what varies and what is kept. Every fault is reported with its key.
+
+A sweep file is data, which may come from anyone: it runs no program, and its results stay in the folder it lies in.
 
     system = "double_pendulum"          # of the catalogue; or leave it out and name a Python file on the command line
     options = {n = 2}                   # of the system
@@ -8,7 +10,7 @@
     count = 1000
     seed = 1
     outcomes = ["end q1", "max q2", "mean energy", "q1 at 2.5", "trace q1"]
-    output = "generated/my_sweep"
+    output = "results/my_sweep"         # inside the folder of this file; --output of the command line names any folder
 
     [parameters]
     m1 = 1.5                            # the same for all
@@ -23,11 +25,11 @@
 from __future__ import annotations
 
 import difflib
-import math
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -35,23 +37,31 @@ import numpy as np
 from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.samples import SAMPLINGS, Samples
 from symdyn.errors import ArgumentError
+from symdyn.shown import shown
 
 TABLES = {"parameters": ("parameters",), "initial": ("q", "u", "z"), "inputs": ("inputs",)}
 # Key -> what its value must be.
 KEYS = {"system": "text", "options": "table", "formulation": "text", "coordinates": "text", "t": "times", "rtol": "positive",
         "atol": "positive", "method": "text", "max_steps": "whole", "max_step": "positive", "stabilization": "text",
         "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
-        "outcomes": "texts", "scatter": "pairs", "output": "text", **dict.fromkeys(TABLES, "table")}
+        "outcomes": "texts", "scatter": "pairs", "output": "folder", **dict.fromkeys(TABLES, "table")}
 OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization")
+# No double is larger; whole numbers of TOML have any number of digits.
+LARGEST = sys.float_info.max
 CHOICES = {"formulation": ("auto", "embedding", "recursive", "augmented"), "coordinates": ("relative", "absolute"),
            "sampling": SAMPLINGS, "stabilization": ("projection", "baumgarte", "none")}
 
 
 @dataclass
 class Sweep:
-    """What a file asks for; `values` has the texts, numbers and tables that stood there and are right."""
+    """What a file asks for.
+
+    values   the texts, numbers and tables that stood there and are right
+    folder   where results go: the file's `output`, inside the folder of the file; None without one
+    """
 
     values: dict[str, Any]
+    folder: Path | None = None
     samples: Samples | None = None
     fixed: dict[str, dict[str, float]] = field(default_factory=dict)
     varied: dict[str, list[str]] = field(default_factory=dict)
@@ -102,31 +112,49 @@ def read_sweep(path: Path, faults: list[str]) -> Sweep:
         taken = _value(key, value, KEYS[key], faults)
         if len(faults) == before:
             values[key] = taken
-    sweep = Sweep(values)
+    sweep = Sweep(values, _inside(path.parent, values["output"], faults) if "output" in values else None)
     _take_samples(sweep, content, faults)
     return sweep
 
 
 def _value(key: str, value: Any, kind: str, faults: list[str]) -> Any:
     """A value of the kind, or a fault."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    number = isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
     if kind == "times":
         return _times(key, value, faults)
-    fits = {"text": isinstance(value, str) and bool(value), "table": isinstance(value, dict),
+    text = isinstance(value, str) and bool(value)
+    fits = {"text": text, "folder": text, "table": isinstance(value, dict),
             "positive": number and value > 0, "whole": number and isinstance(value, int) and value >= (key != "seed"),
             "true or false": isinstance(value, bool), "texts": _are_texts(value),
             "pairs": isinstance(value, list) and all(_are_texts(v) and len(v) == 2 for v in value)}[kind]
-    wanted = {"text": "a text", "table": "a table", "positive": "a positive number", "true or false": "true or false",
+    wanted = {"text": "a text", "folder": "the path of a folder, a text", "table": "a table",
+              "positive": "a positive number", "true or false": "true or false",
               "whole": f"a whole number from {int(key != 'seed')} on", "texts": 'a list of texts such as ["max q1"]',
               "pairs": 'a list of pairs such as [["l1", "max q1"]]'}[kind]
     if not fits:
-        faults.append(f"{key}: must be {wanted}, found {value!r:.80}")
+        faults.append(f"{key}: must be {wanted}, found {shown(value, 80)}")
     elif key in CHOICES and value not in CHOICES[key]:
-        faults.append(f"{key}: must be one of {', '.join(CHOICES[key])}, found {value!r:.80}")
+        faults.append(f"{key}: must be one of {', '.join(CHOICES[key])}, found {shown(value, 80)}")
     elif key == "options":
-        faults += [f"options.{k}: must be a number, a text or true or false, found {v!r:.80}" for k, v in value.items()
+        faults += [f"options.{k}: must be a number, a text or true or false, found {shown(v, 80)}" for k, v in value.items()
                    if not isinstance(v, (bool, int, float, str))]
     return value
+
+
+def _inside(home: Path, output: str, faults: list[str]) -> Path | None:
+    """The folder for results of a file that lies in `home`; a fault if it is not below it, links followed."""
+    folder = None
+    if output.isprintable() and ".." not in PurePosixPath(output).parts + PureWindowsPath(output).parts:
+        try:
+            folder = (home / output).resolve()
+        except (OSError, RuntimeError):  # a circle of links, or a name longer than the disk takes
+            folder = None
+    if folder is None or PureWindowsPath(output).drive or home.resolve() not in folder.parents:
+        faults.append("output: must be a folder below the one of the sweep file, such as \"results\", found "
+                      f"{shown(output, 80)}; "
+                      "a sweep file is data, and writes nowhere else. Any folder can be named on the command line: --output DIR")
+        return None
+    return home / output
 
 
 def _are_texts(value: Any) -> bool:
@@ -144,7 +172,7 @@ def _times(key: str, value: Any, faults: list[str]) -> Any:
         return None
     times = axis.values if axis is not None else None
     if times is None or len(times) < 2 or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        faults.append(f"{key}: must be [start, end], a list of increasing times or {{from, to, count}}, found {value!r:.80}")
+        faults.append(f"{key}: must be [start, end], a list of increasing times or {{from, to, count}}, found {shown(value, 80)}")
         return None
     return tuple(times.tolist()) if len(times) == 2 else times
 
@@ -161,8 +189,8 @@ def _take_samples(sweep: Sweep, content: Mapping[str, Any], faults: list[str]) -
         for name, value in entries.items():
             where = f"{table}.{name}"
             numbers = value if isinstance(value, list) else [value]
-            if any(isinstance(v, float) and not math.isfinite(v) for v in numbers):
-                faults.append(f"{where}: must be finite, found {value!r:.80}")
+            if any(isinstance(v, (int, float)) and not abs(v) <= LARGEST for v in numbers):
+                faults.append(f"{where}: must be finite, and within the range of double precision, found {shown(value, 80)}")
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 sweep.fixed[table][name] = float(value)
             elif name in free:

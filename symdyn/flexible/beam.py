@@ -15,9 +15,10 @@ from symdyn.flexible.integrals import AXES, integrate, modes_of
 from symdyn.flexible.modal_body import ModalBody
 from symdyn.flexible.shape import Basis, Shape
 from symdyn.flexible.table import Table, numbers, table
+from symdyn.shown import shown
 
 _INTEGRATIONS = ("exact", "stations")
-_MOST_MODES = 40
+_MOST_MODES, _MOST_DRAWN = 40, 100_000
 _DEPENDENT = 1e-13  # least eigenvalue of the modal mass matrix, scaled to a unit diagonal
 
 
@@ -49,19 +50,19 @@ class Beam:
                  integration: str = "exact", draw: int = 21, name: str = "beam") -> None:
         faults: list[str] = []
         self.name, self.axis, self.integration = str(name), axis, integration
-        if axis not in AXES:
-            faults.append(f"axis is {axis!r}; pass 'x', 'y' or 'z'")
-        if integration not in _INTEGRATIONS:
-            faults.append(f"integration is {integration!r}; pass 'exact' or 'stations'")
-        if not _whole(draw, 2):
-            faults.append(f"draw is {draw!r}; pass a whole number of stations, 2 or more")
+        if not isinstance(axis, str) or axis not in AXES:
+            faults.append(f"axis is {shown(axis)}; pass 'x', 'y' or 'z'")
+        if not isinstance(integration, str) or integration not in _INTEGRATIONS:
+            faults.append(f"integration is {shown(integration)}; pass 'exact' or 'stations'")
+        if not _whole(draw, 2) or draw > _MOST_DRAWN:
+            faults.append(f"draw is {shown(draw)}; pass a whole number of stations, 2 or more, {_MOST_DRAWN} at most")
         found = table(stations, mass_per_length, stiffness, twist, length, faults)
         self._scale = 1.0 if length is None or found is None else found.length
         count = int(shapes) if isinstance(shapes, (int, np.integer)) and _whole(shapes, 1) else None
         given = [] if count is not None else self._shapes(shapes, None if found is None else found.length / self._scale, faults)
         if count is not None and count > _MOST_MODES:
             faults.append(f"shapes asks for {count} modes; at most {_MOST_MODES} are computed")
-        n = count if count is not None else len(given)
+        n = min(count, _MOST_MODES) if count is not None else len(given)
         self._ratios = _ratios(damping_ratio, n, faults)
         self._raise(faults)
         self.table: Table = found  # type: ignore[assignment]  # without faults there is one
@@ -85,7 +86,7 @@ class Beam:
         that the modes are real. At least 24 cubic elements, 4 for each mode, with nodes at all stations.
         """
         if not _whole(count, 1) or count > _MOST_MODES:
-            raise ArgumentError(f"count is {count!r}; pass a whole number of modes from 1 to {_MOST_MODES}")
+            raise ArgumentError(f"count is {shown(count)}; pass a whole number of modes from 1 to {_MOST_MODES}")
         basis = HermiteBasis(self.table, max(24, 4 * count))
         names = tuple(map(str, range(basis.n)))
         body = integrate(self.table, basis, self.axis, np.zeros(basis.n), "exact", self.table.x[[0, -1]], self.name, names)
@@ -96,7 +97,7 @@ class Beam:
     def _shapes(self, shapes: Any, end: float | None, faults: list[str]) -> list[Shape]:
         """The shapes that were given, their faults told with their place."""
         if not isinstance(shapes, (list, tuple)) or not shapes or any(not isinstance(s, Shape) for s in shapes):
-            faults.append(f"shapes is {shapes!r:.60}; pass a list of sd.Shape, or how many modes to take")
+            faults.append(f"shapes is {shown(shapes, 60)}; pass a list of sd.Shape, or how many modes to take")
             return []
         across = AXES.get(self.axis, "xyz")[:2]
         for k, shape in enumerate(shapes, start=1):
@@ -104,8 +105,9 @@ class Beam:
             faults.extend(f"{where}: {fault}" for fault in shape.faults)
             for direction, curve, sampled in shape.parts:
                 if direction not in across:
-                    faults.append(f"{where} deflects along {direction!r}; pass {across[0]!r} or {across[1]!r}, across the axis "
-                                  f"{self.axis!r}")
+                    faults.append(f"{where} deflects along {shown(direction)}; pass {shown(across[0])} or {shown(across[1])}, "
+                                  "across the axis "
+                                  f"{shown(self.axis)}")
                 if sampled and end is not None and abs(curve.x[-1] - end) > 1e-9 * end:
                     faults.append(f"{where}: its stations end at {curve.x[-1]:g}; they must end at {end:g}, the tip")
         return list(shapes)
@@ -124,7 +126,7 @@ class Beam:
 
     def _raise(self, faults: list[str]) -> None:
         if faults:
-            raise ModelError([f"beam {self.name!r}: {fault}" for fault in faults], self.name)
+            raise ModelError([f"beam {shown(self.name)}: {fault}" for fault in faults], self.name)
 
 
 def _separate_modes(M: np.ndarray, K: np.ndarray, count: int) -> np.ndarray:
@@ -142,7 +144,8 @@ def _separate_modes(M: np.ndarray, K: np.ndarray, count: int) -> np.ndarray:
 
 def _ratios(value: Any, n: int, faults: list[str]) -> np.ndarray:
     """(n,) damping ratios."""
-    row = numbers([value] * n if np.ndim(value) == 0 and n else value if np.ndim(value) else [0.0], "damping_ratio", faults)
+    several = isinstance(value, (list, tuple)) or bool(getattr(value, "ndim", 0))
+    row = numbers(value, "damping_ratio", faults, None if several else n or 1)
     if row is None:
         return np.zeros(n)
     if n and row.size != n:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PPoly
 
 from symdyn.flexible.table import numbers, rising
+from symdyn.shown import name_of
 
 # A shape is not clamped if the slope that its samples have at the clamp is more than this part of their largest slope.
 _LARGEST_SLOPE = 0.25
@@ -39,10 +40,10 @@ class Shape:
             self.faults.append("a shape has either coefficients or values; pass one of them")
         elif values is None:
             curve = self._polynomial(coefficients, powers)
-            self.parts = () if curve is None else ((str(direction), curve, False),)
+            self.parts = () if curve is None else ((name_of(direction), curve, False),)
         else:
             curve = self._sampled(stations, values, slopes, curvatures)
-            self.parts = () if curve is None else ((str(direction), curve, True),)
+            self.parts = () if curve is None else ((name_of(direction), curve, True),)
 
     def __add__(self, other: Shape) -> Shape:
         if not isinstance(other, Shape):

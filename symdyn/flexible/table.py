@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PPoly
 
+from symdyn.real_numbers import NotReal, real
+from symdyn.shown import shown
+
 _LARGEST = 1e30
 
 
@@ -54,10 +57,10 @@ def numbers(value: Any, what: str, faults: list[str], size: int | None = None) -
     try:
         if value is None:
             raise TypeError
-        row = np.array(value, dtype=float)
+        row = np.array(real(value))
         row = np.full(size, row) if size is not None and row.ndim == 0 else row
-    except (TypeError, ValueError):
-        faults.append(f"{what} is {_short(value)}; pass a list of numbers")
+    except (TypeError, NotReal) as error:
+        faults.append(f"{what} is {_short(value)}; pass a list of numbers" + (f": {error}" if str(error) else ""))
         return None
     if row.ndim != 1 or not row.size:
         faults.append(f"{what} has the shape {row.shape}; pass a list of numbers")
@@ -98,7 +101,8 @@ def table(stations: Any, mass_per_length: Any, stiffness: Any, twist: Any, lengt
         rising(x, "stations", None if length is None else 1.0, faults)
     size = None if x is None else x.size
     mass = _not_negative(mass_per_length, "mass_per_length", "kg/m", faults, size)
-    two = isinstance(stiffness, (tuple, list, np.ndarray)) and len(stiffness) == 2 and np.ndim(stiffness[0]) == 1
+    several = isinstance(stiffness, (tuple, list)) or getattr(stiffness, "ndim", 0) > 1
+    two = several and len(stiffness) == 2 and (isinstance(stiffness[0], (tuple, list)) or getattr(stiffness[0], "ndim", 0) == 1)
     pair = tuple(stiffness) if two else (stiffness, stiffness)
     names = ("stiffness",) if pair[0] is pair[1] else ("stiffness of direction 1", "stiffness of direction 2")
     EI = [_not_negative(row, what, "N m^2", faults, size) for row, what in zip(pair, names, strict=False)]
@@ -149,5 +153,4 @@ def _not_missing(row: np.ndarray, x: np.ndarray, what: str, faults: list[str]) -
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return shown(value, 60)

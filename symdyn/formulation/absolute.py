@@ -15,15 +15,17 @@ from typing import Any
 
 import sympy as sp
 
-from symdyn.model.bodies import Body, Point
+from symdyn.formulation.site import has_roll_pitch_yaw, joint_with_ground
+from symdyn.model.bodies import Body
 from symdyn.model.closures import Gear
-from symdyn.model.elements import Element
+from symdyn.model.elements import Element, LinearStiffness
 from symdyn.model.joints import Custom, Free, Helical, Joint, Modal, Planar
-from symdyn.model.loads import JointForce
+from symdyn.model.loads import JointForce, expressions_of
 from symdyn.model.loop_check import carried
 from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.model.points import Point
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Coordinate, Speed
+from symdyn.model.symbols import Coordinate, Speed, symbols_of
 
 
 def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParameters | None = None) -> Model:
@@ -69,8 +71,7 @@ def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParame
         units.update({q: unit for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True)
                       if isinstance(q, Coordinate)})
         units.update({u: unit for u, unit in zip(joint_speeds(joint), joint.speed_units, strict=True) if u is not None})
-    loads = tuple(replace(load, joint=getattr(load.joint, "name", load.joint)) if isinstance(load, JointForce) else load
-                  for load in model.loads)
+    loads = tuple(_as_meant(load, model) for load in model.loads)
     known = {*coordinates, *speeds, *[z.symbol for z in model.states], *model.inputs}
     return replace(model, bodies=tuple(bodies), joints=joints, parents=tuple(p for _, p, _ in order),
                    children=tuple(c for _, _, c in order), loops=(*closing, *model.loops), loads=loads,
@@ -131,6 +132,17 @@ def _needs_coordinates(joint: Joint, used: set[sp.Symbol | str]) -> bool:
     return any(s in used for s in (*joint.coordinates, *[q.dot for q in joint.coordinates], *joint_speeds(joint)))
 
 
+def _as_meant(load: Any, model: Model) -> Any:
+    """A load, with what it takes from the joints of the tree, which are no longer there."""
+    if isinstance(load, JointForce):
+        return replace(load, joint=getattr(load.joint, "name", load.joint))
+    if isinstance(load, LinearStiffness):
+        names = [body.name for body in model.bodies]
+        name = getattr(load.body, "name", load.body)
+        return load.with_angles_of(has_roll_pitch_yaw(joint_with_ground(model, names.index(name)))) if name in names else load
+    return load
+
+
 def _used(model: Model) -> set[Any]:
     """Symbols that stand in expressions, and names of joints that are driven or geared."""
     expressions: list[Any] = [c.expression for c in model.constraints] + [z.rate for z in model.states]
@@ -142,14 +154,12 @@ def _used(model: Model) -> set[Any]:
     for event in model.events:
         expressions += event.expressions
     for load in model.loads:
-        used = load.expressions if isinstance(load, Element) else (*getattr(load, "force", ()), *getattr(load, "torque", ()),
-                                                                   *getattr(load, "values", ()))
-        expressions += used
+        expressions += load.expressions if isinstance(load, Element) else expressions_of(load)
         if isinstance(load, JointForce):
             names.add(getattr(load.joint, "name", load.joint))
     for gear in (g for g in model.loops if isinstance(g, Gear)):
         names.update(getattr(j, "name", j) for j in (gear.joint_a, gear.joint_b))
-    return names.union(*[e.free_symbols for e in expressions if isinstance(e, sp.Basic)])
+    return names.union(*[symbols_of(e) for e in expressions if isinstance(e, sp.Basic)])
 
 
 def _pairs(joint: Joint) -> Iterable[tuple[Any, Any]]:

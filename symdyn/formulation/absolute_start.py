@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from symdyn.errors import ModelWarning
+from symdyn.errors import ModelError, ModelWarning
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.tree_equations import tree_of
 from symdyn.model.joints import Free, Joint
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.record import Model, joint_speeds
-from symdyn.spatial.vectors import vector, zeros
-from symdyn.tape.differentiate import forward
+from symdyn.spatial.vectors import cross, zeros
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.tape import Tape
 
@@ -34,33 +33,35 @@ def absolute_start(relative: Model, absolute: Model) -> dict[sp.Symbol, float]:
     tree = tree_of(relative, "body")
     kinematics = Kinematics(tree)
     ground_R, ground_p = kinematics.rotation(tree.ground), kinematics.position(tree.ground, zeros(3))
-    rows = []
-    for pose in tree.poses:
-        R = ground_R.T @ kinematics.rotation(pose)
-        p = ground_R.T @ (kinematics.position(pose, zeros(3)) - ground_p)
-        rows.append([*p, *R.ravel()])
-    poses = np.array(rows, dtype=object)
-    algebra = tree.algebra
-    rates = forward(algebra.recorder, poses.ravel().tolist(), algebra.by_time(relative.coordinates, tree.rates))
-    tape = Tape.of(algebra.recorder, poses=poses, rates=vector(*rates).reshape(poses.shape))
+    ground_omega, ground_v = kinematics.twist(tree.ground, zeros(3))
+    poses, twists = [], []
+    for pose in tree.poses:  # by the speeds: rates of angles do not exist at gimbal lock, where speeds may be those of the body
+        arm, (omega, v) = kinematics.position(pose, zeros(3)) - ground_p, kinematics.twist(pose, zeros(3))
+        poses.append([*(ground_R.T @ arm), *(ground_R.T @ kinematics.rotation(pose)).ravel()])
+        twists.append([*(ground_R.T @ (v - ground_v - cross(ground_omega, arm))), *(ground_R.T @ (omega - ground_omega))])
+    tape = Tape.of(tree.algebra.recorder, poses=np.array(poses, dtype=object), twists=np.array(twists, dtype=object))
     found = {name: array[0] for name, array in evaluate_rows(tape, values, 1).items()}
     start: dict[sp.Symbol, float] = {}
     for k, joint in own:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            start |= _of_joint(joint, found["poses"][k], found["rates"][k])
+            start |= _of_joint(joint, found["poses"][k], found["twists"][k])
         if any("imbal" in str(warning.message) for warning in caught):
             angles: Any = getattr(joint, "orientation", None)
             warnings.warn(f"{relative.name}: the Euler angles {angles.sequence} of {absolute.bodies[k].name} are singular at the "
                           "initial state (gimbal lock), so that they have no derivatives there; pass an orientation of another "
                           "sequence, or sd.EulerParameters()", ModelWarning, stacklevel=5)
+    wrong = [symbol.name for symbol, value in start.items() if not np.isfinite(value)]
+    if wrong:
+        raise ModelError([f"the initial state has no numbers in absolute coordinates: {', '.join(wrong)} would not be "
+                          "finite; give initial values and defaults at which positions and velocities of all bodies exist"],
+                         relative.name)
     return start
 
 
-def _of_joint(joint: Joint, pose: np.ndarray, rate: np.ndarray) -> dict[sp.Symbol, float]:
-    p, R = pose[:3], pose[3:].reshape(3, 3)
-    spin = rate[3:].reshape(3, 3) @ R.T
-    omega = np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
+def _of_joint(joint: Joint, pose: np.ndarray, twist: np.ndarray) -> dict[sp.Symbol, float]:
+    """Start values of a body's own joint; twist: velocity of its origin and angular velocity, axes of the ground."""
+    p, R, rate, omega = pose[:3], pose[3:].reshape(3, 3), twist[:3], twist[3:]
     if not isinstance(joint, Free):
         position, speeds = [p[0], p[1], np.arctan2(R[1, 0], R[0, 0])], [rate[0], rate[1], omega[2]]
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import UnsupportedExpression
+from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate, time
 from symdyn.spatial.vectors import vector
@@ -21,7 +22,8 @@ from symdyn.tape.sympy_bridge import record_expression
 class TapeAlgebra:
     """Records on a tape; knows which leaf each symbol of the model is.
 
-    leaves   symbol -> node, for coordinates, speeds, states, inputs, parameters, t and the derivatives of speeds
+    leaves    symbol -> node, for coordinates, speeds, states, inputs, parameters, t and the derivatives of speeds
+    measured  records points, orientations and distances that stand in expressions; None where there are no bodies
     """
 
     # A difference of terms of size 1 that is below this is rounding error alone: 64 units of the last place of doubles.
@@ -30,6 +32,7 @@ class TapeAlgebra:
     def __init__(self, recorder: Recorder, leaves: dict[sp.Basic, Any]) -> None:
         self.recorder = recorder
         self.leaves = leaves
+        self.measured: Callable[[Quantity], Any] | None = None
         self._memory: dict[sp.Basic, Any] = {}
         self.sin, self.cos, self.sqrt = recorder.sin, recorder.cos, recorder.sqrt
         self.section = recorder.section
@@ -37,7 +40,9 @@ class TapeAlgebra:
 
     def within(self, values: Mapping[sp.Basic, Any]) -> TapeAlgebra:
         """The same algebra with scalars that stand for some symbols, in place of their leaves."""
-        return TapeAlgebra(self.recorder, {**self.leaves, **values})
+        other = TapeAlgebra(self.recorder, {**self.leaves, **values})
+        other.measured = self.measured
+        return other
 
     def divisor(self, value: Any, least: Any, reason: str) -> Any:
         """A value to divide by; where it is not above `least` when the code runs, that stops and tells the reason."""
@@ -45,6 +50,10 @@ class TapeAlgebra:
 
     def expression(self, e: Any) -> Any:
         """A SymPy expression on the tape. Raises UnsupportedExpression, telling in which part of the model it stands."""
+        quantities = [q for q in quantities_in([e]) if q not in self.leaves and q not in self._memory]
+        if quantities and self.measured is not None:
+            # Not among the leaves: these are printed under the names of their symbols.
+            self._memory.update({q: self.measured(q) for q in quantities})
         try:
             return record_expression(self.recorder, e, self.leaves, self._memory)
         except (UnsupportedExpression, ZeroDivisionError) as error:

@@ -27,10 +27,14 @@ from symdyn.formulation.tree_equations import tree_of, tree_result
 from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.model.quantity import Quantity
 from symdyn.model.record import Model
+from symdyn.model.symbols import symbols_of
+from symdyn.shown import shown
 from symdyn.spatial.vectors import inner, vector
 from symdyn.tape.differentiate import jacobian
 from symdyn.tape.node import SEED, is_zero
+from symdyn.turning import turns
 
 COORDINATES = ("relative", "absolute")
 
@@ -69,7 +73,7 @@ class ConstrainedTree(Constrained, TreeQuantities):
         inside: set[str] = set().union(*[path(c.joint.parent) ^ path(c.joint.child) for c in self.gathered.closures])
         known = set(model.coordinates)
         return [j.name for j in model.joints if j.name in inside and j.coordinates
-                and not any(q.free_symbols & known for q in j.coordinates)]
+                and not any(symbols_of(q) & known for q in j.coordinates)]
 
     @property
     def reacting(self) -> tuple[Joint, ...]:
@@ -90,15 +94,24 @@ class ConstrainedTree(Constrained, TreeQuantities):
         entries = [e for joint in self.reacting for e in found[joint.name]]
         return jacobian(recorder, entries, list(lam), "forward")
 
-    def all_reactions(self) -> dict[str, np.ndarray]:
-        return self.reactions_of(self.lam())
+    def all_reactions(self, whole: bool = False) -> dict[str, np.ndarray]:
+        return self.reactions_of(self.lam(), whole)
 
-    def reactions_of(self, lam: np.ndarray) -> dict[str, np.ndarray]:
-        """Joint name -> reaction with these multipliers."""
+    def reactions_of(self, lam: np.ndarray, whole: bool = False) -> dict[str, np.ndarray]:
+        """Joint name -> reaction with these multipliers, or whole: cut load."""
         closed = {place for c in self.gathered.closures for place in c.places}
         other = [k for k in range(len(self.rows)) if k not in closed]
         along = -self.C_r()[other].T @ lam[other] if other else None
-        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along)
+        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), self.gathered.closures, lam, along,
+                         whole)
+
+    def measured(self, quantity: Quantity) -> Any:
+        if quantity.measure.kind != "multiplier":
+            return super().measured(quantity)
+        names, name = [row.name for row in self.rows], quantity.measure.of[0]
+        if name not in names:
+            raise ModelError([f"{quantity} is requested; constraints are {', '.join(names) or 'none'}"], self.model.name)
+        return self.lam()[names.index(name)]
 
     def power(self) -> Any:
         """Power of the loads and drives, and of the constraints that depend on time, W."""
@@ -111,13 +124,13 @@ class ConstrainedTree(Constrained, TreeQuantities):
 
     @property
     def angular(self) -> list[bool]:
-        return [self.model.units.get(u) == "rad/s" for u in self.model.speeds]
+        return [turns(self.model.units.get(u)) for u in self.model.speeds]
 
 
 def _demand_orientation(model: Model, coordinates: str, orientation: Any) -> None:
     """Raises SymdynError for an orientation that is none, or that nothing takes."""
     if not isinstance(orientation, (EulerAngles, EulerParameters)):
-        raise SymdynError(f"orientation is {orientation!r}; it tells how bodies turn in absolute coordinates: pass "
+        raise SymdynError(f"orientation is {shown(orientation)}; it tells how bodies turn in absolute coordinates: pass "
                           "sd.EulerParameters() or sd.EulerAngles('ZYX')")
     unused = "coordinates are 'relative'" if coordinates != "absolute" else "the system is planar" if model.planar else ""
     if unused:
@@ -128,8 +141,8 @@ def _demand_orientation(model: Model, coordinates: str, orientation: Any) -> Non
 
 def augment(model: Model, coordinates: str = "relative", orientation: Any = None, frames: str = "parallel") -> AugmentedEquations:
     """The augmented equations of a checked model; see System.augmented."""
-    if coordinates not in COORDINATES:
-        raise SymdynError(f"coordinates {coordinates!r} asked for; there are {' and '.join(map(repr, COORDINATES))}")
+    if not isinstance(coordinates, str) or coordinates not in COORDINATES:
+        raise SymdynError(f"coordinates {shown(coordinates)} asked for; there are {' and '.join(map(repr, COORDINATES))}")
     if orientation is not None:
         _demand_orientation(model, coordinates, orientation)
     again = partial(augment, model, coordinates, orientation, frames)
@@ -147,4 +160,6 @@ def augment(model: Model, coordinates: str = "relative", orientation: Any = None
         faults = contradictions(result(ConstrainedTree(tree, gathered, True), None))
         if faults:
             raise ModelError(faults, model.name)
+    else:  # a tree without constraints, which needs mass in every motion, as in the other formulations
+        TreeQuantities(tree).demand_inertia()
     return choose(lambda *way: ConstrainedTree(tree, gathered, *way), result, search)

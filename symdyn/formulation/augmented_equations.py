@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.errors import SymdynError
 from symdyn.formulation.motion_equations import MotionEquations
+from symdyn.shown import name_of
 
 
 class AugmentedEquations(MotionEquations):
@@ -79,9 +80,8 @@ class AugmentedEquations(MotionEquations):
         factors that all terms share. Together with C_r u_dot = F_d these are n_u equations. Raises SymdynError for a wrong
         number of speeds or a singular choice.
         """
-        several = isinstance(dependent, sp.MatrixBase) or (hasattr(dependent, "__iter__") and not isinstance(dependent, str))
-        given = list(dependent) if several else [dependent]
-        names = [str(getattr(d, "name", d)) for d in given]
+        given = list(dependent) if isinstance(dependent, (sp.MatrixBase, list, tuple)) else [dependent]
+        names = [name_of(d) for d in given]
         speeds = self.symbols.speeds
         known = {s.name: k for k, s in enumerate(speeds)}
         known |= {q.name: known[f"{q.name}_dot"] for q in self.symbols.coordinates if f"{q.name}_dot" in known}

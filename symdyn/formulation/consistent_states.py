@@ -9,6 +9,7 @@ import numpy as np
 
 from symdyn.formulation.equations import Equations
 from symdyn.tape.floats import evaluate_rows
+from symdyn.turning import turns
 
 ITERATIONS = 60
 # Residuals as lengths, relative to the mechanism's, below this are zero.
@@ -28,7 +29,7 @@ class ConstraintStates:
         self.values |= {s.name: 0.0 for s in (*symbols.speeds, *symbols.states, *symbols.inputs)}
         self.holonomic = np.array(equations.holonomic, dtype=bool)
         self.units = [[self.names.index(q.name) for q in group] for group in equations.unit_groups]
-        self.angular = np.array([symbols.units.get(u) in ("rad/s", "1/s") for u in symbols.speeds], dtype=bool)
+        self.angular = np.array([turns(symbols.units.get(u)) for u in symbols.speeds], dtype=bool)
 
     def at(self, q: np.ndarray) -> dict[str, np.ndarray]:
         """C (s, n_c), C_r (s, n_c, n_u), C_scale (s, n_c), N (s, n_q, n_u), length (s,) at coordinates (s, n_q)."""

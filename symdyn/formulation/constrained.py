@@ -34,7 +34,7 @@ VANISHING = Fraction(1, 1000)
 class Constrained(Motion):
     """Mixed in before a Motion: what constraints add to it.
 
-    rows          of the constraints; length: the mechanism's, m; angular: for each speed whether it is in rad/s
+    rows          of the constraints; length: the mechanism's, m; angular: for each speed whether it turns (symdyn.turning)
     kernel        False: Schur complement of the factorized mass matrix, as statements; True: the numeric algorithm that takes
                   singular mass matrices and dependent constraints, too
     independent   places of rows that imply the others; None: all rows

@@ -22,7 +22,8 @@ from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerParameters
-from symdyn.model.symbols import Coordinate
+from symdyn.model.quantity import Quantity, of_speeds
+from symdyn.model.symbols import Coordinate, symbols_of
 from symdyn.spatial.vectors import dot, inner, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
@@ -214,8 +215,8 @@ def unit_of(expression: sp.Expr, units: Mapping[sp.Symbol, str]) -> str:
 
     Found by its values with all lengths doubled and trebled.
     """
-    symbols = sorted(expression.free_symbols, key=str)
-    lengths = [s for s in symbols if units.get(s) in ("m", "m/s")]
+    symbols = sorted(symbols_of(expression), key=str)
+    lengths = [s for s in symbols if (s.unit if isinstance(s, Quantity) else units.get(s)) in ("m", "m/s")]
     stream = np.random.default_rng(5)
     values = {s: sp.Float(v, 30) for s, v in zip(symbols, stream.uniform(0.3, 1.3, len(symbols)), strict=True)}
     try:
@@ -236,7 +237,8 @@ def expression_row(algebra: Any, constraint: Constraint, coordinates: Sequence[s
     recorder = algebra.recorder
     value = algebra.expression(constraint.expression)
     moving = {*speeds, *[q.dot for q in coordinates if isinstance(q, Coordinate)]}
-    holonomic = not constraint.expression.free_symbols & moving
+    symbols = symbols_of(constraint.expression)
+    holonomic = not symbols & moving and not any(map(of_speeds, symbols))
     rate = forward(recorder, [value], by_time)[0] if holonomic else value
     jacobian = vector(*[forward(recorder, [rate], {algebra.leaves[u]: 1})[0] for u in speeds])
     remaining = forward(recorder, [rate], by_time)[0]

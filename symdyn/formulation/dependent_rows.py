@@ -72,19 +72,29 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     stream = np.random.default_rng(seed)
     near = stream.uniform(-1, 1, (STARTS, start.shape[1]))
     near[0] = 0  # the initial state itself; from a singular one no step leads on
-    q, residual = states.nearest(start + near)
+    near, residual = states.nearest(start + near)
     if not (residual < FULFILLED).any():
         return None
-    q = q[int(np.argmax(residual < FULFILLED))][None]
+    consistent = near[residual < FULFILLED]
+    q = consistent[:1]
     places = np.concatenate([q, *walked(states, q, stream)])
     samples = scaled(states, places)
     sizes = np.linalg.svd(samples, compute_uv=False)
     counts = (sizes > RANK_TOLERANCE * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
     rank = int(counts.max(initial=0))
     samples = samples[counts == rank]
-    values = {**states.values, **dict(zip(states.names, q[0], strict=True))}
-    mass = evaluate_rows(equations.tape("M_tilde"), values, 1)["M_tilde"][0]
+    mass = _mass(equations, states, np.concatenate([places, consistent]))
+    if mass is None:
+        return None
     return Ranks(rank, _independent(samples, rank), samples, mass, _vanishing(states, places, stream))
+
+
+def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
+    """M_tilde at the first of the places (s, n_q) where it exists: not at gimbal lock where a joint follows angles."""
+    values = {**states.values, **dict(zip(states.names, places.T, strict=True))}
+    masses = evaluate_rows(equations.tape("M_tilde"), values, len(places))["M_tilde"]
+    there = np.isfinite(masses).all(axis=(1, 2))
+    return masses[int(np.argmax(there))] if there.any() else None
 
 
 def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:

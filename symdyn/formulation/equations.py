@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
+from symdyn.counting import counted
 from symdyn.errors import SymdynError
-from symdyn.tape.node import Node
+from symdyn.kinds import flag, text
+from symdyn.shown import shown
+from symdyn.tape.node import ACCELERATION, Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Tape
+
+# Seconds for an explicit form where less, or nothing, is left for its simplification.
+_EXPANDED = 1.0
 
 if TYPE_CHECKING:
     from symdyn.report.latex import Typeset
@@ -50,6 +57,8 @@ class Equations:
     leaves       symbol -> leaf of the tape
     quantities   name -> function that records it; planar: 3 rows a body instead of 6
     notes        what the formulation left out, and why
+    implicit_loads   labels of loads that depend on accelerations, multipliers or reactions; of_reactions: outputs and rates of
+                     states that depend on multipliers or reactions, in words
     unit_groups  coordinates that form a unit vector (Euler parameters)
     charts       of Euler angles: joint, sequence, kind of speeds, coordinate of the second angle
     again        derives the same equations on a new tape, so that files do not depend on what was recorded before
@@ -76,6 +85,8 @@ class Equations:
     notes: tuple[str, ...] = ()
     unit_groups: tuple[tuple[sp.Symbol, ...], ...] = ()
     charts: tuple[tuple[str, str, str, str], ...] = field(default=(), kw_only=True)
+    implicit_loads: tuple[str, ...] = field(default=(), kw_only=True)
+    of_reactions: tuple[str, ...] = field(default=(), kw_only=True)
     again: Callable[[], Equations] | None = None
     simplify_seconds: float = 10.0
     frames: str = "body"
@@ -96,13 +107,14 @@ class Equations:
 
     def quantity(self, name: str) -> np.ndarray:
         """A quantity, or a named output, as an array of nodes and numbers; recorded on first use."""
+        text(name, "the name of a quantity", "M_tilde")
         if name not in self.quantities and f"output_{name}" in self.quantities:
             name = f"output_{name}"
         if name not in self._recorded:
             if name not in self.quantities:
                 reason = "".join(f": {note}" for note in self.notes
                                  if note.startswith("no ") and name.partition("_")[0].lower() in note.lower())
-                raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {name!r}{reason}; it has "
+                raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {shown(name)}{reason}; it has "
                                   f"{', '.join(self.quantities)}")
             self._recorded[name] = np.asarray(self.quantities[name](), dtype=object)
         return self._recorded[name]
@@ -112,14 +124,29 @@ class Equations:
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
     def explicit(self, name: str, simplify: bool = True) -> Any:
-        """The quantity as explicit SymPy, simplified as far as the time limit `simplify_seconds` allows."""
-        if name not in self._printed or not simplify:
-            value = expand(self.tape(name).outputs[name], self.printed_leaves())
+        """The quantity as explicit SymPy, simplified as far as the time limit `simplify_seconds` allows.
+
+        Without `simplify` there is no limit. Raises SymdynError if the quantity is so long that the time is over before it is
+        multiplied into one expression.
+        """
+        text(name, "the name of a quantity", "M_tilde")
+        if not flag(simplify, "simplify") or name not in self._printed:
+            output = self.tape(name).outputs[name]
             if not simplify:
-                return value
+                return expand(output, self.printed_leaves())
+            from symdyn.report.limit import TimeUp, within
             from symdyn.report.simplify import simplified
 
-            self._printed[name] = simplified(value, self.simplify_seconds)
+            begin = clock.monotonic()
+            try:
+                value = within(max(self.simplify_seconds, _EXPANDED), lambda: expand(output, self.printed_leaves()))
+            except TimeUp:
+                raise SymdynError(
+                    f"{self.name}: {name} has {len(self.tape(name).steps)} steps and is no explicit expression within "
+                    f"{max(self.simplify_seconds, _EXPANDED):g} s; print its steps with latex({name!r}, intermediates=True), "
+                    f"evaluate it with lambdify({name!r}), or wait for it without a limit with explicit({name!r}, "
+                    "simplify=False)") from None
+            self._printed[name] = simplified(value, self.simplify_seconds - (clock.monotonic() - begin))
         return self._printed[name]
 
     def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
@@ -135,8 +162,17 @@ class Equations:
         return equations_latex(self, name, shorthand, intermediates, width, simplify)
 
     def printed_leaves(self) -> dict[Node, sp.Basic]:
-        """Leaf of the tape -> the symbol it is printed as."""
-        return {leaf: symbol for symbol, leaf in self.leaves.items() if isinstance(leaf, Node) and leaf.op == "leaf"}
+        """Leaf of the tape -> the symbol it is printed as: its own, where others stand for the same value.
+
+        A speed u with a name of its own is the derivative of its coordinate, too, and is printed as u.
+        """
+        printed: dict[Node, sp.Basic] = {}
+        for symbol, leaf in self.leaves.items():
+            if isinstance(leaf, Node) and leaf.op == "leaf" and (leaf not in printed or symbol.name == leaf.args[1]):
+                printed[leaf] = symbol
+        for u in self.symbols.speeds:
+            printed.setdefault(self.recorder.leaf(f"{u.name}_dot", ACCELERATION), u.dot)
+        return printed
 
     @property
     def accelerations(self) -> sp.Matrix:
@@ -150,23 +186,45 @@ class Equations:
         """
         return self.compile(backend="numpy").function(name)
 
-    def compile(self, backend: str | None = None, **options: Any) -> Any:
-        """A numeric module; backend "c" or "numpy", default: C if a compiler is found, else NumPy.
+    def compile(self, backend: str | None = None, templates: str | os.PathLike[str] | None = None,
+                specialize: Mapping[Any, float] | None = None) -> Any:
+        """A numeric module.
 
-        See symdyn.pipeline.compile_equations for the options.
+        backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
+        templates    folder whose templates take precedence
+        specialize   parameters, by symbol or name, that become numbers in the code and are folded
+
+        Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
         """
         from symdyn.pipeline import compile_equations
 
-        return compile_equations(self, backend, **options)
+        return compile_equations(self, backend, templates, specialize)
 
-    def write(self, folder: Any, backend: str = "c", **options: Any) -> list[Any]:
+    def write(self, folder: str | os.PathLike[str], backend: str = "c", functions: Sequence[str] | None = None,
+              templates: str | os.PathLike[str] | None = None, specialize: Mapping[Any, float] | None = None,
+              integrator: bool = True, work: bool = False, baumgarte: bool = False, batch: bool = False,
+              method: str = "dop853") -> list[Any]:
         """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
 
-        See symdyn.pipeline.emit for the options: functions, templates, specialize.
+        backend      "c" or "numpy"
+        functions    names of what is written; default: the usual ones that the formulation has
+        templates    folder whose templates take precedence
+        specialize   parameters, by symbol or name, that become numbers in the code and are folded
+        integrator   C only: with an integrator of rhs, by the compiled method of this name: `method`
+        work         rhs gets one more state at the end: the work of all loads but gravity and springs
+        baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
+        batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
+
+        Raises SymdynError for an unknown function, parameter, backend or method, or a broken template.
         """
         from symdyn.pipeline import emit, write_source
+        from symdyn.runtime.paths import as_path, writing
 
-        return write_source(emit(self, backend, **options), Path(folder))
+        target = as_path(folder, "of the folder to write to", "generated/arm")
+        source = emit(self, backend, functions, templates, integrator=integrator, specialize=specialize, work=work,
+                      baumgarte=baumgarte, batch=batch, method=method)
+        with writing(target):
+            return write_source(source, target)
 
     def base_parameters(self) -> Any:
         """The smallest set of inertial parameters that the equations depend on; see symdyn.formulation.identification."""
@@ -182,4 +240,6 @@ class Equations:
 
     def __repr__(self) -> str:
         s = self.symbols
-        return f"<{self.formulation} equations of {self.name}: {len(s.coordinates)} coordinates, {len(s.speeds)} speeds>"
+        rows = f", {counted(len(self.constraints), 'constraint')}" if self.constraints else ""
+        return (f"<{self.formulation} equations of {self.name}: {counted(len(s.coordinates), 'coordinate')}, "
+                f"{counted(len(s.speeds), 'speed')}{rows}>")

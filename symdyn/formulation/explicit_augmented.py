@@ -28,6 +28,7 @@ from symdyn.formulation.saddle_choice import choose
 from symdyn.model.closures import Constraint
 from symdyn.model.faults import NAME
 from symdyn.model.loop_check import constraint_faults
+from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import inner, zeros
 
 # Starts from which consistent states are looked for.
@@ -81,12 +82,15 @@ def _labels(given: ByHand, names: Any, n: int) -> list[str]:
     """Names of n constraints."""
     if names is None:
         return [f"constraint_{k + 1}" for k in range(n)]
+    if not isinstance(names, (str, list, tuple)):
+        given.faults.append(f"names is {shown(names)}; pass a list of text, one for each constraint")
+        return [f"constraint_{k + 1}" for k in range(n)]
     names = list(names) if not isinstance(names, str) else [names]
-    given.faults += [f"one of the constraints is named {label!r}; pass text on one line of letters, digits, spaces and "
+    given.faults += [f"one of the constraints is named {shown(label)}; pass text on one line of letters, digits, spaces and "
                      "_ . , : + - * / ^ ' # % and brackets" for label in names
                      if not isinstance(label, str) or not NAME.fullmatch(label)]
-    given.faults += [f"{count} constraints are named {label!r}; give each a name of its own"
-                     for label, count in Counter(map(str, names)).items() if count > 1]
+    given.faults += [f"{count} constraints are named {shown(label)}; give each a name of its own"
+                     for label, count in Counter(map(name_of, names)).items() if count > 1]
     if len(names) != n:
         given.faults.append(f"names has {len(names)} entries, there are {n} constraints; give each a name")
         return [f"constraint_{k + 1}" for k in range(n)]

@@ -14,7 +14,21 @@ import sympy as sp
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.equations import Symbols
 from symdyn.model.faults import Faults
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_coordinate, take_over, time
+from symdyn.model.joints.base import listed
+from symdyn.model.quantity import Quantity
+from symdyn.model.symbols import (
+    Acceleration,
+    Coordinate,
+    Input,
+    Rate,
+    as_coordinate,
+    described,
+    finite,
+    symbols_of,
+    take_over,
+    time,
+)
+from symdyn.shown import name_of, shown
 from symdyn.tape import node as kinds
 from symdyn.tape.recorder import Recorder
 
@@ -43,8 +57,8 @@ class ByHand:
     def __init__(self, coordinates: Any, name: Any) -> None:
         self.faults = Faults()
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            self.faults.append(f"name is {name!r}; pass an identifier such as 'pendulum', it names files and functions")
-        given = list(coordinates) if hasattr(coordinates, "__iter__") else [coordinates]
+            self.faults.append(f"name is {shown(name)}; pass an identifier such as 'pendulum', it names files and functions")
+        given = list(coordinates) if listed(coordinates) else [coordinates]
         if not given:
             self.faults.append("there are no coordinates; pass symbols made with sd.coordinates")
         q = [as_coordinate(c) for c in given]
@@ -65,8 +79,8 @@ class ByHand:
             if len(values) and 1 not in values.shape:
                 self.faults.append(f"{what} is a {values.shape[0]} x {values.shape[1]} matrix; pass a column")
             values = list(values)
-        if not isinstance(values, (list, tuple, np.ndarray)):
-            self.faults.append(f"{what} is {values!r}; pass a list or column of expressions")
+        if not isinstance(values, (list, tuple, np.ndarray)) or np.ma.isMaskedArray(values) or getattr(values, "ndim", 1) == 0:
+            self.faults.append(f"{what} is {shown(values)}; pass a list or column of expressions")
             return []
         known = len(labels) == len(values)
         return [self.expression(v, labels[k] if known else f"{what}[{k + 1}]") for k, v in enumerate(values)]
@@ -74,12 +88,14 @@ class ByHand:
     def mass(self, mass: Any, n: int, of: str) -> sp.Matrix:
         """The (n, n) mass matrix, from itself or from its diagonal; of: what has n entries."""
         faults = self.faults
-        try:
-            M = sp.Matrix(mass)
-        except (TypeError, ValueError, sp.SympifyError):
-            faults.append(f"mass is {mass!r}; pass a square matrix, or a list for its diagonal")
+        # SymPy evaluates text that it is to make a matrix of: every entry is looked at before.
+        rows = mass.tolist() if isinstance(mass, (sp.MatrixBase, np.ndarray)) and not np.ma.isMaskedArray(mass) else mass
+        rows = list(rows) if isinstance(rows, (list, tuple)) else None
+        flat = rows is not None and not any(isinstance(row, (list, tuple)) for row in rows)
+        if not rows or not (flat or all(isinstance(row, (list, tuple)) and len(row) == len(rows[0]) for row in rows)):
+            faults.append(f"mass is {shown(mass)}; pass a square matrix, or a list for its diagonal")
             return sp.eye(n)
-        M = M.applyfunc(lambda e: faults.expression(e, "mass"))
+        M = sp.Matrix([[faults.expression(e, "mass") for e in ([row] if flat else row)] for row in rows])
         if M.shape != (n, n) and 1 in M.shape and len(M) == n:
             M = sp.diag(*M)
         if M.shape != (n, n):
@@ -90,7 +106,7 @@ class ByHand:
         for k in range(n):
             if M[k, k].is_number and M[k, k] < 0:
                 faults.append(f"mass[{k + 1}, {k + 1}] is {M[k, k]}; pass zero or a positive number")
-        if M == M.T and not M.is_diagonal() and not M.free_symbols:
+        if M == M.T and not M.is_diagonal() and not symbols_of(M):
             least = float(np.linalg.eigvalsh(np.array(M.tolist(), dtype=float))[0])
             if least < -1e-12 * max(abs(float(e)) for e in M):
                 faults.append(f"mass has the eigenvalue {least:.6g}; pass a matrix that gives no negative kinetic energy")
@@ -100,17 +116,23 @@ class ByHand:
                 kind: str) -> dict[sp.Symbol, float]:
         """Numbers for some of the known symbols, by symbol or name; kind: what each of them is."""
         names = {s.name: s for s in known}
-        numbers = {}
+        numbers: dict[sp.Symbol, float] = {}
+        if values is not None and not isinstance(values, Mapping):
+            self.faults.append(f"{what} is {shown(values)}; pass a mapping from symbols or names to numbers")
+            return numbers
         for key, value in (values or {}).items():
             symbol = take_over(key) if isinstance(key, sp.Basic) else key
-            name = str(getattr(symbol, "name", symbol))
+            name = name_of(symbol)
             if name not in names:
-                self.faults.append(f"{what} has a number for {name!r}, which is no {kind}; there are "
+                self.faults.append(f"{what} has a number for {shown(name)}, which is no {kind}; there are "
                                    f"{', '.join(names) or 'none'}")
-            elif not isinstance(value, (int, float, sp.Number, np.number)) or not np.isfinite(float(value)):
-                self.faults.append(f"{what}: the value of {name} is {value!r}; pass a finite number")
+                continue
+            found = finite(value)
+            if found is None:
+                self.faults.append(f"{what}: the value of {name} is {shown(value)}; pass a finite number, real and "
+                                   "within double precision")
             else:
-                numbers[names[name]] = float(value)
+                numbers[names[name]] = found
         return numbers
 
     def symbols(self, parts: Sequence[Part]) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
@@ -119,7 +141,7 @@ class ByHand:
         inputs: dict[sp.Symbol, None] = {}
         for part in parts:
             for e in part.expressions:
-                for s in sorted(e.free_symbols, key=lambda a: a.name):
+                for s in sorted(symbols_of(e), key=lambda a: a.name):
                     self._use(part, s, parameters, inputs)
         names = {c.name for c in self.q} | {c.dot.name for c in self.q}
         for s in [*parameters, *inputs]:
@@ -131,13 +153,20 @@ class ByHand:
     def _use(self, part: Part, s: sp.Symbol, parameters: dict[sp.Symbol, None], inputs: dict[sp.Symbol, None]) -> None:
         what, faults = part.what, self.faults
         speeds = {c.dot for c in self.q}
+        named = {c.name: c for c in (*self.q, *speeds)}
         if s.name == "t" and s != time:
             faults.append(f"{what} uses a symbol t with assumptions, which is not the time; use symdyn.t")
+        elif isinstance(s, Quantity):
+            faults.append(f"{what} uses {s}, but there are no bodies, joints and constraints by name here; write it out, or "
+                          "describe a System")
         elif isinstance(s, Acceleration) or (isinstance(s, Rate) and not part.speeds):
             faults.append(f"{what} uses {s}; it may use {part.allowed}")
         elif s == time or s in self.q or s in speeds:
             if not part.moving:
                 faults.append(f"{what} depends on {s}, but must be constant")
+        elif isinstance(s, (Coordinate, Rate)) and s.name in named:
+            faults.append(f"{what} uses {s}, {described(s)}, but {s} among the coordinates is {described(named[s.name])}; use "
+                          "the same symbol in both (SymPy's q(t) stands for a coordinate without assumptions)")
         elif isinstance(s, (Coordinate, Rate)):
             faults.append(f"{what} uses {s}, which is not among the coordinates {', '.join(map(str, self.q))}; add it, or "
                           "use a parameter in its place")

@@ -15,8 +15,8 @@ from symdyn.formulation.base_parameters import Base, base
 from symdyn.formulation.regressor import inertial_parameters, project, regressor
 from symdyn.formulation.tree import Tree
 from symdyn.runtime.arguments import take
+from symdyn.shown import name_of
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.node import ACCELERATION
 from symdyn.tape.sympy_bridge import expand
 
 if TYPE_CHECKING:
@@ -102,16 +102,14 @@ class BaseParameters:
         """
         symbols = self.equations.symbols
         names = [p.name for p in symbols.parameters]
-        defaults = {str(getattr(k, "name", k)): float(v) for k, v in symbols.defaults.items()}
+        defaults = {name_of(k): float(v) for k, v in symbols.defaults.items()}
         numbers = take(params, names, "parameters", defaults, self.equations.name)
         return evaluate_rows(self.equations.tape("base_parameters"), dict(zip(names, numbers.tolist(), strict=True)),
                              1)["base_parameters"][0]
 
     def _explicit(self, name: str) -> sp.Matrix:
         eq = self.equations
-        symbols = {leaf: symbol for symbol, leaf in eq.leaves.items() if getattr(leaf, "op", "") == "leaf"}
-        symbols.update({eq.recorder.leaf(f"{u.name}_dot", ACCELERATION): u.dot for u in eq.symbols.speeds})
-        return expand(eq.tape(name).outputs[name], symbols)
+        return expand(eq.tape(name).outputs[name], eq.printed_leaves())
 
     def __str__(self) -> str:
         head = f"{self.equations.name}: {len(self)} base parameters"

@@ -12,6 +12,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.formulation.rank import first_dependent
 from symdyn.model.record import Model, joint_speeds
+from symdyn.shown import shown
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import Node, is_zero
 from symdyn.tape.recorder import Recorder
@@ -52,8 +53,8 @@ def massless(model: Model, u: sp.Symbol) -> str:
     joint = next((j for j in model.joints if u in joint_speeds(j)), None)
     if joint is None:
         return f"no joint with mass or inertia moves with {u}; use its coordinate in the expression of a joint, or leave it out"
-    return (f"joint {joint.name!r}: what it moves has no mass or inertia along {u}; give body "
-            f"{getattr(joint.child, 'name', joint.child)!r} or one further out a mass or an inertia, or fix the joint")
+    return (f"joint {shown(joint.name)}: what it moves has no mass or inertia along {u}; give body "
+            f"{shown(getattr(joint.child, 'name', joint.child))} or one further out a mass or an inertia, or fix the joint")
 
 
 def _dependent(u: sp.Symbol) -> str:

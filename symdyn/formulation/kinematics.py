@@ -107,6 +107,13 @@ class Kinematics:
                                self.algebra.vector(f"v{k + 1}", E @ (v + cross(omega, link.r)) + own[3:])))
         return result
 
+    def twist(self, pose: Pose, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """omega, and velocity of a point given in body axes, n-frame, from the recursion of the links."""
+        if pose.link == GROUND:
+            return zeros(3), zeros(3)
+        R, (omega, v) = self.frames[pose.link][0], self.twists[pose.link]
+        return R @ omega, R @ (v + cross(omega, pose.point(at)))
+
     def kinetic_energy(self) -> Any:
         """T = sum of (omega . I omega + 2 v . (omega x h) + m v . v) / 2, J."""
         total: Any = 0

@@ -44,7 +44,8 @@ class Varied:
                 "damping": lambda: self.by(self.forces(), self._leaves(self.motion.speeds)),
                 "N_dot": lambda: self.motion.rate(self.motion.N()),
                 "variation": self.variation, "second_variation": self.second_variation,
-                "outputs_variation": self.outputs_variation}
+                "outputs_variation": self.outputs_variation,
+                **({"input_matrix": self.input_matrix} if len(self.motion.inputs) else {})}
 
     def forces(self) -> np.ndarray:
         """M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, (n_u,): with u_dot = 0 and lam = 0 what a rest state lacks."""
@@ -79,6 +80,10 @@ class Varied:
         """Derivatives (len(values), len(leaves)); column by column: speeds and coordinates move what comes after them only."""
         with self.algebra.section("derivatives"):
             return jacobian(self.recorder, values.tolist(), leaves, "forward")
+
+    def input_matrix(self) -> np.ndarray:
+        """Derivative of the generalized forces F_tilde by the inputs, (n_u, n_in)."""
+        return -self.by(self.motion.inverse_dynamics(), self._leaves(self.motion.inputs))
 
     def outputs(self) -> np.ndarray:
         """The user's outputs, one after the other, at given accelerations."""

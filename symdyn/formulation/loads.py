@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.formulation.flexible import FlexibleLink
+from symdyn.formulation.implicit_loads import Settled, implicit
 from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.site import BodySite
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.bodies import Body
 from symdyn.model.elements import Action, Element, Watch
 from symdyn.model.joints.modal import exactly
-from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
-from symdyn.spatial.vectors import cross, dot, zeros
+from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
+from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.differentiate import forward
-from symdyn.tape.node import exact, is_zero
+from symdyn.tape.node import SEED, Node, exact, is_zero
 
 # Deflection of a beam's free end, by its length, that is told to be far.
 FAR = 0.2
@@ -56,8 +59,12 @@ class Applied:
 class Loads:
     """Records the loads of a model on its tree."""
 
-    def __init__(self, tree: Tree, kinematics: Kinematics | None = None) -> None:
+    def __init__(self, tree: Tree, kinematics: Kinematics | None = None,
+                 settle: Callable[[], Settled] | None = None) -> None:
+        """settle   gives the values of loads that depend on accelerations, multipliers and reactions; None: leaves stand for them
+        """
         self.tree = tree
+        self._settle = settle
         self.kinematics = kinematics or Kinematics(tree)
         self.algebra = tree.algebra
         self.model = tree.model
@@ -79,6 +86,8 @@ class Loads:
                     self._torque(result, load)
                 elif other and isinstance(load, JointForce):
                     self._joint(result, load)
+                elif other and isinstance(load, ForceBetween):
+                    self._between(result, load)
         for body in self.tree.flexible:
             with self.algebra.section(f"link {self.tree.links[body.link].name}: elastic forces and damping"):
                 places = slice(body.speeds.start, body.speeds.stop)
@@ -96,7 +105,7 @@ class Loads:
         for load in self.model.loads:
             if isinstance(load, Element):
                 total = total + self._action(load).potential
-            elif isinstance(load, SpringDamper):
+            elif isinstance(load, SpringDamper) and load.is_elastic(self.model.parameters):
                 with self.algebra.section(f"load {load.label}"):
                     stretch = self._line(load)[1] - self.algebra.expression(load.length)
                     total = total + self.algebra.expression(load.stiffness) * (stretch * stretch) / 2
@@ -105,7 +114,8 @@ class Loads:
     def watches(self) -> list[Watch]:
         """What elements want to be looked at, and how far elastic bodies bend."""
         found = [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
-        return [*found, *(self._bending(body) for body in self.tree.flexible)]
+        found += [self._bending(body) for body in self.tree.flexible]
+        return [*found, self.settled.watch] if self.implicit else found
 
     def _bending(self, body: FlexibleLink) -> Watch:
         name = self.tree.links[body.link].joint.name
@@ -115,6 +125,32 @@ class Loads:
         return Watch(f"deflection of {name}", part, -math.inf, FAR,
                      f"{name}: the free end goes {{value}} of the length aside; the kinetic energy of a beam is complete to "
                      f"second order, which is meant for deflections below {FAR:g}")
+
+    # -- values
+
+    @cached_property
+    def implicit(self) -> dict[sp.Expr, Node]:
+        """Expressions of loads that depend on accelerations, multipliers and reactions, and leaves that stand for them."""
+        expressions = [e for load in self.model.loads for e in expressions_of(load)]
+        return {e: self.algebra.recorder.leaf(f"implicit_load_{k + 1}", SEED) for k, e in enumerate(implicit(expressions))}
+
+    def value(self, e: sp.Expr) -> Any:
+        """The value of an expression of a load."""
+        if e not in self.implicit:
+            return self.algebra.expression(e)
+        if self._settle is None:
+            return self.implicit[e]
+        return self.settled.values[e]
+
+    @cached_property
+    def settled(self) -> Settled:
+        """What solves for the loads that depend on accelerations, multipliers and reactions."""
+        assert self._settle is not None
+        return self._settle()
+
+    def values(self, expressions: Iterable[sp.Expr]) -> np.ndarray:
+        """The values of several, (n,)."""
+        return vector(*[self.value(e) for e in expressions])
 
     # -- each kind
 
@@ -136,7 +172,7 @@ class Loads:
 
     def _force(self, result: Applied, load: Force) -> None:
         pose = self.pose(load.body)
-        f = self.express(self.algebra.constants(load.force), load.frame, pose.link)
+        f = self.express(self.values(load.force), load.frame, pose.link)
         at = pose.point(self.algebra.constants(load.point))
         result.add(pose, f, cross(at, f))
         if load.reaction is not None:
@@ -147,7 +183,7 @@ class Loads:
 
     def _torque(self, result: Applied, load: Torque) -> None:
         pose = self.pose(load.body)
-        n = self.express(self.algebra.constants(load.torque), load.frame, pose.link)
+        n = self.express(self.values(load.torque), load.frame, pose.link)
         result.add(pose, zeros(3), n)
         if load.reaction is not None:
             other = self.pose(load.reaction)
@@ -158,37 +194,53 @@ class Loads:
         for link in self.tree.links:
             if link.joint is joint or link.joint.name == joint:
                 for place, value in zip(link.speeds, load.values, strict=True):
-                    result.joint[place] = result.joint[place] + self.algebra.expression(value)
+                    result.joint[place] = result.joint[place] + self.value(value)
 
     def _spring(self, result: Applied, load: SpringDamper, elastic: bool, damped: bool) -> None:
-        a = self.algebra
-        stiffness = a.expression(load.stiffness) if elastic else 0
-        damping = a.expression(load.damping) if damped else 0
+        springs = elastic if load.is_elastic(self.model.parameters) else damped  # with other loads, where it has no potential
+        stiffness = self.value(load.stiffness) if springs else 0
+        damping = self.value(load.damping) if damped else 0
         d, length, common = self._line(load)
         along: Any = 0
         if not is_zero(stiffness):
-            rest = a.expression(load.length)
+            rest = self.value(load.length)
             along = stiffness if is_zero(rest) else stiffness * (1 - rest / length)
         if not is_zero(damping):
             along = along + damping * self._rate(length) / length
         if is_zero(along):
             return
-        pull = d * along
+        self._pull(result, load, d * along, common)
+
+    def _between(self, result: Applied, load: ForceBetween) -> None:
+        tension = self.value(load.force)
+        if not is_zero(tension):
+            d, length, common = self._line(load)
+            self._pull(result, load, d * (tension / length), common)
+
+    def _pull(self, result: Applied, load: SpringDamper | ForceBetween, pull: np.ndarray, common: int) -> None:
+        """The force (3,) on the first point, in the axes of a link, and the opposite on the second."""
         for body, point, force in ((load.body_a, load.point_a, pull), (load.body_b, load.point_b, -pull)):
             pose = self.pose(body)
             f = self._turn(force, common, pose.link)
-            result.add(pose, f, cross(pose.point(a.constants(point)), f))
+            result.add(pose, f, cross(pose.point(self.algebra.constants(point)), f))
 
-    def _line(self, load: SpringDamper) -> tuple[np.ndarray, Any, int]:
-        """Vector from point a to point b in the axes of the nearest common link, its length, and that link."""
+    def _line(self, load: SpringDamper | ForceBetween) -> tuple[np.ndarray, Any, int]:
+        return self.separation(load.label, (load.body_a, load.body_b), (load.point_a, load.point_b))
+
+    def separation(self, label: str, bodies: Sequence[Any], points: Sequence[Any]) -> tuple[np.ndarray, Any, int]:
+        """Vector from a point of one body to one of another in the axes of the nearest common link, its length, and that link.
+
+        label   what it is for, in names and messages
+        Raises ModelError where the points coincide at every position.
+        """
         ends = [(pose.link, pose.point(self.algebra.constants(point))) for pose, point in
-                ((self.pose(load.body_a), load.point_a), (self.pose(load.body_b), load.point_b))]
+                ((self.pose(body), point) for body, point in zip(bodies, points, strict=True))]
         common, (a, b) = self._common(ends)
         d = b - a
         if all(is_zero(e) for e in d):
-            raise ModelError([f"{load.label}: its two ends are the same point at every position; give them a distance, or "
+            raise ModelError([f"{label}: its two ends are the same point at every position; give them a distance, or "
                               "leave it out"], self.model.name)
-        return d, self.algebra.name(f"length_{load.label}", self.algebra.sqrt(dot(d, d))), common
+        return d, self.algebra.name(f"length_{label}", self.algebra.sqrt(dot(d, d))), common
 
     def _rate(self, value: Any) -> Any:
         return forward(self.algebra.recorder, [value], self.algebra.by_time(self.model.coordinates, self.tree.rates))[0]

@@ -6,7 +6,8 @@ may become parallel. No position does that to the other speeds, and generated co
 
 A motion without kinetic energy moves no link in a direction in which it has mass. So a speed is sound if at some link its
 velocity, and the part of it that the speeds after it do not explain, have the same size at every position; it may lock if these
-sizes change. Links with mass that have one freedom each are seen at once.
+sizes change, or if at every single link the speeds after it always explain it, so that only several links together do not. Links
+with mass that have one freedom each are seen at once.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ class _Search:
     """`alive`: speeds that a motion without kinetic energy may have, as far as is known; those of beams bend them."""
 
     def __init__(self, tree: Tree, solid: bool) -> None:
-        self.tree = tree
+        self.tree, self.solid = tree, solid
         self.moving: list[frozenset[int]] = []
         for link in tree.links:
             before = self.moving[link.parent] if link.parent >= 0 else frozenset()
@@ -116,6 +117,7 @@ class _Search:
     def lockable(self) -> dict[int, frozenset[int]]:
         sound: set[int] = set()
         changing: dict[int, frozenset[int]] = {}
+        explained: dict[int, frozenset[int]] = {}
         decided: set[int] = set()
         for k in range(len(self.tree.links)):
             speeds = sorted(self.alive & self.moving[k])
@@ -124,14 +126,17 @@ class _Search:
                 continue
             found = {p: self._sound(k, p, [c for c in speeds if c > p]) for p in asked}
             sound.update(p for p in asked if found[p])
-            changing.update({p: frozenset(c for c in speeds if c > p) for p in asked if found[p] is False})
+            after = {p: frozenset(c for c in speeds if c > p) for p in asked}
+            changing.update({p: after[p] for p in asked if found[p] is False})
+            explained.update({p: after[p] for p in asked if found[p] is None and after[p]})
             if len(asked) == len(speeds) and all(found.values()):
                 self.alive.difference_update(speeds)
             decided |= sound
             # A link that has mass in all directions, and is not moved, moves nothing that hangs on it, either.
             if not decided.issuperset(asked) and len(self.positions[0].directions(k)) == 6:
                 decided.update(asked)
-        return {p: after for p, after in changing.items() if p not in sound}
+        together = {} if self.solid else explained
+        return {p: after for p, after in {**together, **changing}.items() if p not in sound}
 
     def _sound(self, k: int, p: int, after: Sequence[int]) -> bool | None:
         """Whether speed p always moves link k otherwise than the speeds after it do; None where it never does."""

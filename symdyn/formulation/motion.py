@@ -78,15 +78,13 @@ class Motion:
     @contextmanager
     def accelerations_given(self) -> Iterator[None]:
         """While this lasts, what is recorded takes accelerations as arguments in place of those that the forces make."""
-        solved = self._memory.get("accelerations")
+        kept = self._memory
+        self._memory = {name: value for name, value in kept.items() if name != "all_reactions"}
         self._memory["accelerations"] = self.speed_rates
         try:
             yield
         finally:
-            if solved is None:
-                del self._memory["accelerations"]
-            else:
-                self._memory["accelerations"] = solved
+            self._memory = kept
 
     def reasons(self) -> list[str]:
         """What it means, speed by speed, if a pivot of the mass matrix is not positive."""
@@ -112,7 +110,11 @@ class Motion:
     def state_rates(self) -> list[Any]:
         """z_dot of the extra states."""
         with self.algebra.section("rates of the extra states"):
-            return [self.algebra.expression(rate) for _, rate in self.states]
+            return [self.expression(rate) for _, rate in self.states]
+
+    def expression(self, e: sp.Expr) -> Any:
+        """An expression, which may hold accelerations of points, multipliers and reactions."""
+        return self.algebra.expression(e)
 
     def N(self) -> np.ndarray:
         """q_dot = N u + n_t, (n_q, n_u)."""

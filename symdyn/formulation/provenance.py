@@ -16,6 +16,8 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import SymdynError
+from symdyn.kinds import flag
+from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, inner
 from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import Node, is_zero
@@ -94,15 +96,17 @@ def explain(equations: MotionEquations, quantity: str, *index: int, simplify: bo
 
     Raises SymdynError for another quantity, an index that is not there, and equations that know no bodies.
     """
-    if quantity not in EXPLAINED:
-        raise SymdynError(f"explain takes M_tilde (with row and column) or k_tilde (with a row), found {quantity!r}")
+    flag(simplify, "simplify")
+    if not isinstance(quantity, str) or quantity not in EXPLAINED:
+        raise SymdynError(f"explain takes M_tilde (with row and column) or k_tilde (with a row), found {shown(quantity)}")
     if equations.provenance is None:
         raise SymdynError(f"the {equations.formulation} equations of {equations.name} were given in their coordinates, so no "
                           "bodies contribute; explain is for systems and for embedding from a position map")
     n, wanted = len(equations.symbols.speeds), EXPLAINED[quantity]
     if len(index) != wanted or not all(isinstance(i, (int, np.integer)) and 0 <= i < n for i in index):
         needed = "a row and a column" if wanted == 2 else "a row"
-        raise SymdynError(f"{quantity} of {equations.name} takes {needed} from 0 to {n - 1}, found {', '.join(map(str, index))}")
+        raise SymdynError(f"{quantity} of {equations.name} takes {needed} from 0 to {n - 1}, found "
+                          f"{', '.join(map(shown, index))}")
     source: Provenance = equations.provenance
     parts = source.mass(*index) if quantity == "M_tilde" else source.velocity(*index)
     found = []

@@ -1,7 +1,9 @@
 """What every joint transmits: force and moment on its child, by one pass inwards over the bodies as they are.
 
-Nothing is merged or lumped here: bodies held by fixed joints have reactions, too. What a joint's own drive and springs give
-along its speeds is no reaction and is taken off; what holds a prescribed or dependent coordinate is one.
+Nothing is merged or regrouped here: bodies held by fixed joints have reactions, too. The cut load of a joint is all that passes
+from its parent to its child through it. Its reaction is the cut load less what acts along its speeds: joint forces (drives,
+springs and dampers in the joint), gears, and constraints by expression. What holds a prescribed or dependent coordinate is a
+reaction.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from symdyn.formulation.newton_euler import outward
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.elements import AddedMass
 from symdyn.model.joints import Fixed, Joint, Modal
+from symdyn.model.record import joint_speeds
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.vectors import cross, zeros
 from symdyn.tape.node import is_zero
@@ -28,11 +31,13 @@ Wrench = tuple[np.ndarray, np.ndarray]
 
 
 def reactions(tree: Tree, loads: Loads, kinematics: Kinematics, w_dot: np.ndarray, closures: Sequence[Closure] = (),
-              lam: np.ndarray | None = None, along_speeds: np.ndarray | None = None) -> dict[str, np.ndarray]:
+              lam: np.ndarray | None = None, along_speeds: np.ndarray | None = None,
+              whole: bool = False) -> dict[str, np.ndarray]:
     """Joint name -> [force; moment about the joint's point on the child] on the child, n-frame, (6,).
 
     w_dot          (n_w,) accelerations of the joints; lam: multipliers of the closures' rows
     along_speeds   (n_u,) forces along the generalized speeds that other constraints make
+    whole          the cut loads in place of the reactions
     """
     model, algebra = tree.model, tree.algebra
     gravity = algebra.constants(model.gravity)
@@ -52,7 +57,7 @@ def reactions(tree: Tree, loads: Loads, kinematics: Kinematics, w_dot: np.ndarra
             wrenches.append((force - f, moment - n))
     for number, (f, n) in _beyond_rigid(tree, kinematics, motions, w_dot, -gravity):
         wrenches[number] = (wrenches[number][0] + f, wrenches[number][1] + n)
-    drives = applied.joint + _on_joints(tree, along_speeds)
+    drives = None if whole else applied.joint + _on_joints(tree, along_speeds)
     order = list(zip(model.joints, model.parents, model.children, strict=True))
     for joint, parent, child in reversed(order):
         with algebra.section(f"joint {joint.name}: reaction"):
@@ -97,11 +102,12 @@ def _closing(closure: Closure, lam: np.ndarray, act: Any, kinematics: Kinematics
     return np.concatenate([R @ force, R @ moment])
 
 
-def _at_joint(tree: Tree, joint: Joint, pose: Pose, force: np.ndarray, moment: np.ndarray, drives: np.ndarray,
+def _at_joint(tree: Tree, joint: Joint, pose: Pose, force: np.ndarray, moment: np.ndarray, drives: np.ndarray | None,
               kinematics: Kinematics) -> np.ndarray:
+    """The wrench at the joint's point; drives: what acts along the joints' speeds, which is taken off."""
     at = pose.point(tree.algebra.constants(joint.child_point))
     n = moment - cross(at, force)
-    if not isinstance(joint, (Fixed, Modal)):
+    if drives is not None and not isinstance(joint, (Fixed, Modal)):
         link = tree.links[pose.link]
         f_d, n_d = _drive(link.S, drives[link.speeds.start:link.speeds.stop])
         force, n = force - f_d, n - n_d
@@ -147,11 +153,18 @@ def _carried(tree: Tree, pose: Pose, parent: Pose, force: np.ndarray, moment: np
 
 
 def _on_joints(tree: Tree, along_speeds: np.ndarray | None) -> np.ndarray:
-    """Forces along generalized speeds as forces along the joint speeds that these are."""
+    """Forces along generalized speeds as forces along the joint speeds that these are; not along others that follow them."""
     result = zeros(len(tree.w))
     if along_speeds is not None:
-        for row in range(len(tree.w)):
-            own = [k for k in range(tree.D.shape[1]) if not is_zero(tree.D[row, k])]
-            if len(own) == 1 and tree.D[row, own[0]] == 1:
-                result[row] = along_speeds[own[0]]
+        for place, row in own_rows(tree).items():
+            result[row] = along_speeds[place]
     return result
+
+
+def own_rows(tree: Tree) -> dict[int, int]:
+    """Place of a generalized speed among all -> that of the joint speed that it is; speeds that no joint has are left out."""
+    places = {u: k for k, u in enumerate(tree.model.speeds)}
+    found: dict[int, int] = {}
+    for link in tree.links:
+        found.update({places[u]: row for u, row in zip(joint_speeds(link.joint), link.speeds, strict=True) if u in places})
+    return found

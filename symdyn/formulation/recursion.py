@@ -22,6 +22,7 @@ from symdyn.formulation.tree_quantities import TreeQuantities
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed
 from symdyn.model.record import Model
+from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
 from symdyn.tape.node import is_zero
 
@@ -59,7 +60,8 @@ class RecursiveEquations(MotionEquations):
         number = name if isinstance(name, int) else self.links.index(name) + 1 if name in self.links else 0
         if not 1 <= number <= len(self.links):
             there = ", ".join(f"{k + 1} {name}" for k, name in enumerate(self.links))
-            raise SymdynError(f"{self.name} has no link {which!r}; it has {there} (bodies on fixed joints belong to the link "
+            raise SymdynError(f"{self.name} has no link {shown(which)}; it has {there} (bodies on fixed joints belong to the "
+                              "link "
                               "before them)")
         return LinkPage(self, number)
 

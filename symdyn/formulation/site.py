@@ -14,6 +14,7 @@ from symdyn.formulation.kinematics import Kinematics
 from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.joints import Fixed, Free, Joint
 from symdyn.model.orientation import EulerAngles
+from symdyn.model.record import Model
 from symdyn.model.symbols import Coordinate
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 
@@ -31,7 +32,7 @@ class BodySite:
         self.tree = tree
         self.kinematics = kinematics
         self.pose: Pose = tree.poses[k]
-        self.joint = _joint_of(tree, k)
+        self.joint = joint_with_ground(tree.model, k)
 
     @cached_property
     def R(self) -> np.ndarray:
@@ -61,10 +62,7 @@ class BodySite:
     @property
     def angles_given(self) -> bool:
         """Whether the body's own joint with the ground has roll, pitch and yaw as coordinates."""
-        joint = self.joint
-        return (isinstance(joint, Free) and isinstance(joint.orientation, EulerAngles) and joint.orientation.sequence == "ZYX"
-                and joint.parent_rotation == sp.eye(3) == joint.child_rotation
-                and all(isinstance(q, Coordinate) for q in joint.coordinates))
+        return has_roll_pitch_yaw(self.joint)
 
     @cached_property
     def angles(self) -> Sequence[Any]:
@@ -92,10 +90,16 @@ class BodySite:
         return 2 * recorder.apply("select", recorder.apply("lt", square, SMALL), series, far) * part
 
 
-def _joint_of(tree: Tree, k: int) -> Joint | None:
+def has_roll_pitch_yaw(joint: Joint | None) -> bool:
+    """Whether a joint with the ground has roll, pitch and yaw of R = R_z(psi) R_y(theta) R_x(phi) as coordinates."""
+    return (isinstance(joint, Free) and isinstance(joint.orientation, EulerAngles) and joint.orientation.sequence == "ZYX"
+            and joint.parent_rotation == sp.eye(3) == joint.child_rotation
+            and all(isinstance(q, Coordinate) for q in joint.coordinates))
+
+
+def joint_with_ground(model: Model, k: int) -> Joint | None:
     """The joint with the ground that moves body k, through bodies that are fixed to each other; None if there is none, or the
     ground moves."""
-    model = tree.model
     if model.ground_motion is not None:
         return None
     by_child = {child: (joint, parent) for joint, parent, child in zip(model.joints, model.parents, model.children, strict=True)}

@@ -11,14 +11,19 @@ import sympy as sp
 from symdyn.errors import ModelError, SymdynError
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.equations import Symbols
+from symdyn.formulation.implicit_loads import implicit
+from symdyn.formulation.measured import Measured
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.provenance import OfBodies
 from symdyn.formulation.tree import Tree, build
 from symdyn.formulation.tree_quantities import TreeQuantities
-from symdyn.model.bodies import Point
 from symdyn.model.joints import Fixed, Joint, Modal
+from symdyn.model.loads import expressions_of
 from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.model.points import Point
+from symdyn.model.quantity import quantities_in
 from symdyn.model.record import Model
+from symdyn.shown import name_of, shown
 from symdyn.tape.recorder import Recorder
 
 FRAMES = ("body", "parallel")
@@ -43,10 +48,12 @@ def derive_tree(model: Model, formulation: str, frames: str, derivation: type[Tr
 
 def tree_of(model: Model, frames: str) -> Tree:
     """The tree of a model on a tape of its own. Raises SymdynError for unknown frames."""
-    if frames not in FRAMES:
-        raise SymdynError(f"frames {frames!r} asked for; there are {' and '.join(map(repr, FRAMES))}")
+    if not isinstance(frames, str) or frames not in FRAMES:
+        raise SymdynError(f"frames {shown(frames)} asked for; there are {' and '.join(map(repr, FRAMES))}")
     recorder = Recorder()
-    return build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), frames == "parallel")
+    tree = build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), frames == "parallel")
+    tree.algebra.measured = Measured(tree)
+    return tree
 
 
 def _point_units(model: Model) -> dict[str, str]:
@@ -68,6 +75,8 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
     return result(model.name, formulation, model.planar, symbols, algebra.recorder, algebra.leaves, recorded,
                   tuple(_notes(model, tree) + quantities.notes), _unit_groups(model), again,
                   frames="parallel" if tree.parallel else "body",
+                  of_reactions=_of_reactions(model),
+                  implicit_loads=tuple(load.label for load in model.loads if implicit(expressions_of(load))),
                   identification=quantities.identification if tree.rigid else None,
                   provenance=OfBodies(quantities), charts=_charts(model), watched=quantities.loads.watches, events=model.events,
                   bodies=tuple(b.name for b in model.bodies),
@@ -79,7 +88,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
 def _joints(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]:
     """Name, parent, child and kind of the joints that react; for a carrier the body that is fixed to it."""
     def name(body: Any) -> str:
-        return str(getattr(body, "name", body))
+        return name_of(body)
 
     carried = {name(c.parent): name(c.child) for c in quantities.model.loops if isinstance(c, Joint) and c.inner}
     return tuple((j.name, name(j.parent), carried.get(name(j.child), name(j.child)), j.kind) for j in quantities.reacting)
@@ -105,6 +114,18 @@ def _charts(model: Model) -> tuple[tuple[str, str, str, str], ...]:
     oriented = [(j, getattr(j, "orientation", None)) for j in model.joints]
     return tuple((j.name, angles.sequence, angles.speeds, j.coordinates[-2].name) for j, angles in oriented
                  if isinstance(angles, EulerAngles) and j.coordinates[-2] in model.coordinates)
+
+
+def _of_reactions(model: Model) -> tuple[str, ...]:
+    """Outputs and rates of states that depend on multipliers or reactions."""
+    found = []
+    values: list[tuple[str, Any]] = [(f"the rate of {z.symbol}", z.rate) for z in model.states]
+    values += [(f"output {o.name}", o.value) for o in model.outputs if not isinstance(o.value, Point)]
+    for what, value in values:
+        kinds = {q.measure.kind for q in quantities_in(value if isinstance(value, tuple) else [value])}
+        if kinds & {"multiplier", "reaction"}:
+            found.append(what)
+    return tuple(found)
 
 
 def _unit_groups(model: Model) -> tuple[tuple[sp.Symbol, ...], ...]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+import sympy as sp
 
+from symdyn.errors import ModelError
 from symdyn.formulation import composite
 from symdyn.formulation.identification import Identification
+from symdyn.formulation.implicit_loads import Settled, solve
 from symdyn.formulation.inertia_faults import demand_mass_matrix
 from symdyn.formulation.inertial_forces import inverse_dynamics
 from symdyn.formulation.kinematics import Kinematics
@@ -17,13 +22,14 @@ from symdyn.formulation.motion import Motion
 from symdyn.formulation.newton_euler import inward, outward
 from symdyn.formulation.reactions import reactions
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.model.bodies import Component, Point
 from symdyn.model.elements import Element
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerAngles
+from symdyn.model.points import Point
+from symdyn.model.quantity import Measure, Quantity, quantities_in
 from symdyn.model.record import Model, joint_speeds
 from symdyn.spatial.vectors import congruence, cross, inner, vector, zeros
-from symdyn.tape.differentiate import reverse
+from symdyn.tape.differentiate import forward, reverse
 from symdyn.tape.node import is_zero
 
 
@@ -39,10 +45,23 @@ class TreeQuantities(Motion):
         self.model = model
         self.lockable = tree.lockable
         self.kinematics = Kinematics(tree)
-        self.loads = Loads(tree, self.kinematics)
+        self.loads = Loads(tree, self.kinematics, self._settled)
         self.identification = Identification(tree, self.speed_rates)
         self.notes: list[str] = [] if tree.rigid else [
             "no regressor, base parameters or momenta: added mass and elastic bodies are no inertias of rigid bodies"]
+
+    def _settled(self, given: bool = False) -> Settled:
+        """The loads that depend on accelerations, multipliers and reactions: of the motion that they make, or at given
+        accelerations."""
+        trial = self._apart({"accelerations": self.speed_rates} if given else {})
+        trial.loads = Loads(self.tree, self.kinematics)
+        return solve(self.algebra, self.model.name, trial.loads.implicit, trial.measured)
+
+    def _apart(self, memory: dict[str, Any]) -> Self:
+        """The same quantities, to be recorded apart from these."""
+        other = copy(self)
+        other._memory = memory
+        return other
 
     @property
     def reacting(self) -> tuple[Joint, ...]:
@@ -62,15 +81,19 @@ class TreeQuantities(Motion):
         """name -> function that records it."""
         own = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde, "J": self.J, "Jdot": self.Jdot,
                "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
-               "joint_points": self.joint_points, "reactions": self.reactions, "energy": self.energy,
+               "joint_points": self.joint_points, "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
-        if self.tree.flexible or any(isinstance(load, Element) for load in self.model.loads):
+        if self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
+        if self.model.ground_motion is not None:
+            own["ground_rotation"] = self.ground_rotation
         if self.model.events:
             own["events"] = self.events
         if any(event.reset for event in self.model.events):
             own["event_resets"] = self.event_resets
+        if self.loads.implicit and not self.rows:  # with constraints, given accelerations leave open what these give
+            own["inverse_dynamics"] = self.inverse_dynamics_at_accelerations
         return {**super().quantities(), **own, **(self.identification.quantities() if self.tree.rigid else {})}
 
     # -- the equations, joint by joint
@@ -97,6 +120,12 @@ class TreeQuantities(Motion):
         w_dot = self.tree.D @ self.speed_rates + self.tree.b if len(self.tree.w) else self.tree.b
         tau = inverse_dynamics(self.tree, w_dot, -self.gravity(), applied.wrenches)
         return self.algebra.name("tau", self.project(tau - applied.joint))
+
+    def inverse_dynamics_at_accelerations(self) -> np.ndarray:
+        """The same where loads depend on accelerations and reactions: on the given accelerations, then, and their reactions."""
+        given = self._apart({"accelerations": self.speed_rates})
+        given.loads = Loads(self.tree, self.kinematics, partial(self._settled, True))
+        return given.inverse_dynamics()
 
     def k_tilde(self) -> np.ndarray:
         return self.algebra.name("k_tilde", self.project(inverse_dynamics(self.tree, self.tree.b, zeros(3))))
@@ -143,12 +172,22 @@ class TreeQuantities(Motion):
 
     def reactions(self) -> np.ndarray:
         """Force and moment of each joint on its child, at its point on the child, n-frame, (n_joints, 6)."""
-        found = self.all_reactions()
-        return np.array([found[name] for name in (j.name for j in self.reacting)], dtype=object).reshape(-1, 6)
+        return self._of_joints(self.recall("all_reactions"))
 
-    def all_reactions(self) -> dict[str, np.ndarray]:
-        """Joint name -> reaction."""
-        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations())
+    def cut_loads(self) -> np.ndarray:
+        """All that passes through each joint to its child: reaction, and what acts along the joint's speeds, (n_joints, 6)."""
+        return self._of_joints(self.all_reactions(whole=True))
+
+    def _of_joints(self, found: dict[str, np.ndarray]) -> np.ndarray:
+        return np.array([found[j.name] for j in self.reacting], dtype=object).reshape(-1, 6)
+
+    def all_reactions(self, whole: bool = False) -> dict[str, np.ndarray]:
+        """Joint name -> reaction, or whole: cut load."""
+        return reactions(self.tree, self.loads, self.kinematics, self.joint_accelerations(), whole=whole)
+
+    def ground_rotation(self) -> np.ndarray:
+        """R of the frame of the ground, which moves, (3, 3)."""
+        return self.kinematics.rotation(self.tree.ground)
 
     def joint_accelerations(self) -> np.ndarray:
         """w_dot, (n_w,)."""
@@ -179,6 +218,33 @@ class TreeQuantities(Motion):
         """Derivative of the power by the state, (n_x,)."""
         return vector(*reverse(self.algebra.recorder, self.power(), self.x()))
 
+    def expression(self, e: sp.Expr) -> Any:
+        later = [q for q in quantities_in([e]) if q.level == 2]
+        return (self.algebra.within({q: self.measured(q) for q in later}) if later else self.algebra).expression(e)
+
+    def measured(self, quantity: Quantity) -> Any:
+        """A quantity that takes accelerations or forces. Raises ModelError for multipliers of what is no constraint."""
+        measure = quantity.measure
+        if measure.kind == "multiplier":
+            raise ModelError([f"{quantity} is requested of equations without multipliers; use system.augmented()"],
+                             self.model.name)
+        if measure.kind == "reaction":
+            return self._reaction(measure)
+        if measure.kind == "position":
+            return self._point(Point(measure.of[0], measure.points[0], "acceleration"))[measure.index[0]]
+        recorder = self.algebra.recorder
+        rate = self.algebra.expression(Quantity(replace(measure, order=measure.order - 1)))
+        along = {**self.by_time(), **dict(zip(self._leaves(self.speeds), self.recall("accelerations"), strict=True))}
+        return forward(recorder, [rate], along)[0]
+
+    def _reaction(self, measure: Measure) -> Any:
+        """A component of a joint's reaction in the n-frame or in the axes of a body."""
+        rows = self.recall("all_reactions")[measure.of[0]]
+        if measure.frame is not None:
+            R = self.kinematics.rotation(self.loads.pose(measure.frame))
+            rows = np.concatenate([R.T @ rows[:3], R.T @ rows[3:]])
+        return rows[measure.index[0]]
+
     def output(self, name: str, value: Any) -> Any:
         """A named output of the user."""
         with self.algebra.section(f"output {name}"):
@@ -188,19 +254,18 @@ class TreeQuantities(Motion):
         if isinstance(value, Point):
             return self._point(value)
         if isinstance(value, tuple):
-            return self.algebra.constants(value)
-        return self.algebra.expression(value)
+            return vector(*[self.expression(e) for e in value])
+        return self.expression(value)
 
     def events(self) -> np.ndarray:
         """What vanishes at the events, (n_e,)."""
         with self.algebra.section("events"):
-            return vector(*[self._point(e.value.point)[e.value.index] + self.algebra.expression(e.value.offset)
-                            if isinstance(e.value, Component) else self.algebra.expression(e.value) for e in self.model.events])
+            return vector(*[self.expression(e.value) for e in self.model.events])
 
     def event_resets(self) -> np.ndarray:
         """What the reset entries of the state become, event after event."""
         with self.algebra.section("resets of events"):
-            return vector(*[self.algebra.expression(becomes) for e in self.model.events for _, becomes in e.reset])
+            return vector(*[self.expression(becomes) for e in self.model.events for _, becomes in e.reset])
 
     def _point(self, point: Point) -> np.ndarray:
         """What is asked of a point of a body, n-frame; see Point."""

@@ -18,6 +18,8 @@ from symdyn.frames.rigid_body import (
     moment_equation,
 )
 from symdyn.frames.tree import Axes, angular_motion, demand_frames, rotation_between
+from symdyn.model.symbols import symbols_of
+from symdyn.shown import shown
 
 
 class Body:
@@ -37,7 +39,7 @@ class Body:
         self.mass = take.mass(mass)
         self.given_inertia = sp.ImmutableMatrix(take.inertia("inertia", inertia))
         place = take.vector("com", com)
-        moving = sorted({s.name for e in (self.mass, *self.given_inertia, *place) for s in e.free_symbols if moves(s)})
+        moving = sorted({s.name for e in (self.mass, *self.given_inertia, *place) for s in symbols_of(e) if moves(s)})
         if moving:
             take.faults.append(f"body of frame {frame.name}: mass, inertia or com depend on {', '.join(moving)}; in the frame "
                                "of a rigid body they are constant")
@@ -86,11 +88,13 @@ class Body:
         if about is None:
             return sp.zeros(3, 1), rotation_between(self.frame, components), components
         if not isinstance(about, Point):
-            raise ArgumentError(f"about is {about!r}; pass a point of frame {self.frame.name!r}; default: the centre of mass")
-        if about.frame is not self.frame or any(map(moves, about.given.free_symbols)):
-            raise ArgumentError(f"about is {about!r}, which is not fixed to the body of frame {self.frame.name!r}; pass a point "
+            raise ArgumentError(f"about is {shown(about)}; pass a point of frame {shown(self.frame.name)}; default: the centre "
+                                "of mass")
+        if about.frame is not self.frame or any(map(moves, symbols_of(about.given))):
+            raise ArgumentError(f"about is {shown(about)}, which is not fixed to the body of frame {shown(self.frame.name)}; "
+                                "pass a point "
                                 "made with that frame's .point(...) that does not move in it")
         return sp.Matrix(self.com.given - about.given), rotation_between(self.frame, components), components
 
     def __repr__(self) -> str:
-        return f"Body(mass {self.mass}, in {self.frame.name!r})"
+        return f"Body(mass {self.mass}, in {shown(self.frame.name)})"

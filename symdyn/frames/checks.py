@@ -11,7 +11,8 @@ import sympy as sp
 
 from symdyn.errors import ModelError, NotARotation, UnsupportedExpression
 from symdyn.model.faults import NAME, Faults
-from symdyn.model.symbols import Coordinate, time
+from symdyn.model.symbols import Coordinate, symbols_of, time
+from symdyn.shown import shown
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
@@ -32,7 +33,7 @@ class FrameFaults(Faults):
 
     def name(self, name: Any, kind: str) -> None:
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            self.append(f"the name of a {kind} is {name!r}; pass text on one line such as 'b'")
+            self.append(f"the name of a {kind} is {shown(name)}; pass text on one line such as 'b'")
 
     def column(self, value: Any, what: str) -> sp.ImmutableMatrix:
         """Three components in one frame."""
@@ -64,7 +65,7 @@ class FrameFaults(Faults):
             raise NotARotation(self.tilts[0])
 
     def _time(self, matrix: sp.ImmutableMatrix) -> None:
-        if any(s.name == "t" and s != time for s in matrix.free_symbols):
+        if any(s.name == "t" and s != time for s in symbols_of(matrix)):
             self.append(f"{self.where} uses a symbol t with assumptions, which is not the time; use sd.t")
 
 
@@ -75,12 +76,12 @@ def rotation_fault(R: sp.ImmutableMatrix) -> str:
     """
     if sp.eye(3) == R:
         return ""
-    symbols = sorted({s.name for s in R.free_symbols})
+    symbols = sorted({s.name for s in symbols_of(R)})
     stream = random.Random(1)
     points = {name: np.array([stream.uniform(-0.9, 0.9) for _ in range(POINTS)]) for name in symbols}
     try:
         fault = _worst(R, points)
-        four = sorted({s.name for s in R.free_symbols if isinstance(s, Coordinate)} or symbols)
+        four = sorted({s.name for s in symbols_of(R) if isinstance(s, Coordinate)} or symbols)
         if fault and len(four) == 4:
             norm = np.sqrt(sum(points[name] ** 2 for name in four))
             if not _worst(R, {name: x / norm if name in four else x for name, x in points.items()}):
@@ -95,7 +96,7 @@ def _worst(R: sp.ImmutableMatrix, points: dict[str, np.ndarray]) -> str:
     recorder = Recorder()
     leaves = {name: recorder.leaf(name, 0) for name in points}
     memory: dict[sp.Basic, Any] = {}
-    nodes = [record_expression(recorder, e, {s: leaves[s.name] for s in R.free_symbols}, memory) for e in R]
+    nodes = [record_expression(recorder, e, {s: leaves[s.name] for s in symbols_of(R)}, memory) for e in R]
     values = evaluate_rows(Tape.of(recorder, R=nodes), points, POINTS)["R"].reshape(POINTS, 3, 3)
     real = np.isfinite(values).all(axis=(1, 2))
     if not real.any():
@@ -123,4 +124,4 @@ def _square(value: Any) -> bool:
 def _found(value: Any) -> str:
     if hasattr(value, "shape"):
         return f"has the shape {tuple(value.shape)}"
-    return f"is {value!r}"
+    return f"is {shown(value)}"

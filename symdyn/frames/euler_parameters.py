@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.frames.rates import differentiated
-from symdyn.model.symbols import Coordinate
+from symdyn.model.symbols import Coordinate, symbols_of
 
 CLOSE = 1e-9
 
@@ -35,7 +35,7 @@ def _E(p: list[sp.Expr], sign: int) -> sp.Matrix:
 
 def _parameters(R: sp.ImmutableMatrix) -> list[sp.Expr] | None:
     """+-1 times the four coordinates in the order of Euler parameters, if R is E E_bar^T wherever their norm is 1."""
-    symbols = sorted(R.free_symbols, key=str)
+    symbols = sorted(symbols_of(R), key=str)
     if len(symbols) != 4 or not all(isinstance(s, Coordinate) for s in symbols):
         return None
     stream = random.Random(2)

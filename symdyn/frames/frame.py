@@ -10,6 +10,7 @@ from symdyn.frames.body import Body
 from symdyn.frames.point import Point
 from symdyn.frames.tree import Axes, angular_motion, demand_frames, rotation_between
 from symdyn.frames.vector import Vector
+from symdyn.shown import shown
 
 
 class Frame(Axes):
@@ -94,4 +95,4 @@ class Frame(Axes):
         return seen_from, components
 
     def __repr__(self) -> str:
-        return f"Frame({self.name!r})" if self.parent is None else f"Frame({self.name!r}, in {self.parent.name!r})"
+        return f"Frame({shown(self.name)})" if self.parent is None else f"Frame({shown(self.name)}, in {shown(self.parent.name)})"

@@ -11,7 +11,8 @@ import sympy as sp
 
 from symdyn.errors import ArgumentError, EvaluationError, ModelError, UnsupportedExpression
 from symdyn.frames.rates import differentiated, taken
-from symdyn.model.symbols import Coordinate, Rate, take_over, time
+from symdyn.model.symbols import Coordinate, Rate, symbols_of, take_over, time
+from symdyn.shown import name_of, shown
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
@@ -59,7 +60,7 @@ def _times(t: Any) -> tuple[np.ndarray, bool]:
     try:
         array = np.asarray(t, dtype=float)
     except (TypeError, ValueError):
-        raise ArgumentError(f"t is {t!r}; pass a time in s or an array of times (n_t,)") from None
+        raise ArgumentError(f"t is {shown(t)}; pass a time in s or an array of times (n_t,)") from None
     if array.ndim > 1 or array.size == 0:
         raise ArgumentError(f"t has the shape {array.shape}; pass a time in s or an array of times (n_t,)")
     if not np.isfinite(array).all():
@@ -70,13 +71,13 @@ def _times(t: Any) -> tuple[np.ndarray, bool]:
 def _given(values: Any, times: np.ndarray, over_time: bool) -> tuple[dict[str, sp.Expr], dict[str, np.ndarray]]:
     """Expressions by name, and the values over time of what was given as a function of t."""
     if not isinstance(values, Mapping) and values is not None:
-        raise ArgumentError(f"values is {values!r}; pass a dict such as {{q: 0.3}}")
+        raise ArgumentError(f"values is {shown(values)}; pass a dict such as {{q: 0.3}}")
     given: dict[str, sp.Expr] = {}
     functions: dict[str, np.ndarray] = {}
     faults: list[str] = []
     for key, value in (values or {}).items():
         symbol = take_over(key) if isinstance(key, sp.Basic) else key
-        name = str(getattr(symbol, "name", symbol))
+        name = name_of(symbol)
         if callable(value) and not isinstance(value, sp.Basic):
             if over_time:
                 _sampled(name, value, times, functions, faults)
@@ -111,7 +112,7 @@ def _with_rates(given: dict[str, sp.Expr], over_time: bool) -> dict[str, sp.Expr
     for name, motion in given.items():
         if name == time.name:
             continue
-        moving = motion.has(time) or any(isinstance(s, (Coordinate, Rate)) for s in motion.free_symbols)
+        moving = motion.has(time) or any(isinstance(s, (Coordinate, Rate)) for s in symbols_of(motion))
         if moving or over_time:
             speed = motion
             for rate_name in (Coordinate(name).dot.name, Coordinate(name).ddot.name):
@@ -136,7 +137,7 @@ class _Values:
         self.memory: dict[sp.Basic, Any] = {}
 
     def expression(self, e: sp.Expr) -> Any:
-        leaves = {s: self.symbol(s.name) for s in sorted(e.free_symbols, key=str)}
+        leaves = {s: self.symbol(s.name) for s in sorted(symbols_of(e), key=str)}
         return record_expression(self.recorder, e, leaves, self.memory)
 
     def symbol(self, name: str) -> Any:
@@ -175,4 +176,4 @@ def _missing(name: str, given: list[str], functions: dict[str, np.ndarray]) -> s
         return (f"there is no value for {name}: {base} is given as a function, whose rate is not known; give {name} too, or "
                 f"{base} as an expression in sd.t")
     near = difflib.get_close_matches(name, given, 1)
-    return f"there is no value for {name}; give one in values" + (f" (there is {near[0]!r})" if near else "")
+    return f"there is no value for {name}; give one in values" + (f" (there is {shown(near[0])})" if near else "")

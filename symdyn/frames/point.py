@@ -13,6 +13,7 @@ from symdyn.frames.numbers import numbers
 from symdyn.frames.parts import AccelerationParts, InertialForces, VelocityParts
 from symdyn.frames.rates import taken
 from symdyn.frames.tree import ZERO, Axes, along, angular_motion, demand_frames, point_motion
+from symdyn.shown import shown
 
 _ORDERS = {"position": 0, "velocity": 1, "acceleration": 2}
 
@@ -115,9 +116,9 @@ class Point:
         Raises ArgumentError for missing values and EvaluationError where a value is not finite.
         """
         if quantity not in _ORDERS:
-            raise ArgumentError(f"quantity is {quantity!r}; pass {', '.join(map(repr, _ORDERS))}")
+            raise ArgumentError(f"quantity is {shown(quantity)}; pass {', '.join(map(repr, _ORDERS))}")
         if t is None or np.ndim(t) != 1:
-            raise ArgumentError(f"t is {t!r}; pass an array of times (n_t,), such as numpy.linspace(0, 2)")
+            raise ArgumentError(f"t is {shown(t)}; pass an array of times (n_t,), such as numpy.linspace(0, 2)")
         order = _ORDERS[quantity]
         result: np.ndarray = numbers(sp.Matrix(self._motion(seen_from, components, order)[order]), values, t)
         return result
@@ -134,4 +135,4 @@ class Point:
         return through, seen_from, components
 
     def __repr__(self) -> str:
-        return f"Point({self.name!r}, {list(self.given)} in {self.frame.name!r})"
+        return f"Point({shown(self.name)}, {list(self.given)} in {shown(self.frame.name)})"

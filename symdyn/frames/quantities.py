@@ -12,6 +12,7 @@ import sympy as sp
 from symdyn.errors import ArgumentError, ModelWarning
 from symdyn.frames.checks import FrameFaults
 from symdyn.model.joints.base import numeric
+from symdyn.model.symbols import symbols_of
 
 # What counts as rounding in an inertia, of its largest entry.
 ROUNDING = 1e-9
@@ -80,7 +81,7 @@ class Quantities:
                 self.faults.append(f"{self.where}: {what} is not symmetric: I[{j + 1}, {i + 1}] = {I[j, i]}, "
                                    f"I[{i + 1}, {j + 1}] = {I[i, j]}; pass a symmetric matrix")
                 return
-        if any(e.free_symbols for e in I):
+        if any(symbols_of(e) for e in I):
             return
         moments = np.linalg.eigvalsh(np.array(I.tolist(), dtype=float))
         found = f"{self.where}: {what} has the principal moments {', '.join(f'{m:.6g}' for m in moments)} kg m^2"

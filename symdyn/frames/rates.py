@@ -8,7 +8,8 @@ from typing import Any
 import sympy as sp
 
 from symdyn.errors import ModelError
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_expression, time
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_expression, partial_rate, symbols_of, time
+from symdyn.shown import shown
 
 
 def rate(value: Any) -> Any:
@@ -35,18 +36,18 @@ def taken(what: str, value: Any) -> sp.Expr:
     try:
         return as_expression(value, what)
     except (sp.SympifyError, TypeError, ValueError):
-        raise ModelError([f"{what} is {value!r}; pass a number or an expression of SymPy symbols"]) from None
+        raise ModelError([f"{what} is {shown(value)}; pass a number or an expression of SymPy symbols"]) from None
 
 
 def differentiated(expressions: Iterable[sp.Expr]) -> list[sp.Expr]:
     """The rates of expressions that were taken over. Raises ModelError naming all symbols without a rate."""
     entries = list(expressions)
-    symbols = sorted({s for e in entries for s in e.free_symbols}, key=lambda s: (s.name, str(type(s))))
+    symbols = sorted({s for e in entries for s in symbols_of(e)}, key=lambda s: (s.name, str(type(s))))
     faults = [fault for s in symbols for fault in _faults(s)]
     if faults:
         raise ModelError(faults)
-    moving = [(s, sp.S.One if s == time else s.dot) for s in symbols if s == time or isinstance(s, (Coordinate, Rate))]
-    return [sp.Add(*[e.diff(s) * s_dot for s, s_dot in moving if e.has(s)]) for e in entries]
+    moving = [s for s in symbols if isinstance(s, (Coordinate, Rate))]
+    return [sp.Add(partial_rate(e), *[e.diff(s) * s.dot for s in moving if e.has(s)]) for e in entries]
 
 
 def moves(symbol: sp.Symbol) -> bool:

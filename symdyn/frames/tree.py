@@ -19,6 +19,7 @@ from symdyn.frames.checks import FrameFaults
 from symdyn.frames.euler_parameters import spin_by_parameters
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tidy import tidy
+from symdyn.shown import shown
 
 ZERO = sp.ImmutableMatrix(sp.zeros(3, 1))
 
@@ -35,7 +36,7 @@ class Axes:
         faults = FrameFaults(f"frame {name}" if isinstance(name, str) else "a frame")
         faults.name(name, "frame")
         if parent is not None and not isinstance(parent, Axes):
-            faults.append(f"{faults.where}: its parent is {parent!r}; pass a frame")
+            faults.append(f"{faults.where}: its parent is {shown(parent)}; pass a frame")
             parent = None
         self.name = name
         self.parent: Axes | None = parent
@@ -81,11 +82,11 @@ def _axial(skew: sp.Matrix) -> sp.ImmutableMatrix:
 
 def demand_frames(**given: Any) -> None:
     """Raise ArgumentError, telling all faults, for values that are no frames or are frames of different trees."""
-    faults = [f"{what} is {value!r}; pass a frame" for what, value in given.items() if not isinstance(value, Axes)]
+    faults = [f"{what} is {shown(value)}; pass a frame" for what, value in given.items() if not isinstance(value, Axes)]
     if not faults:
         roots = {id(value.path[0]): value.path[0] for value in given.values()}
         if len(roots) > 1:
-            found = ", ".join(f"{what} {value.name!r} hangs on {value.path[0].name!r}" for what, value in given.items())
+            found = ", ".join(f"{what} {shown(value.name)} hangs on {shown(value.path[0].name)}" for what, value in given.items())
             faults = [f"frames of different trees do not know how they move relative to each other: {found}; make all frames "
                       "with .frame(...) from one first frame"]
     if faults:

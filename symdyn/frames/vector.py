@@ -10,6 +10,7 @@ from symdyn.frames.checks import FrameFaults
 from symdyn.frames.numbers import numbers
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tree import Axes, along, angular_motion, demand_frames
+from symdyn.shown import shown
 
 
 class Vector:
@@ -50,4 +51,4 @@ class Vector:
         return numbers(self.components(self.frame if components is None else components), values, t)
 
     def __repr__(self) -> str:
-        return f"Vector({self.name!r}, {list(self.given)} in {self.frame.name!r})"
+        return f"Vector({shown(self.name)}, {list(self.given)} in {shown(self.frame.name)})"

@@ -7,20 +7,24 @@ closed where the bodies are: the configuration fulfils its constraints by constr
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from types import ModuleType
+from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
 
 import symdyn as sd
+from symdyn.errors import EvaluationError
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import SEQUENCES
 from symdyn.model.symbols import Coordinate, Speed
 
+# What joints and loads take as a number.
+Expression: TypeAlias = float | sp.Expr
 # Joints that carry bodies, with how often they are drawn.
 SPATIAL = {"Revolute": 8, "Prismatic": 4, "Helical": 2, "Cylindrical": 2, "Universal": 2, "Planar": 2, "Spherical": 3, "Free": 1,
            "Fixed": 1, "Custom": 1}
@@ -31,28 +35,42 @@ CLOSES_SPATIAL = {"Rod": 1, "Gear": 1, "Spherical": 3, "Planar": 3, "Universal":
 CLOSES_PLANAR = {"Rod": 1, "Gear": 1, "Revolute": 2, "Prismatic": 2}
 
 
+def as_float(e: Expression, values: Mapping[sp.Basic, float]) -> float:
+    """An expression as a float."""
+    return float(sp.sympify(e, strict=True).xreplace({s: sp.Float(v, 17) for s, v in values.items()}))
+
+
 class Numbers:
-    """The algebra that joints are written for, on floats; `values` of the symbols of expressions."""
+    """The algebra that joints are written for, on numbers; `values` of the symbols of expressions.
 
-    def __init__(self, values: Mapping[sp.Symbol, float]) -> None:
+    number      what makes a number of an expression and the values
+    functions   where sin, cos and sqrt of such numbers are: numpy for floats, mpmath for more digits
+    """
+
+    def __init__(self, values: Mapping[sp.Basic, Any], number: Callable[[Any, Mapping[sp.Basic, Any]], Any] = as_float,
+                 functions: ModuleType = np) -> None:
         self.values = dict(values)
-        self.sin, self.cos, self.sqrt = np.sin, np.cos, np.sqrt
+        self.number, self.functions = number, functions
+        self.sin, self.cos, self.sqrt = functions.sin, functions.cos, functions.sqrt
 
-    def within(self, values: Mapping[sp.Symbol, float]) -> Numbers:
+    def within(self, values: Mapping[sp.Basic, Any]) -> Numbers:
         """The same with more symbols."""
-        return Numbers({**self.values, **values})
+        return Numbers({**self.values, **values}, self.number, self.functions)
 
-    def divisor(self, value: float, least: Any, reason: str) -> float:
-        """The value; configurations are drawn away from where it vanishes."""
+    def divisor(self, value: float, least: Expression, reason: str) -> float:
+        """The value. Raises EvaluationError with the reason where it is not more than the least."""
+        if not value > float(least):
+            raise EvaluationError(reason)
         return value
 
-    def expression(self, e: Any) -> float:
+    def expression(self, e: Expression) -> Any:
         """An expression as a number."""
-        return float(sp.sympify(e).xreplace({s: sp.Float(v, 17) for s, v in self.values.items()}))
+        return self.number(e, self.values)
 
-    def constants(self, values: Any) -> np.ndarray:
+    def constants(self, values: Sequence[Expression]) -> np.ndarray:
         """Expressions as numbers, (n,)."""
-        return np.array([self.expression(e) for e in values])
+        numbers = [self.expression(e) for e in values]
+        return np.array(numbers, dtype=float if all(isinstance(v, float) for v in numbers) else object)
 
     def matrix(self, values: sp.MatrixBase) -> np.ndarray:
         """A matrix of expressions as numbers."""
@@ -84,7 +102,7 @@ class Draft:
     removed    freedoms that constraints take away so far
     """
 
-    def __init__(self, rng: random.Random, name: str, planar: bool, gravity: Sequence[Any], t: float) -> None:
+    def __init__(self, rng: random.Random, name: str, planar: bool, gravity: Sequence[Expression], t: float) -> None:
         self.rng, self.planar, self.t = rng, planar, t
         self.system = sd.System(name, gravity=list(gravity), planar=planar)
         self.values: dict[sp.Symbol, float] = {}
@@ -144,7 +162,7 @@ class Draft:
              [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]]
         return sp.Matrix(3, 3, [sp.Rational(e, w * w + x * x + y * y + z * z) for row in R for e in row])
 
-    def axis(self) -> list[Any]:
+    def axis(self) -> list[Expression]:
         """A unit vector of short fractions."""
         a, b = sp.Rational(3, 5), sp.Rational(4, 5)
         if self.planar:
@@ -320,7 +338,7 @@ def _ancestors(link: Link) -> list[Link]:
     return found
 
 
-def _floats(point: Any) -> np.ndarray:
+def _floats(point: Iterable[Expression]) -> np.ndarray:
     """A point in three components."""
     values = [float(e) for e in point]
     return np.array([*values, 0.0] if len(values) == 2 else values)

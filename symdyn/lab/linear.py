@@ -135,21 +135,30 @@ def flow_of(mechanism: Mechanism, linear: Any) -> Flow:
 def with_verdict(result: Result, mechanism: Mechanism, linear: Any, flow: Flow) -> Result:
     """The result with the verdict of the linearization and that of simulation."""
     try:
-        verdict = str(linear.verdict)
+        verdict, reason = str(linear.verdict), ""
     except ArgumentError as error:
         verdict, reason = NO_VERDICT, str(error)
-    else:
-        reason = ""
     # Linear equations about any motion change with time; only a verdict on one needs a closer look.
-    if (mechanism.motion == "any" and verdict == NO_VERDICT) or not constant(flow):
-        observed = NO_VERDICT
-    else:
+    observed = NO_VERDICT
+    if not (mechanism.motion == "any" and verdict == NO_VERDICT) and constant(flow):
         observed = observe(flow).word
+        if verdict == NO_VERDICT:
+            verdict, reason = verdict_of_motion(mechanism)
     fault = ""
     missing = verdict == NO_VERDICT and not mechanism.constant
     if verdict != observed and not missing and "not decided" not in (verdict, observed):
         fault = f"verdict {verdict!r}, simulation {observed!r}" + (f"; {reason}" if reason else "")
     return replace(result, verdict=verdict, observed=observed, fault=fault)
+
+
+def verdict_of_motion(mechanism: Mechanism) -> tuple[str, str]:
+    """The verdict of `stability`, which also judges motions whose coordinates accelerate; or no verdict, and the reason."""
+    hold = {"hold": list(mechanism.hold)} if mechanism.hold else {}
+    try:
+        found = mechanism.module.stability(mechanism.x, mechanism.params, t=mechanism.t, inputs=mechanism.inputs, **hold)
+    except ArgumentError as error:
+        return NO_VERDICT, str(error)
+    return str(found.verdict), ""
 
 
 def relative(found: np.ndarray, expected: np.ndarray) -> float:

@@ -15,6 +15,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison.case import Formula
+from symdyn.model.symbols import symbols_of
 
 # How joint 1 is set on the base: its axis lies level.
 SEAT_1 = sp.Matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -44,7 +45,7 @@ class Letters:
     def formula(self, name: str, printed: Any, derived: Any, line: int, **options: Any) -> Formula:
         """A formula in these symbols; see Formula."""
         parts = printed if isinstance(printed, tuple) else (printed,)
-        used = {str(s) for part in parts for s in sp.Matrix(part).free_symbols}
+        used = {str(s) for part in parts for s in symbols_of(sp.Matrix(part))}
         renamed = {name: self.values[name] for name in used if name in self.values}
         return Formula(name, printed, derived, line=line, renamed=renamed, **options)
 

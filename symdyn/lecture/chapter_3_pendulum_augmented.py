@@ -82,9 +82,9 @@ def _time_dependent() -> list[Formula]:
     eq = sd.augmented([x, y], [m, m], [Fx, Fy], [C], name="moving_constraint")
     r, r_dot, r_ddot = Matrix([x, y]), Matrix([x.dot, y.dot]), Matrix([x.ddot, y.ddot])
     lam, dt = Matrix(eq.multipliers), sp.Symbol("dt")
-    Cx, Cy, Ct = C.diff(x), C.diff(y), C.diff(t)
+    Cx, Cy, Ct = C.diff(x), C.diff(y), sd.partial_rate(C)
     C_r, C_t = Matrix([[Cx, Cy]]), Matrix([Ct])
-    C_rt, C_tt = C_r.diff(t), C_t.diff(t)
+    C_rt, C_tt = sd.partial_rate(C_r), sd.partial_rate(C_t)
     velocity = C_r * r_dot
     total = velocity + C_t
     rate = sd.rate(Matrix([C]))
@@ -106,7 +106,7 @@ def _time_dependent() -> list[Formula]:
         Formula("rate of C, matrices", C_r * r_dot + Matrix([Ct]), rate, line=5428),
         Formula("dC/dt", C_r * r_dot + C_t, rate, line=5430, also=(5440, 5462), latex=r"\frac{dC}{dt}"),
         Formula("C_r", [[C.diff(x), C.diff(y)]], eq.C_r, line=5430, also=(5440, 5462), latex=r"\mathbf{C}_r"),
-        Formula("C_t", [C.diff(t)], eq.C_t, line=5430, also=(5440, 5462), latex=r"\mathbf{C}_t"),
+        Formula("C_t", [sd.partial_rate(C)], eq.C_t, line=5430, also=(5440, 5462), latex=r"\mathbf{C}_t"),
         # The subscript r_dot means the derivative by r_dot, which is a row.
         Formula("second rate 1, first term", total.jacobian(r_dot), total.jacobian(r) * r_dot, line=5444,
                 latex=r"(\mathbf{C}_r\dot{\mathbf{r}}+\mathbf{C}_t)_{\dot{\mathbf{r}}}", errata=[Erratum(
@@ -115,8 +115,9 @@ def _time_dependent() -> list[Formula]:
         Formula("second rate 2", by_r * r_dot + C_t.jacobian(r) * r_dot + by_t, second, line=5444),
         Formula("second rate 3", by_r * r_dot + C_rt * r_dot + C_rt * r_dot + C_r * r_ddot + C_tt, second, line=5444),
         Formula("second rate", by_r * r_dot + 2 * C_rt * r_dot + C_r * r_ddot + C_tt, second, line=5444, also=(5466, 5470)),
-        Formula("C_rt", [[Cx.diff(t), Cy.diff(t)]], eq.C_r.diff(t), line=5444, also=(5466, 5492), latex=r"\mathbf{C}_{rt}"),
-        Formula("C_tt", [Ct.diff(t)], eq.C_t.diff(t), line=5444, also=(5466, 5492), latex=r"\mathbf{C}_{tt}"),
+        Formula("C_rt", [[sd.partial_rate(Cx), sd.partial_rate(Cy)]], sd.partial_rate(eq.C_r), line=5444, also=(5466, 5492),
+                latex=r"\mathbf{C}_{rt}"),
+        Formula("C_tt", [sd.partial_rate(Ct)], sd.partial_rate(eq.C_t), line=5444, also=(5466, 5492), latex=r"\mathbf{C}_{tt}"),
         Formula("C_r r_ddot", (C_r * r_ddot, F_d), (eq.C_r * r_ddot, eq.F_d), line=5472, also=(5474, 5492)),
         Formula("F_d", F_d, eq.F_d, line=5474, also=(5492, 5509, 5533, 5558), latex=r"\mathbf{F}^d"),
         Formula("augmented equations", (blocks * Matrix([*r_ddot, *lam]), Matrix([Fx, Fy, *F_d])),
@@ -155,8 +156,8 @@ def _pendulum() -> list[Formula]:
         Formula("M", [[m, 0], [0, m]], eq.M_tilde, line=5507, also=(5236, 5374, 5404, 5422, 5452, 5484, 5490, 5531, 5556),
                 latex=r"\mathbf{M}"),
         Formula("C_r", [[2 * x, 2 * y]], eq.C_r, line=5517, also=(5535, 5562), latex=r"\mathbf{C}_r"),
-        Formula("C_rt", [[0, 0]], eq.C_r.diff(sd.t), line=5517, also=(5535, 5562), latex=r"\mathbf{C}_{rt}"),
-        Formula("C_tt", [0], eq.C_t.diff(sd.t), line=5517, also=(5535, 5562), latex=r"\mathbf{C}_{tt}"),
+        Formula("C_rt", [[0, 0]], sd.partial_rate(eq.C_r), line=5517, also=(5535, 5562), latex=r"\mathbf{C}_{rt}"),
+        Formula("C_tt", [0], sd.partial_rate(eq.C_t), line=5517, also=(5535, 5562), latex=r"\mathbf{C}_{tt}"),
         Formula("C_r r_dot by the matrix", Matrix([[2 * x, 2 * y]]) * r_dot, product, line=5519, also=(5537,),
                 latex=r"\mathbf{C}_r\dot{\mathbf{r}}"),
         Formula("C_r r_dot", 2 * x * x.dot + 2 * y * y.dot, product[0], line=5519, also=(5537, 5545),

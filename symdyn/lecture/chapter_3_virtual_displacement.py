@@ -21,7 +21,7 @@ def _particle(angle: sp.Expr) -> tuple:
     r, acceleration, F_c = (eq.explicit(name, simplify=False) for name in ("r", "accelerations", "F_c"))
     r, F_c = Matrix(r), Matrix(F_c)
     r_ddot = sd.rate(sd.rate(r)).xreplace({q1.ddot: Matrix(acceleration)[0]})
-    return weight + F_c - m * r_ddot, weight - m * r_ddot, F_c, eq.J, r.diff(sd.t)
+    return weight + F_c - m * r_ddot, weight - m * r_ddot, F_c, eq.J, sd.partial_rate(r)
 
 
 def _fixed() -> list[Formula]:
@@ -67,9 +67,9 @@ def _surface() -> list[Formula]:
     return [
         Formula("differential, fixed surface", along(fixed, dx, dy, dz), sd.rate(fixed) * dt, line=5694, latex="dC"),
         Formula("rate, fixed surface", along(fixed, x.dot, y.dot, z.dot), sd.rate(fixed), line=5700),
-        Formula("differential, moving surface", along(moving, dx, dy, dz) + moving.diff(t) * dt, sd.rate(moving) * dt, line=5710,
-                latex="dC"),
-        Formula("rate, moving surface", along(moving, x.dot, y.dot, z.dot) + moving.diff(t), sd.rate(moving), line=5716),
+        Formula("differential, moving surface", along(moving, dx, dy, dz) + sd.partial_rate(moving) * dt, sd.rate(moving) * dt,
+                line=5710, latex="dC"),
+        Formula("rate, moving surface", along(moving, x.dot, y.dot, z.dot) + sd.partial_rate(moving), sd.rate(moving), line=5716),
     ]
 
 

@@ -8,6 +8,7 @@ from sympy import cos, sin
 import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
 from symdyn.lecture.chapter_4_three_link import R_3, G, arm, gamma_dot, of_phi, of_psi, of_theta, phi, psi, theta
+from symdyn.model.symbols import symbols_of
 
 
 def _lock() -> list[Formula]:
@@ -86,7 +87,7 @@ def _determination() -> list[Formula]:
 
 
 def _n(angle: sp.Expr) -> sp.Symbol:
-    return next(iter(angle.free_symbols))
+    return next(iter(symbols_of(angle)))
 
 
 CASES = (

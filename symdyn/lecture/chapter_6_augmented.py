@@ -70,12 +70,12 @@ def depending_on_time() -> list[Formula]:
     equations = sd.augmented([s], mass=[m], force=[0], constraints=[C], defaults={m: 1, a: 2, w: 1}, initial={s: 1})
     first = equations.explicit("C_dot", simplify=False)[0]
     second = (equations.C_r * sp.Matrix([s.ddot]) - equations.F_d)[0]
-    C_t, C_q, C_tt, C_qt = C.diff(t), C.diff(s), C.diff(t, 2), C.diff(s, t)
+    C_t, C_q, C_tt, C_qt = sd.partial_rate(C), C.diff(s), sd.partial_rate(sd.partial_rate(C)), sd.partial_rate(C.diff(s))
     velocity = C_q * s.dot
 
     def partial_t(value: sp.Expr) -> sp.Expr:
         """By the time, as printed: q is held, q_dot is not."""
-        return value.diff(t) + value.diff(s.dot) * s.ddot
+        return sd.partial_rate(value) + value.diff(s.dot) * s.ddot
 
     twice = proofs.numeric_derivative("C must be differentiated twice.", of=C, order=2)
     index = Erratum("What is differentiated by q is C_t + C_q q_dot; C_qt stands where C_t belongs.", twice)

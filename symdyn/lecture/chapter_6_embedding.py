@@ -9,6 +9,7 @@ from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
 from symdyn.lecture.chapter_6_platform import Body
 from symdyn.lecture.chapter_6_transformation import F, Platform, q, tau
 from symdyn.lecture.letters import constant, ddot, dot, moving
+from symdyn.model.symbols import symbols_of
 
 SECTION = "2.1 Equations of Motion"
 TITLE = f"{SECTION} - Derivation of Equations of Motion with respect to the"
@@ -64,7 +65,7 @@ def embedding() -> list[Formula]:
     k_bar = J.T * M * Jdot * qd + J.T * QJ * qd
     k_without_dot = J.T * MJ * qd + J.T * QJ * qd
     faster = proofs.Proof("dimensions", "Centrifugal forces are four times as large at twice the speed.",
-                          lambda k: k.xreplace({s: 2 * s for s in k.free_symbols if s.name.endswith("_dot")}) - 4 * k)
+                          lambda k: k.xreplace({s: 2 * s for s in symbols_of(k) if s.name.endswith("_dot")}) - 4 * k)
     lost_dot = Erratum("The dot over the second J is lost: M J_dot q_dot is a force, M J q_dot a momentum.", faster)
     upright = dict.fromkeys(q[4:], sp.S.Zero)
     again = Slide("6.3", f"{TITLE} Arbitrary Point O for Rigid Body", 12163)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import keyword
-import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
-from symdyn.model.bodies import Body, Component, Point
+from symdyn.model.bodies import Body
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import check_events
 from symdyn.model.faults import NAME, Faults
@@ -23,10 +22,13 @@ from symdyn.model.loads import Force, JointForce
 from symdyn.model.loop_check import idle_coordinate_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
+from symdyn.model.points import Point
+from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model
 from symdyn.model.symbol_check import check_coordinates, check_symbols, spelling, symbols_in
-from symdyn.model.symbols import take_over, time
+from symdyn.model.symbols import finite, take_over, time
 from symdyn.model.uses import units_of, uses
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -61,7 +63,7 @@ class _Checker:
             self.doubts += [] if id(body) in slender else doubts
         for joint in [*self.joints, *s.loops]:
             self.faults.extend(joint.faults)
-        self.faults += loop_faults(s.loops, {str(j.name): j for j in self.joints}, self._resolve)
+        self.faults += loop_faults(s.loops, {name_of(j): j for j in self.joints}, self._resolve)
         order = self._tree()
         if s.planar:
             self.faults += plane_faults([*self.joints, *(j for j in s.loops if isinstance(j, Joint))], s.ground_motion)
@@ -82,21 +84,24 @@ class _Checker:
             self.faults.append(f"duration is {s.duration} s; pass a positive number")
         if self.faults:
             raise ModelError(list(dict.fromkeys(self.faults)), s.name)
-        for doubt in self.doubts:
-            warnings.warn(doubt, ModelWarning, stacklevel=4)
+        distinct = tuple(dict.fromkeys(self.doubts))
+        for doubt in distinct:
+            if doubt not in s._warned:  # every formulation checks the system again
+                s._warned.add(doubt)
+                warnings.warn(doubt, ModelWarning, stacklevel=4)
         return Model(
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units},
-            tuple(s.shapes), self.events)
+            tuple(s.shapes), self.events, distinct)
 
     # -- names
 
     def _names(self) -> None:
         s = self.system
         if not isinstance(s.name, str) or not s.name.isidentifier() or keyword.iskeyword(s.name):
-            self.faults.append(f"the system's name is {s.name!r}; pass an identifier such as 'arm', it names files and "
+            self.faults.append(f"the system's name is {shown(s.name)}; pass an identifier such as 'arm', it names files and "
                                "functions")
         moving = [] if s.ground_motion is None else [s.ground_motion.name]
         for kind, names in (("bodies", ["ground", *[b.name for b in s.bodies]]),
@@ -107,19 +112,19 @@ class _Checker:
                             ("loads", [load.label for load in s.loads])):
             for name, count in Counter(map(_hashable, names)).items():
                 if count > 1 and kind != "loads":
-                    self.faults.append(f"{count} {kind} are named {name!r}; give each a name of its own")
+                    self.faults.append(f"{count} {kind} are named {shown(name)}; give each a name of its own")
             if kind not in ("outputs", "events"):
                 spelling(self.faults, f"the {kind}", names)
         for joint, count in Counter(s.joints).items():
             if count > 1:
-                self.faults.append(f"joint {joint.name!r} was added {count} times; add it once")
+                self.faults.append(f"joint {shown(joint.name)} was added {count} times; add it once")
         for load in {id(load): load for load in s.loads}.values():
             count = sum(other is load for other in s.loads)
             if count > 1:
                 self.faults.append(f"{load.label} was added {count} times; add it once, or make another one")
         for output in s.outputs:
             if not isinstance(output.name, str) or not output.name.isidentifier():
-                self.faults.append(f"an output is named {output.name!r}; pass an identifier such as 'tip'")
+                self.faults.append(f"an output is named {shown(output.name)}; pass an identifier such as 'tip'")
 
     # -- tree
 
@@ -127,18 +132,18 @@ class _Checker:
         found = self.known.get(body) if isinstance(body, str) else body
         if isinstance(found, Body) and id(found) in self.index:
             if carried and id(found) in self.idle_ends:
-                self.faults.append(f"{where} is {found.name!r}, the free end of a flexible body, which was added with "
+                self.faults.append(f"{where} is {shown(found.name)}, the free end of a flexible body, which was added with "
                                    "carries=False and stays at the clamped end; leave carries out")
             return self.index[id(found)]
         name, what = (body.name, "is a body of another system") if isinstance(body, Body) else (body, "is no body of the system")
-        self.faults.append(f"{where} is {name!r}, which {what}; bodies: {', '.join(self.known)}"
+        self.faults.append(f"{where} is {shown(name)}, which {what}; bodies: {', '.join(self.known)}"
                            f"{self._nearest(name, self.known)}")
         return None
 
     @staticmethod
     def _nearest(name: Any, known: Iterable[str]) -> str:
-        near = difflib.get_close_matches(str(name), [k for k in known if k != name], n=1)
-        return f"; did you mean {near[0]!r}?" if near else ""
+        near = difflib.get_close_matches(name, [k for k in known if k != name], n=1) if isinstance(name, str) else []
+        return f"; did you mean {shown(near[0])}?" if near else ""
 
     def _at_com(self, load: Any) -> Any:
         """A force without a point acts at the centre of mass."""
@@ -154,20 +159,21 @@ class _Checker:
         if not s.bodies:
             self.faults.append("the system has no bodies; add one with add_body and join it with add_joint")
         for joint in self.joints:
-            parent = self._resolve(joint.parent, f"joint {joint.name!r}: parent")
-            child = self._resolve(joint.child, f"joint {joint.name!r}: child", not isinstance(joint, Modal))
+            parent = self._resolve(joint.parent, f"joint {shown(joint.name)}: parent")
+            child = self._resolve(joint.child, f"joint {shown(joint.name)}: child", not isinstance(joint, Modal))
             if parent is None or child is None:
                 doubtful.update(range(len(s.bodies)) if child is None else {child})
             elif child == -1:
-                self.faults.append(f"joint {joint.name!r}: the ground is its child; exchange parent and child")
+                self.faults.append(f"joint {shown(joint.name)}: the ground is its child; exchange parent and child")
                 doubtful.add(parent)
             elif child == parent:
-                self.faults.append(f"joint {joint.name!r} joins body {s.bodies[child].name!r} to itself; "
+                self.faults.append(f"joint {shown(joint.name)} joins body {shown(s.bodies[child].name)} to itself; "
                                    "pass two different bodies")
                 doubtful.add(child)
             elif child in edges:
                 self.faults.append(
-                    f"body {s.bodies[child].name!r} is the child of joints {edges[child][0].name!r} and {joint.name!r}, "
+                    f"body {shown(s.bodies[child].name)} is the child of joints {shown(edges[child][0].name)} and "
+                    f"{shown(joint.name)}, "
                     f"a loop in the tree; add one of them with close_loop")
             else:
                 edges[child] = (joint, parent)
@@ -189,13 +195,13 @@ class _Checker:
                 placed.add(c)
         for k, body in enumerate(s.bodies):
             if k not in edges and k not in doubtful:
-                self.faults.append(f"body {body.name!r} has no joint; join it to a parent (a body that moves freely: Free)")
+                self.faults.append(f"body {shown(body.name)} has no joint; join it to a parent (a body that moves freely: Free)")
         return sorted(order, key=lambda e: self.joints.index(e[0])) if _sorted_is_tree(order, self.joints) else order
 
     # -- loads, numbers, units
 
     def _loads(self) -> None:
-        joints = {str(j.name): j for j in self.joints}
+        joints = {name_of(j): j for j in self.joints}
         for load in self.loads:
             if isinstance(load, (Element, AddedMass)):
                 self.faults.extend(load.faults)
@@ -204,11 +210,11 @@ class _Checker:
                     self.faults.append(f"{load.label} acts on the ground, so that nothing comes of it; pass a body that moves")
             if isinstance(load, JointForce):
                 joint = joints.get(load.joint) if isinstance(load.joint, str) else load.joint
-                if joint not in self.joints:
-                    self.faults.append(f"{load.label} acts on the joint {load.joint!r}, which the system does not have; "
+                if not any(joint is j for j in self.joints):
+                    self.faults.append(f"{load.label} acts on the joint {shown(load.joint)}, which the system does not have; "
                                        f"joints: {', '.join(joints) or 'none'}{self._nearest(load.joint, joints)}")
                 elif joint is not None and len(load.values) != joint.n_speeds:
-                    self.faults.append(f"{load.label} has {len(load.values)} values; joint {joint.name!r} has "
+                    self.faults.append(f"{load.label} has {len(load.values)} values; joint {shown(joint.name)} has "
                                        f"{joint.n_speeds} degrees of freedom")
                 continue
             places = {attribute: self._resolve(getattr(load, attribute), f"{load.label}: {attribute}")
@@ -220,10 +226,24 @@ class _Checker:
                                        "pass two different bodies")
         for output in self.system.outputs:
             if isinstance(output.value, Point):
-                self._resolve(output.value.body, f"output {output.name!r}: body")
-        for event in self.system.events:
-            if isinstance(event.value, Component):
-                self._resolve(event.value.point.body, f"event {event.name!r}: body")
+                self._resolve(output.value.body, f"output {shown(output.name)}: body")
+        for where, expressions, _ in uses(self.system, self.joints, self.loads):
+            for quantity in quantities_in(expressions):
+                self._quantity(quantity, where)
+
+    def _quantity(self, quantity: Quantity, where: str) -> None:
+        """The bodies and the joint that a quantity is of belong to the system; constraints get their names when derived."""
+        measure = quantity.measure
+        if measure.kind == "reaction":
+            joints = [str(j.name) for j in [*self.joints, *self.system.loops] if isinstance(j, Joint)]
+            if measure.of[0] not in joints:
+                self.faults.append(f"{where} uses {quantity}, but the system has no joint {measure.of[0]!r}; joints: "
+                                   f"{', '.join(joints) or 'none'}{self._nearest(measure.of[0], joints)}")
+        elif measure.kind != "multiplier":
+            for name in measure.of:
+                self._resolve(name, f"{where}: body of {quantity}")
+        if measure.frame is not None:
+            self._resolve(measure.frame, f"{where}: frame of {quantity}")
 
     def _shapes(self) -> None:
         """Shapes have the bodies and parameters that the mechanism has without them."""
@@ -242,16 +262,16 @@ class _Checker:
     def _numbers(self, given: Any, what: str, allowed: Iterable[sp.Symbol], kind: str) -> dict[sp.Symbol, float]:
         """A table of numbers by symbol; symbols are known by their names."""
         if not isinstance(given, Mapping):
-            self.faults.append(f"{what} is {given!r}; pass a dict such as {{m: 1.5}}")
+            self.faults.append(f"{what} is {shown(given)}; pass a dict such as {{m: 1.5}}")
             return {}
         result = {}
         symbols = {s.name: s for s in allowed}
         for key, value in given.items():
             taken = take_over(key) if isinstance(key, sp.Basic) else key
-            name = str(getattr(taken, "name", taken))
+            name = name_of(taken)
             number = self._number(value, f"{what}: the value of {name}")
             if name not in symbols:
-                self.faults.append(f"{what} has a number for {name!r}, which is no {kind} of the system; "
+                self.faults.append(f"{what} has a number for {shown(name)}, which is no {kind} of the system; "
                                    f"there are {', '.join(symbols) or 'none'}{self._nearest(name, symbols)}")
             elif number is not None:
                 result[symbols[name]] = number
@@ -265,27 +285,26 @@ class _Checker:
         """The units that were given, by symbol."""
         symbols = {a.name: a for a in [*self.coordinates, *self.speeds, *[z.symbol for z in self.system.states],
                                        *self.parameters, *self.inputs]}
-        units = {}
-        for key, unit in dict(self.system.units).items():
-            name = str(getattr(key, "name", key))
+        units: dict[sp.Symbol, str] = {}
+        if not isinstance(self.system.units, Mapping):
+            self.faults.append(f"units is {shown(self.system.units)}; pass a dict such as {{m: 'kg'}}")
+            return units
+        for key, unit in self.system.units.items():
+            name = name_of(key)
             if name not in symbols:
-                self.faults.append(f"units has one for {name!r}, which is no symbol of the system"
+                self.faults.append(f"units has one for {shown(name)}, which is no symbol of the system"
                                    f"{self._nearest(name, symbols)}")
             elif not isinstance(unit, str) or not NAME.fullmatch(unit):
-                self.faults.append(f"units: that of {name} is {unit!r}; pass text such as 'N m'")
+                self.faults.append(f"units: that of {name} is {shown(unit)}; pass text such as 'N m'")
             else:
                 units[symbols[name]] = unit
         return units
 
     def _number(self, value: Any, what: str) -> float | None:
         """A finite real number."""
-        try:
-            number = math.nan if isinstance(value, str) else float(value)
-        except (TypeError, ValueError):
-            number = math.nan
-        if not math.isfinite(number):
-            self.faults.append(f"{what} is {value!r}; pass a finite number")
-            return None
+        number = finite(value)
+        if number is None:
+            self.faults.append(f"{what} is {shown(value)}; pass a finite number, real and within double precision")
         return number
 
 
@@ -302,7 +321,7 @@ def _in_loop(body: int, edges: dict[int, tuple[Joint, int]]) -> bool:
 
 
 def _hashable(name: Any) -> Any:
-    return name if isinstance(name, str) else repr(name)
+    return name if isinstance(name, str) else shown(name)
 
 
 def _sorted_is_tree(order: list[tuple[Joint, int, int]], joints: list[Joint]) -> bool:

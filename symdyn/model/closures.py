@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.model.faults import Faults
 from symdyn.model.joints.base import Joint
+from symdyn.shown import shown
 
 
 class Rod(Joint):
@@ -22,9 +23,10 @@ class Rod(Joint):
     def __init__(self, name: str, parent: Any, child: Any, length: Any, parent_point: Any = (0, 0, 0),
                  child_point: Any = (0, 0, 0)) -> None:
         super().__init__(name, parent, child, (), None, parent_point, child_point, None, None)
-        self.length = self.faults.expression(length, f"rod {name!r}: length (m)")
+        self.length = self.faults.expression(length, f"rod {shown(name)}: length (m)")
         if not self.faults and self.length.is_number and not self.length > 0:
-            self.faults.append(f"rod {name!r}: length is {self.length} m; pass a positive length (for two points that coincide: "
+            self.faults.append(f"rod {shown(name)}: length is {self.length} m; pass a positive length (for two points that "
+                               "coincide: "
                                "Spherical, or Revolute in a plane)")
 
     @property
@@ -45,11 +47,11 @@ class Gear:
         self.name = name
         self.joint_a, self.joint_b = joint_a, joint_b
         self.faults = Faults()
-        self.ratio = self.faults.expression(ratio, f"gear {name!r}: ratio")
-        self.offset = self.faults.expression(offset, f"gear {name!r}: offset")
+        self.ratio = self.faults.expression(ratio, f"gear {shown(name)}: ratio")
+        self.offset = self.faults.expression(offset, f"gear {shown(name)}: offset")
 
     def __repr__(self) -> str:
-        return f"Gear({self.name!r})"
+        return f"Gear({shown(self.name)})"
 
 
 @dataclass(frozen=True)

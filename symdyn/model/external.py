@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
 from symdyn.model.python_text import text_of
+from symdyn.shown import shown
 from symdyn.tape.external import UserFunction
 from symdyn.tape.reserved import OF_FUNCTIONS
 
@@ -18,6 +19,8 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _HEAD = r"\bstatic\s+(?:inline\s+)?int\s+{}\s*\(\s*const\s+double\s*\*\s*\w+\s*,\s*double\s*\*\s*\w+\s*\)\s*\{{"
 # It stands in a C text.
 _REASON = re.compile(r"(?!.*\?\?)[^\"\\\x00-\x1f\x7f]+")
+# Results and operations that a function has at most.
+MOST = 10**9
 
 
 class External:
@@ -51,13 +54,13 @@ class External:
         faults = Faults()
         taken = _arguments(name, arguments, results, operations, faults)
         if precise is not None and not callable(precise):
-            faults.append(f"{name}: precise is {precise!r}; pass a function of an mpmath context and of the arguments")
+            faults.append(f"{name}: precise is {shown(precise)}; pass a function of an mpmath context and of the arguments")
         if reason and not _REASON.fullmatch(reason):
-            faults.append(f"{name}: reason is {reason!r}; pass one line without quotation marks, backslashes and ??")
+            faults.append(f"{name}: reason is {shown(reason)}; pass one line without quotation marks, backslashes and ??")
         given = _texts(name, c, texts, faults)
         if python is not None:
             given["numpy"] = text_of(python, len(taken), python_source, f"{name}: the Python function", faults)
-        elif python_source:
+        elif not isinstance(python_source, str) or python_source:
             faults.append(f"{name}: python_source is given without python; pass the function itself, too")
         if not given:
             faults.append(f"{name} has no text; pass c=, python= or both")
@@ -88,23 +91,23 @@ class External:
 def _arguments(name: Any, arguments: Any, results: Any, operations: Any, faults: Faults) -> tuple[str, ...]:
     """The names of the arguments, once names and numbers have been looked at."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
-        faults.append(f"the name of a function is {name!r}; pass letters, digits and underscores that begin with a letter")
+        faults.append(f"the name of a function is {shown(name)}; pass letters, digits and underscores that begin with a letter")
     elif name in OF_FUNCTIONS or name.startswith("symdyn_"):
-        faults.append(f"a function is called {name!r}, a name that generated code or C has already; take another")
+        faults.append(f"a function is called {shown(name)}, a name that generated code or C has already; take another")
     listed = list(arguments) if isinstance(arguments, (list, tuple)) else []
     if not listed or not all(isinstance(a, str) and _NAME.fullmatch(a) for a in listed) or len(set(listed)) < len(listed):
-        faults.append(f"{name}: arguments is {arguments!r}; pass a list of different names, such as ['v', 'omega']")
+        faults.append(f"{name}: arguments is {shown(arguments)}; pass a list of different names, such as ['v', 'omega']")
         listed = [str(a) for a in listed] or ["v"]
     for what, number in (("results", results), ("operations", operations)):
-        if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-            faults.append(f"{name}: {what} is {number!r}; pass a whole number from 1 on")
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
+            faults.append(f"{name}: {what} is {shown(number)}; pass a whole number from 1 on, {MOST} at most")
     return tuple(listed)
 
 
 def _texts(name: Any, c: Any, texts: Any, faults: Faults) -> dict[str, str]:
     """Backend -> text, of C and backends of the user."""
     if not isinstance(texts or {}, Mapping):
-        faults.append(f"{name}: texts is {texts!r}; pass a dictionary of backends and texts")
+        faults.append(f"{name}: texts is {shown(texts)}; pass a dictionary of backends and texts")
         texts = None
     given = {str(backend): text for backend, text in (texts or {}).items()}
     if {"c", "numpy"} & set(given):
@@ -113,7 +116,7 @@ def _texts(name: Any, c: Any, texts: Any, faults: Faults) -> dict[str, str]:
         given["c"] = c
     for backend, text in given.items():
         if not isinstance(text, str) or not text.strip():
-            faults.append(f"{name}: its text for the backend {backend!r} is {text!r}; pass the text of a function")
+            faults.append(f"{name}: its text for the backend {shown(backend)} is {shown(text)}; pass the text of a function")
             given[backend] = ""
     given = {backend: "\n".join(line.rstrip() for line in text.strip().splitlines()) for backend, text in given.items()}
     if given.get("c"):
@@ -130,7 +133,7 @@ def _derivative(name: Any, derivative: Any, arguments: tuple[str, ...], results:
     if derivative is None:
         return None
     if not isinstance(derivative, External):
-        faults.append(f"{name}: derivative is {derivative!r}; pass another sd.External, or None")
+        faults.append(f"{name}: derivative is {shown(derivative)}; pass another sd.External, or None")
         return None
     below = derivative.function
     if len(below.arguments) != len(arguments):

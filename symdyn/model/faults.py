@@ -6,10 +6,14 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.errors import ModelError
+from symdyn.model.bodies import Body
 from symdyn.model.symbols import as_expression
+from symdyn.model.sympy_vectors import components, is_dyadic, is_frame, is_sympy_vector
+from symdyn.shown import shown
 
 # Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
 NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
@@ -25,11 +29,17 @@ class Faults(list[str]):
         except ModelError as error:
             self.extend(error.faults)
         except (sp.SympifyError, TypeError, ValueError):
-            self.append(f"{what} is {value!r}; pass a number or an expression of SymPy symbols")
+            self.append(f"{what} is {shown(value)}; pass a number or an expression of SymPy symbols")
         return sp.S.Zero
 
-    def vector(self, value: Any, what: str, planar: bool = False) -> sp.ImmutableMatrix:
-        """A vector of 3 components; in a planar system 2 components, which get a zero third."""
+    def vector(self, value: Any, what: str, planar: bool = False, frame: Any = None) -> sp.ImmutableMatrix:
+        """A vector of 3 components; in a planar system 2 components, which get a zero third.
+
+        frame   the ReferenceFrame in which a vector of SymPy's may be written, or the body in whose axes it may be written, whose
+                frame is made for such a vector only; anything else: such vectors are rejected
+        """
+        if is_sympy_vector(value):
+            value = self._written(value, frame, what, sp.zeros(3, 1))
         entries = self._entries(value, what)
         sizes = (2, 3) if planar else (3,)
         if len(entries) not in sizes:
@@ -42,14 +52,18 @@ class Faults(list[str]):
         """Any number of scalar expressions; a single one stands for itself."""
         if isinstance(value, sp.MatrixBase):
             entries = list(value)
+        elif isinstance(value, np.ma.MaskedArray):
+            return (self.expression(np.ma.masked, what),)
         else:
             if hasattr(value, "ravel"):
                 value = value.ravel().tolist()
             entries = list(value) if isinstance(value, (list, tuple)) else [value]
         return tuple(self.expression(e, what) for e in entries)
 
-    def matrix(self, value: Any, what: str) -> sp.ImmutableMatrix:
-        """A 3 x 3 matrix; a list of 3 stands for its diagonal."""
+    def matrix(self, value: Any, what: str, frame: Any = None) -> sp.ImmutableMatrix:
+        """A 3 x 3 matrix; a list of 3 stands for its diagonal; frame: as for `vector`, of dyadics."""
+        if is_dyadic(value):
+            value = self._written(value, frame, what, sp.zeros(3, 3))
         entries = self._entries(value, what)
         if len(entries) == 3 and all(not _is_row(e) for e in entries):
             entries = [[entries[0], 0, 0], [0, entries[1], 0], [0, 0, entries[2]]]
@@ -62,7 +76,7 @@ class Faults(list[str]):
 
     def square(self, value: Any, n: int, what: str) -> sp.ImmutableMatrix:
         """An n x n matrix; a list of n stands for its diagonal."""
-        rows = value.tolist() if hasattr(value, "tolist") else value
+        rows = None if isinstance(value, np.ma.MaskedArray) else value.tolist() if hasattr(value, "tolist") else value
         if isinstance(rows, (list, tuple)) and len(rows) == n:
             if not any(_is_row(e) for e in rows):
                 rows = [[e if i == k else 0 for k in range(n)] for i, e in enumerate(rows)]
@@ -71,13 +85,24 @@ class Faults(list[str]):
         self.append(f"{what} is not a {n} x {n} matrix; pass {n} rows of {n}, or the {n} diagonal entries")
         return sp.ImmutableMatrix(sp.zeros(n, n))
 
+    def _written(self, value: Any, frame: Any, what: str, harmless: sp.Matrix) -> sp.Matrix:
+        try:
+            known = frame.frame if isinstance(frame, Body) and isinstance(frame.name, str) else frame
+            return components(value, known if is_frame(known) else None, what)
+        except ModelError as error:
+            self.extend(error.faults)
+            return harmless
+
     def _entries(self, value: Any, what: str) -> list:
         if isinstance(value, sp.MatrixBase):
             return list(value)
+        if isinstance(value, np.ma.MaskedArray):
+            self.append(f"{what} is a masked array; pass a list of numbers or expressions")
+            return [0, 0, 0]
         if hasattr(value, "tolist"):
             value = value.tolist()
-        if not isinstance(value, Sequence) or isinstance(value, str):
-            self.append(f"{what} is {value!r}; pass a list of numbers or expressions")
+        if not isinstance(value, Sequence) or isinstance(value, (str, bytes, bytearray)):
+            self.append(f"{what} is {shown(value)}; pass a list of numbers or expressions")
             return [0, 0, 0]
         if value and all(_is_row(row) for row in value) and all(len(row) == 1 for row in value):
             return [row[0] for row in value]

@@ -15,6 +15,7 @@ from symdyn.flexible.modal_body import ModalBody
 from symdyn.model.bodies import Body
 from symdyn.model.joints.modal import Modal
 from symdyn.model.symbols import Coordinate
+from symdyn.shown import shown
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def flexible_body(name: str, beam: Any, coordinates: Sequence[Any] | None, stiff
     """Make one. Raises ModelError for a beam that is none."""
     body = getattr(beam, "modal", beam)
     if not isinstance(body, ModalBody):
-        raise ModelError([f"flexible body {name!r}: beam is {beam!r}; pass sd.Beam(...)"])
+        raise ModelError([f"flexible body {shown(name)}: beam is {shown(beam)}; pass sd.Beam(...)"])
     center = body.h0 / body.m
     inertia = body.I0 - body.m * (center @ center * np.eye(3) - np.outer(center, center))
     root = Body(name, sp.Float(body.m), sp.ImmutableMatrix(3, 3, [_number(e) for e in inertia.ravel()]),

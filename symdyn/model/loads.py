@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +50,7 @@ class SpringDamper:
     """A spring (N/m) and damper (N s/m) in line between a point of one body and a point of another.
 
     length   unstretched length, m; points (3, 1) in the axes of their bodies
+    stiffness, damping, length   expressions in coordinates, speeds, inputs, extra states, t and parameters
     """
 
     body_a: Any
@@ -59,3 +61,35 @@ class SpringDamper:
     damping: sp.Expr
     length: sp.Expr
     label: str
+
+    def is_elastic(self, parameters: Collection[sp.Symbol]) -> bool:
+        """Whether the spring has a potential, 1/2 stiffness (distance - length)^2: where both depend on parameters only."""
+        return (self.stiffness.free_symbols | self.length.free_symbols) <= set(parameters)
+
+
+@dataclass(frozen=True)
+class ForceBetween:
+    """A force (N) along the line from a point of one body to a point of another; positive where it draws them together.
+
+    points (3, 1) in the axes of their bodies
+    """
+
+    body_a: Any
+    body_b: Any
+    force: sp.Expr
+    point_a: sp.ImmutableMatrix
+    point_b: sp.ImmutableMatrix
+    label: str
+
+
+def expressions_of(load: Any) -> tuple[sp.Expr, ...]:
+    """The expressions of a force, torque, joint force, spring-damper or force between points, which may depend on the motion."""
+    if isinstance(load, Force):
+        return tuple(load.force)
+    if isinstance(load, Torque):
+        return tuple(load.torque)
+    if isinstance(load, JointForce):
+        return load.values
+    if isinstance(load, SpringDamper):
+        return load.stiffness, load.damping, load.length
+    return (load.force,) if isinstance(load, ForceBetween) else ()

@@ -11,7 +11,9 @@ import sympy as sp
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Custom, Fixed, Free, Helical, Joint
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate
+from symdyn.model.quantity import Quantity, of_speeds
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, symbols_of
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -56,22 +58,24 @@ def carried(joint: Joint) -> tuple[Body, Joint, Joint]:
 def loop_faults(loops: Iterable[Joint | Gear], joints: Mapping[str, Joint],
                 resolve: Callable[[Any, str], int | None]) -> list[str]:
     """What is wrong with the loops; resolve(body, where) gives a body's number and reports unknown ones itself."""
-    faults = [f"rod {j.name!r} cannot carry a body in the tree; join the bodies by other joints and pass the rod to close_loop"
+    faults = [f"rod {shown(j.name)} cannot carry a body in the tree; join the bodies by other joints and pass the rod to "
+              "close_loop"
               for j in joints.values() if isinstance(j, Rod)]
     for loop in loops:
         if isinstance(loop, Gear):
             faults += _gear_faults(loop, joints)
             continue
-        parent = resolve(loop.parent, f"joint {loop.name!r}: parent")
-        child = resolve(loop.child, f"joint {loop.name!r}: child")
+        parent = resolve(loop.parent, f"joint {shown(loop.name)}: parent")
+        child = resolve(loop.child, f"joint {shown(loop.name)}: child")
         if parent is not None and parent == child:
-            faults.append(f"joint {loop.name!r} closes a loop from a body onto itself; pass two different bodies")
+            faults.append(f"joint {shown(loop.name)} closes a loop from a body onto itself; pass two different bodies")
         given = [str(q) for q in loop.coordinates if not isinstance(q, Coordinate)]
         if given and not loop.faults:
-            faults.append(f"joint {loop.name!r} closes a loop, where its motion follows from the others; it cannot be given as "
+            faults.append(f"joint {shown(loop.name)} closes a loop, where its motion follows from the others; it cannot be "
+                          "given as "
                           f"{', '.join(given)}: put this joint into the tree, and close the loop at another")
         if isinstance(loop, Free):
-            faults.append(f"joint {loop.name!r} is free and constrains nothing; leave out close_loop")
+            faults.append(f"joint {shown(loop.name)} is free and constrains nothing; leave out close_loop")
     return faults
 
 
@@ -84,7 +88,7 @@ def idle_coordinate_faults(loops: Iterable[Joint | Gear], used: Iterable[sp.Basi
             continue
         idle = [q for q in joint.coordinates if isinstance(q, Coordinate) and not used & {q, q.dot}]
         if idle:
-            faults.append(f"joint {joint.name!r} closes a loop and is given the coordinate {', '.join(map(str, idle))}; a "
+            faults.append(f"joint {shown(joint.name)} closes a loop and is given the coordinate {', '.join(map(str, idle))}; a "
                           "closing joint has no coordinate, its motion follows from the others: leave it out, or put this "
                           "joint into the tree and close the loop at another")
     return faults
@@ -96,14 +100,15 @@ def _gear_faults(gear: Gear, joints: Mapping[str, Joint]) -> list[str]:
     for end in (gear.joint_a, gear.joint_b):
         joint = joints.get(end) if isinstance(end, str) else end
         if joint not in joints.values():
-            faults.append(f"gear {gear.name!r}: it joins {end!r}, which is no joint of the tree; joints: "
+            faults.append(f"gear {shown(gear.name)}: it joins {shown(end)}, which is no joint of the tree; joints: "
                           f"{', '.join(joints) or 'none'}")
         elif joint is not None and len(joint.coordinates) != 1:
-            faults.append(f"gear {gear.name!r}: joint {joint.name!r} has {len(joint.coordinates)} coordinates; a gear joins "
+            faults.append(f"gear {shown(gear.name)}: joint {shown(joint.name)} has {len(joint.coordinates)} coordinates; a "
+                          "gear joins "
                           "joints with one each")
         found.append(joint)
     if not faults and found[0] is found[1]:
-        faults.append(f"gear {gear.name!r} joins joint {gear.joint_a!r} to itself; pass two different joints")
+        faults.append(f"gear {shown(gear.name)} joins joint {shown(gear.joint_a)} to itself; pass two different joints")
     return faults
 
 
@@ -113,14 +118,14 @@ def constraint_faults(constraints: Iterable[Constraint], moving: Iterable[sp.Sym
     faults = []
     moving, states, rates = set(moving), set(states), set(speeds)
     for c in constraints:
-        symbols = c.expression.free_symbols
+        symbols = symbols_of(c.expression)
         given = sorted(str(s) for s in symbols if isinstance(s, Input) or s in states)
         if given:
             faults.append(f"{c.name} uses {', '.join(given)}; a constraint may use coordinates, speeds, t and parameters")
-        if not symbols & moving and not any(isinstance(s, (Coordinate, Rate, Acceleration)) for s in symbols):
+        if not symbols & moving and not any(isinstance(s, (Coordinate, Rate, Acceleration, Quantity)) for s in symbols):
             faults.append(f"{c.name}, {c.expression} = 0, has no coordinate or speed in it, so that it constrains nothing; use "
                           "coordinates of the system, or remove it")
-        used = sorted((s for s in symbols if s in rates or isinstance(s, Rate)), key=str)
+        used = sorted((s for s in symbols if s in rates or isinstance(s, Rate) or of_speeds(s)), key=str)
         for k, first in enumerate(used):
             if any(sp.diff(c.expression, first, other) != 0 for other in used[k:]):
                 faults.append(f"{c.name}, {c.expression} = 0, is not linear in the speed {first}; pass a constraint of the form "

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from symdyn.errors import ModelError
+from symdyn.shown import shown
 
 SEQUENCES = tuple("".join(s) for s in product("XYZ", repeat=3) if s[0] != s[1] and s[1] != s[2])
 SPEEDS = ("rates", "body")
@@ -27,10 +28,10 @@ class EulerAngles:
 
     def __post_init__(self) -> None:
         faults = []
-        if self.sequence not in SEQUENCES:
-            faults.append(f"there is no Euler sequence {self.sequence!r}; the twelve are {', '.join(SEQUENCES)}")
+        if not isinstance(self.sequence, str) or self.sequence not in SEQUENCES:
+            faults.append(f"there is no Euler sequence {shown(self.sequence)}; the twelve are {', '.join(SEQUENCES)}")
         if self.speeds not in SPEEDS:
-            faults.append(f"Euler angles have no speeds {self.speeds!r}; pass 'rates' (derivatives of the angles) or 'body' "
+            faults.append(f"Euler angles have no speeds {shown(self.speeds)}; pass 'rates' (derivatives of the angles) or 'body' "
                           "(angular velocity in the axes of the child's joint frame)")
         if faults:
             raise ModelError(faults)

@@ -11,13 +11,14 @@ from symdyn.model.bodies import Body
 from symdyn.model.closures import Rod
 from symdyn.model.joints import Custom, Fixed, Joint, Planar, Prismatic, Revolute
 from symdyn.model.joints.base import numeric
+from symdyn.shown import shown
 
 
 def inertia_faults(body: Body, planar: bool) -> tuple[list[str], list[str]]:
     """Faults of a body's mass and inertia, and doubts: what no real body has but can be computed with."""
     faults: list[str] = []
     doubts: list[str] = []
-    where = f"body {body.name!r}"
+    where = f"body {shown(body.name)}"
     if body.mass.is_number and body.mass < 0:
         faults.append(f"{where} has the mass {body.mass} kg; pass zero or a positive mass")
     I = body.inertia
@@ -46,7 +47,7 @@ def plane_faults(joints: Iterable[Joint], ground_motion: Any) -> list[str]:
     """What turns or moves out of the x-y plane in a planar system."""
     faults: list[str] = []
     for joint in joints:
-        where = f"joint {joint.name!r}"
+        where = f"joint {shown(joint.name)}"
         for what in ("parent_rotation", "child_rotation"):
             R = getattr(joint, what)
             if any(abs(numeric(R[k])) > 1e-9 for k in (2, 5)):

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.shown import shown
+
 
 def text_of(function: Any, n: int, given: str, what: str, faults: list[str]) -> str:
     """The text of a function of n arguments: as it stands in its file, or what was given in its place.
@@ -20,7 +22,7 @@ def text_of(function: Any, n: int, given: str, what: str, faults: list[str]) -> 
     what   how messages call it; what is wrong is added to `faults`
     """
     if not isinstance(function, types.FunctionType) or function.__name__ == "<lambda>":
-        kind = "a lambda" if isinstance(function, types.FunctionType) else f"{function!r} of type {type(function).__name__}"
+        kind = "a lambda" if isinstance(function, types.FunctionType) else f"{shown(function)} of type {type(function).__name__}"
         faults.append(f"{what} is {kind}; pass a function that is written with def, whose text goes into generated modules")
         return ""
     what = f"{what} {function.__name__}"
@@ -46,7 +48,7 @@ def text_of(function: Any, n: int, given: str, what: str, faults: list[str]) -> 
         faults.append(f"{what} uses {', '.join(missing)}, which generated modules do not have; it may use its arguments, np and "
                       "what Python has built in: move the rest into it, or pass a text that holds all of it as python_source=")
     if "np" in function.__code__.co_names and function.__globals__.get("np", np) is not np:
-        faults.append(f"{what} uses np, which is {function.__globals__['np']!r} there, and NumPy in generated modules")
+        faults.append(f"{what} uses np, which is {shown(function.__globals__['np'])} there, and NumPy in generated modules")
     return text
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import sympy as sp
 
+from symdyn.counting import counted
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.event import Event
@@ -31,9 +32,9 @@ class NamedOutput:
     value: Any
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
-    """A checked mechanism.
+    """A checked mechanism; prints as a summary, `details()` is the text of every field.
 
     bodies        in the order they were added, without the ground
     loops         joints that close loops, rods and gears; constraints: by expression
@@ -43,6 +44,7 @@ class Model:
     defaults      number for each parameter that has one; initial: for coordinates, speeds, states, inputs
     units         symbol -> unit
     shapes        what bodies look like
+    doubts        sentences on what is possible, but hardly meant
     """
 
     name: str
@@ -68,6 +70,55 @@ class Model:
     units: Mapping[sp.Symbol, str]
     shapes: tuple[Drawn, ...] = ()
     events: tuple[Event, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        rows = [f"{self.name}: {'planar' if self.planar else 'spatial'} mechanism, no faults found",
+                f"  {_number(self.bodies, 'body', 'bodies')}, {_number(self.joints, 'joint')}, "
+                f"{_number(self.loops, 'loop closure')}, {_number(self.constraints, 'constraint')} by expression, "
+                f"{_number(self.loads, 'load')}",
+                f"  {_number(self.coordinates, 'coordinate')}: {_first(self.coordinates)}",
+                f"  {_number(self.speeds, 'speed')}: {_first(self.speeds)}"]
+        if self.states:
+            rows.append(f"  {_number(self.states, 'extra state')}: {_first([z.symbol for z in self.states])}")
+        if self.inputs:
+            rows.append(f"  {_number(self.inputs, 'input')}: {_first(self.inputs)}")
+        missing = [p for p in self.parameters if p not in self.defaults]
+        without = f"; no default for {_first(missing)}" if missing else ", each with a default" if self.parameters else ""
+        named = f": {_first(self.parameters)}" if self.parameters else ""
+        rows.append(f"  {_number(self.parameters, 'parameter')}{named}{without}")
+        rows += [f"  {_number(things, one)}" for things, one in ((self.outputs, "output"), (self.events, "event")) if things]
+        rows += [f"  doubtful: {doubt}" for doubt in self.doubts]
+        return "\n".join(rows)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def details(self) -> str:
+        """Every field with its value, a line for each entry of a mapping."""
+        rows = [f"{self.name}:"]
+        for entry in fields(self)[1:]:
+            value = getattr(self, entry.name)
+            if isinstance(value, Mapping):
+                rows += [f"  {entry.name}:", *(f"    {key}: {one}" for key, one in value.items())]
+            elif isinstance(value, sp.MatrixBase):
+                rows.append(f"  {entry.name}: {value.tolist()}")
+            else:
+                rows.append(f"  {entry.name}: {value}")
+        return "\n".join(rows)
+
+
+# Names in a line of the summary.
+_SHOWN = 8
+
+
+def _number(things: Sequence[Any], one: str, many: str = "") -> str:
+    return counted(len(things), one, many) if things else f"no {many or one + 's'}"
+
+
+def _first(things: Sequence[Any]) -> str:
+    rest = len(things) - _SHOWN
+    return ", ".join(map(str, things[:_SHOWN])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def joint_speeds(joint: Joint) -> tuple[Any, ...]:

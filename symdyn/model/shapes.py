@@ -15,6 +15,8 @@ from typing import Any
 import sympy as sp
 
 from symdyn.model.faults import Faults
+from symdyn.model.symbols import symbols_of
+from symdyn.shown import name_of, shown
 
 # Text that may be a colour: #rrggbb, a grey level such as 0.8, or a name; which names there are is known to what draws.
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}|[01]?\.?\d+|[A-Za-z: ]+")
@@ -140,11 +142,11 @@ class Line(Shape):
         if len(points) + (self.to is not None) < 2:
             faults.append(f"{what}: points has {len(points)} points; pass at least two of three components")
         if isinstance(self.width, bool) or not isinstance(self.width, (int, float)) or not 0 < self.width < 100:
-            faults.append(f"{what}: width is {self.width!r}; pass a number of points of print between 0 and 100")
+            faults.append(f"{what}: width is {shown(self.width)}; pass a number of points of print between 0 and 100")
         if self.to is None:
             return {"points": points}
         if not (isinstance(self.to, (tuple, list)) and len(self.to) == 2):
-            faults.append(f"{what}: to is {self.to!r}; pass a body and a point on it")
+            faults.append(f"{what}: to is {shown(self.to)}; pass a body and a point on it")
             return {"points": points}
         return {"points": points, "end": (_point(faults, self.to[1], f"{what}: end", planar),)}
 
@@ -199,36 +201,37 @@ class Drawn:
     @property
     def expressions(self) -> Iterator[sp.Expr]:
         """Its lengths that are no plain numbers, in order."""
-        return (e for rows in self.values.values() for row in rows for e in row if e.free_symbols)
+        return (e for rows in self.values.values() for row in rows for e in row if symbols_of(e))
 
     @property
     def record(self) -> dict[str, Any]:
         """Plain data; None stands for a length that follows from parameters, see `expressions`."""
         return {"body": str(getattr(self.body, "name", self.body)), "color": self.color, **self.about,
-                "values": {name: [[None if e.free_symbols else float(e) for e in row] for row in rows]
+                "values": {name: [[None if symbols_of(e) else float(e) for e in row] for row in rows]
                            for name, rows in self.values.items()}}
 
 
 def drawn(faults: Faults, body: Any, shapes: Sequence[Any], color: Any, planar: bool) -> list[Drawn]:
     """The checked shapes of a body."""
-    name = str(getattr(body, "name", body))
+    name = name_of(body)
     if isinstance(color, (tuple, list)):
         color = [float(c) if isinstance(c, (int, float)) else c for c in color]
         known = len(color) == 3 and all(isinstance(c, float) and 0 <= c <= 1 for c in color)
     else:
         known = color is None or (isinstance(color, str) and _COLOR.fullmatch(color) is not None)
     if not known:
-        faults.append(f"draw: the colour of {name!r} is {color!r}; pass text such as '#3377aa', '0.8' or 'orange', or three "
+        faults.append(f"draw: the colour of {shown(name)} is {shown(color)}; pass text such as '#3377aa', '0.8' or 'orange', "
+                      "or three "
                       "numbers from 0 to 1")
         color = None
     if not shapes:
-        faults.append(f"draw was given no shape for {name!r}; pass shapes such as sd.shapes.Box([2, 1, 1])")
+        faults.append(f"draw was given no shape for {shown(name)}; pass shapes such as sd.shapes.Box([2, 1, 1])")
     found = []
     for shape in shapes:
         if not isinstance(shape, Shape):
-            faults.append(f"draw: a shape of {name!r} is {shape!r}; pass shapes such as sd.shapes.Box([2, 1, 1])")
+            faults.append(f"draw: a shape of {shown(name)} is {shown(shape)}; pass shapes such as sd.shapes.Box([2, 1, 1])")
             continue
-        what = f"{type(shape).__name__} of {name!r}"
+        what = f"{type(shape).__name__} of {shown(name)}"
         if isinstance(shape, Water) and name != "ground":
             faults.append(f"{what}: the water surface stays in place; draw it on system.ground")
         found.append(Drawn(body, what, color, shape.values(faults, what, planar), shape.about))

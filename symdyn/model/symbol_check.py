@@ -11,9 +11,11 @@ import sympy as sp
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint
 from symdyn.model.loop_check import constraint_faults
+from symdyn.model.quantity import Quantity
 from symdyn.model.record import joint_speeds
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, time
-from symdyn.model.uses import uses
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, described, symbols_of, time
+from symdyn.model.uses import Scope, uses
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -29,14 +31,14 @@ def check_coordinates(s: System, joints: Sequence[Joint], faults: Faults) -> tup
     for joint in joints:
         independent = [isinstance(q, Coordinate) for q in joint.coordinates]
         if joint.symbols_only and not all(independent) and not joint.faults:
-            faults.append(f"joint {joint.name!r}: {joint.symbols_only}")
+            faults.append(f"joint {shown(joint.name)}: {joint.symbols_only}")
         for place, q in enumerate(joint.coordinates):
             if not isinstance(q, Coordinate):
                 continue
             if q in driver:
                 independent[place] = False
                 faults.append(
-                    f"joints {driver[q].name!r} and {joint.name!r} both drive the coordinate {q}; give each its own, "
+                    f"joints {shown(driver[q].name)} and {shown(joint.name)} both drive the coordinate {q}; give each its own, "
                     f"or write one as an expression (gear: 2*{q}; mimic: sympy.UnevaluatedExpr({q}))")
                 continue
             driver[q] = joint
@@ -47,7 +49,7 @@ def check_coordinates(s: System, joints: Sequence[Joint], faults: Faults) -> tup
             speeds += [u for u in joint_speeds(joint) if u is not None]
     for q in dict.fromkeys(s.extra_coordinates):
         if q in driver:
-            faults.append(f"{q} was given to add_coordinate, but joint {driver[q].name!r} has it for its own; "
+            faults.append(f"{q} was given to add_coordinate, but joint {shown(driver[q].name)} has it for its own; "
                           "leave out add_coordinate")
         else:
             coordinates.append(q)
@@ -72,11 +74,15 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
                   faults: Faults) -> tuple[Symbols, Symbols]:
     """Parameters and inputs in order of their use; symbols that stand where they must not are added to the faults."""
     moving = {time, *coordinates, *[q.dot for q in coordinates], *speeds, *[z.symbol for z in s.states]}
+    named = {symbol.name: symbol for symbol in [*moving, *(s.declared or ())]}
     parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
     inputs: dict[sp.Symbol, None] = {}
-    for where, expressions, constant in uses(s, joints, loads):
+    for where, expressions, scope in uses(s, joints, loads):
+        constant = scope == Scope.PARAMETERS
         for symbol in symbols_in(expressions):
-            if isinstance(symbol, Acceleration):
+            if isinstance(symbol, Quantity):
+                faults += _quantity_faults(symbol, where, scope, s.planar)
+            elif isinstance(symbol, Acceleration):
                 faults.append(f"{where} uses the acceleration {symbol}; loads and rates may use coordinates, "
                               "speeds, states, inputs and t")
             elif symbol.name == "t" and symbol != time:
@@ -85,6 +91,10 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
                 faults.append(f"{where} depends on {symbol}, but must be constant; use parameters and numbers")
             elif symbol in moving:
                 continue
+            elif isinstance(symbol, (Coordinate, Rate)) and symbol.name in named:
+                faults.append(f"{where} uses {symbol}, {described(symbol)}, but {symbol} of the system is "
+                              f"{described(named[symbol.name])}; use the same symbol in both (SymPy's q(t) stands for a "
+                              "coordinate without assumptions)")
             elif isinstance(symbol, (Coordinate, Rate)):
                 found = ", ".join(map(str, coordinates)) or "none"
                 faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {found}; "
@@ -104,7 +114,7 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
             rates = [] if isinstance(q, Coordinate) else [
                 a for a in symbols_in([q]) if a in speeds or a in states or isinstance(a, (Rate, Input))]
             if rates:
-                faults.append(f"joint {joint.name!r}: its coordinate {q} uses {', '.join(map(str, rates))}; "
+                faults.append(f"joint {shown(joint.name)}: its coordinate {q} uses {', '.join(map(str, rates))}; "
                               "a dependent coordinate may use coordinates, t and parameters")
     if s.ground_motion is not None:
         free = [a for a in symbols_in(s.ground_motion.coordinates) if a in moving - {time} or isinstance(a, Input)]
@@ -114,23 +124,43 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
     names = Counter(a.name for a in everything)
     for name, count in names.items():
         if count > 1:
-            faults.append(f"{count} different symbols are named {name!r} (by kind or assumptions); "
+            found = " and ".join(described(a) for a in everything if a.name == name)
+            faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {found}; "
                           "make each symbol once, or give them different names")
     if "t" in names:
         faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
     for u in speeds:
         if f"{u.name}_dot" in names:
-            faults.append(f"the name {u.name + '_dot'!r} stands for the derivative of the speed {u}; "
+            faults.append(f"the name {shown(u.name + '_dot')} stands for the derivative of the speed {u}; "
                           "give the other symbol of this name another one")
     spelling(faults, "the symbols", names)
     return tuple(parameters), tuple(inputs)
+
+
+def _quantity_faults(quantity: Quantity, where: str, scope: Scope, planar: bool) -> list[str]:
+    """What is wrong with a quantity in an expression of some scope."""
+    measure, faults = quantity.measure, []
+    if scope == Scope.PARAMETERS:
+        faults.append(f"{where} depends on {quantity}, but must be constant; use parameters and numbers")
+    elif scope == Scope.COORDINATES:
+        faults.append(f"{where} uses {quantity}; it may use coordinates, t and parameters: pass what is to hold to "
+                      "add_constraint")
+    elif quantity.level == 2 and scope < Scope.FORCES:
+        faults.append(f"{where} uses {quantity}, which follows from the forces; accelerations of points, multipliers and "
+                      "reactions may stand in forces, torques, joint forces, rates of states, events, resets and outputs")
+    if planar:
+        axes = {"position": (0, 1), "angular_velocity": (2,), "reaction": (0, 1, 5)}.get(measure.kind)
+        if axes is not None and measure.index[0] not in axes:
+            faults.append(f"{where} uses {quantity}, which is zero in a planar system; components there are "
+                          f"{', '.join(f'[{k}]' for k in axes)}")
+    return faults
 
 
 def spelling(faults: Faults, what: str, names: Iterable[Any]) -> None:
     """Names must be text that can stand in the comments of generated code."""
     for name in names:
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            faults.append(f"one of {what} is named {name!r}; pass text on one line of letters, digits, spaces and "
+            faults.append(f"one of {what} is named {shown(name)}; pass text on one line of letters, digits, spaces and "
                           "_ . , : + - * / ^ ' # % and brackets")
 
 
@@ -138,6 +168,6 @@ def symbols_in(expressions: Iterable[sp.Expr]) -> list[sp.Symbol]:
     """Free symbols in order of the expressions, by name within one expression."""
     found: dict[sp.Symbol, None] = {}
     for e in expressions:
-        for symbol in sorted(e.free_symbols, key=lambda a: a.name):
+        for symbol in sorted(symbols_of(e), key=lambda a: a.name):
             found[symbol] = None
     return list(found)

@@ -5,12 +5,15 @@ All are SymPy symbols, so that expressions print and differentiate as anywhere e
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ModelError
+from symdyn.shown import shown
 
 time = sp.Symbol("t")
 
@@ -37,7 +40,34 @@ class Moving(sp.Symbol):
         return 2, 0, f"Symbol{cls._rank}"
 
 
-class Coordinate(Moving):
+class Timed(Moving):
+    """A symbol that stands for a function of time: SymPy's derivatives by `symdyn.t` are total ones.
+
+    q.diff(t) and q.diff() are q.dot, sin(q).diff(t) is cos(q)*q.dot and q.diff(t, 2) is q.ddot; what has no symbol, such as the
+    derivative of an input, stays an unevaluated Derivative, which no model takes. To that end t is one of the free symbols, as
+    it is one of those of SymPy's q(t). Derivatives by t and by a rate do not commute: take them one after the other, as in
+    T.diff(q.dot).diff(t).
+    """
+
+    __slots__ = ()
+
+    @property
+    def free_symbols(self) -> set[sp.Basic]:
+        return {self, time}
+
+    def diff(self, *symbols: Any, **assumptions: Any) -> Any:
+        """The derivative as of any expression; without symbols, that by time."""
+        return super().diff(*(symbols or (time,)), **assumptions)
+
+    def _eval_derivative(self, s: Any) -> Any:
+        return getattr(self, "dot", None) if s == time else super()._eval_derivative(s)
+
+    def _eval_derivative_n_times(self, s: Any, n: Any) -> Any:
+        # An atom is taken for constant in SymPy's own rule; that of compound expressions derives n times.
+        return sp.Basic._eval_derivative_n_times(self, s, n) if s == time else super()._eval_derivative_n_times(s, n)
+
+
+class Coordinate(Timed):
     """A generalized coordinate; `.dot` and `.ddot` are its derivatives by time, symbols too."""
 
     __slots__ = ()
@@ -51,7 +81,7 @@ class Coordinate(Moving):
         return Acceleration(f"{self.name}_ddot", **_of_derivative(self))
 
 
-class Rate(Moving):
+class Rate(Timed):
     """The first derivative of a coordinate by time."""
 
     __slots__ = ()
@@ -65,7 +95,7 @@ class Rate(Moving):
         return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_dot"))), r"\dot")
 
 
-class Acceleration(Moving):
+class Acceleration(Timed):
     """The second derivative of a coordinate by time."""
 
     __slots__ = ()
@@ -82,7 +112,7 @@ class Speed(Coordinate):
     _rank = 1
 
 
-class Input(Moving):
+class Input(Timed):
     """A value given from outside while the motion runs: a number, an array over time, or a function."""
 
     __slots__ = ()
@@ -90,8 +120,8 @@ class Input(Moving):
 
 
 def _make(kind: type, names: str, assumptions: dict) -> Any:
-    if not isinstance(names, str) or not names.strip():
-        raise ModelError([f"names of symbols are {names!r}; pass text such as 'q1 q2' or 'm1:4'"])
+    if not isinstance(names, str) or not names.strip() or not names.isprintable():
+        raise ModelError([f"names of symbols are {shown(names)}; pass text such as 'q1 q2' or 'm1:4'"])
     return sp.symbols(names, cls=kind, **assumptions)
 
 
@@ -115,6 +145,32 @@ def inputs(names: str, **assumptions: Any) -> Any:
     return _make(Input, names, assumptions)
 
 
+def symbols_of(expression: Any) -> set[Any]:
+    """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
+    free: set[Any] = expression.free_symbols
+    return free - {time} if time in free and not expression.has(time) else free
+
+
+def described(symbol: sp.Symbol) -> str:
+    """What a symbol is and with which assumptions it was made, to keep apart those of one name in messages."""
+    kinds = {Coordinate: "a coordinate", Speed: "a speed", Input: "an input", Rate: "the derivative of a coordinate or speed",
+             Acceleration: "a second derivative"}
+    assumptions = ", ".join(f"{name}={value}" for name, value in symbol._assumptions_orig.items())
+    return f"{kinds.get(type(symbol), 'a parameter')} {f'with {assumptions}' if assumptions else 'without assumptions'}"
+
+
+def partial_rate(value: Any) -> Any:
+    """The partial derivative by t of an expression or matrix: coordinates, their derivatives, speeds and inputs are constant.
+
+    What is left of `symdyn.rate` where nothing moves, such as the C_t of a constraint; `value.diff(symdyn.t)` is the total
+    derivative. Raises ModelError for what is neither expression nor matrix.
+    """
+    if not isinstance(value, (sp.Expr, sp.MatrixBase)):
+        raise ModelError([f"partial_rate was given {value!r} of type {type(value).__name__}; pass an expression or a matrix"])
+    held = {symbol: sp.Dummy(symbol.name) for symbol in value.atoms(Timed)}
+    return value.xreplace(held).diff(time).xreplace({dummy: symbol for symbol, dummy in held.items()})
+
+
 def as_expression(value: Any, what: str) -> sp.Expr:
     """Take a number or SymPy expression over; dynamicsymbols and their derivatives become coordinates and rates.
 
@@ -122,17 +178,35 @@ def as_expression(value: Any, what: str) -> sp.Expr:
     Raises ModelError for text (never evaluated), for NaN and infinity, and for anything that is no expression.
     """
     if isinstance(value, str):
-        raise ModelError([f"{what} is the text {value!r}; text is never evaluated: "
+        raise ModelError([f"{what} is the text {shown(value)}; text is never evaluated: "
                           "pass a number or an expression of SymPy symbols"])
-    if hasattr(value, "item") and not isinstance(value, sp.Basic):
-        value = value.item()
+    if isinstance(value, np.ma.MaskedArray):
+        raise ModelError([f"{what} is masked; pass a real number or an expression of SymPy symbols"])
+    if isinstance(value, (np.ndarray, np.generic)):
+        if value.size != 1:
+            raise ModelError([f"{what} is {shown(value)}; pass a number or an expression of SymPy symbols"])
+        return as_expression(value.item(), what) if isinstance(value.item(), str) else _taken(value.item(), what)
+    return _taken(value, what)
+
+
+def _taken(value: Any, what: str) -> sp.Expr:
+    """A number or expression; see `as_expression`."""
     if not isinstance(value, sp.Basic):
         if not isinstance(value, (int, float)) and not hasattr(value, "_sympy_") and not hasattr(value, "numerator"):
-            raise ModelError([f"{what} is {value!r} of type {type(value).__name__}; "
+            raise ModelError([f"{what} is {shown(value)} of type {type(value).__name__}; "
                               "pass a number or an expression of SymPy symbols"])
-        value = sp.sympify(value, strict=True)
+        try:
+            value = sp.sympify(value, strict=True)
+        except sp.SympifyError:
+            value = None
+    if not isinstance(value, sp.Basic):
+        raise ModelError([f"{what} is {shown(value)}; pass a number or an expression of SymPy symbols"])
     if value.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise ModelError([f"{what} is {value}; pass a finite number or expression"])
+    beyond = [n for n in value.atoms(sp.Number) if not _is_double(n)]
+    if beyond:
+        raise ModelError([f"{what} holds {shown(int(beyond[0]))}, which is beyond the range of double precision, 1.8e308; pass "
+                          "smaller numbers, in other units if need be"])
     if not isinstance(value, sp.Expr) or value.is_Matrix:
         raise ModelError([f"{what} is {value} of type {type(value).__name__}; pass a scalar expression"])
     if value.has(sp.I):
@@ -145,8 +219,32 @@ def as_expression(value: Any, what: str) -> sp.Expr:
     return taken
 
 
+def _is_double(value: sp.Number) -> bool:
+    """Whether a number of SymPy is within the range of double precision."""
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def finite(value: Any) -> float | None:
+    """A finite real number, also of SymPy and NumPy, as a double; None for anything else, and beyond the range of doubles."""
+    if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 and not isinstance(value, sp.Basic):
+        value = None if np.ma.is_masked(value) else value.item()
+    if not isinstance(value, (int, float)) and not (isinstance(value, sp.Expr) and value.is_number):
+        return None
+    try:
+        found = float(value)
+    except (OverflowError, TypeError, ValueError):
+        return None
+    return found if math.isfinite(found) else None
+
+
 def take_over(expression: sp.Basic) -> Any:
-    """Replace functions of t and their derivatives (SymPy's dynamicsymbols) by coordinates and rates."""
+    """Replace functions of t and their derivatives (SymPy's dynamicsymbols) by coordinates and rates.
+
+    Derivatives by t that were left unevaluated, such as sympy.Derivative(q, t), are evaluated.
+    """
     if not expression.has(AppliedUndef, sp.Derivative):
         return expression
     replacements: dict[sp.Basic, sp.Basic] = {}
@@ -156,13 +254,15 @@ def take_over(expression: sp.Basic) -> Any:
             symbol = as_coordinate(base)
             replacements[derivative] = symbol.dot if count == 1 else symbol.ddot
     result = expression.xreplace(replacements)
-    return result.xreplace({f: as_coordinate(f) for f in result.atoms(AppliedUndef) if f.args == (time,)})
+    result = result.xreplace({f: as_coordinate(f) for f in result.atoms(AppliedUndef) if f.args == (time,)})
+    unevaluated = [d for d in result.atoms(sp.Derivative) if set(d.variables) == {time} and not d.has(AppliedUndef)]
+    return result.xreplace({derivative: derivative.doit() for derivative in unevaluated})
 
 
 def as_coordinate(value: Any) -> Any:
-    """A coordinate as it is; a dynamicsymbol q(t) or a plain symbol under the same name."""
+    """A coordinate as it is; a dynamicsymbol q(t) or a plain symbol under the same name, with the same assumptions."""
     if isinstance(value, AppliedUndef) and value.args == (time,):
-        return Coordinate(value.func.__name__)
+        return Coordinate(value.func.__name__, **value.func._kwargs)
     if type(value) is sp.Symbol and value != time:
         return Coordinate(value.name, **value._assumptions_orig)
     return value

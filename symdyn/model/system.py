@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
 import sympy as sp
 
-from symdyn.model.bodies import Body, Point
+from symdyn.counting import counted
+from symdyn.errors import ModelError
+from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.elements import AddedMass, Element
@@ -17,11 +22,14 @@ from symdyn.model.event import Event, make_event
 from symdyn.model.faults import Faults
 from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
-from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
 from symdyn.model.orientation import EulerAngles
+from symdyn.model.points import Point
 from symdyn.model.record import Model, NamedOutput, State
 from symdyn.model.shapes import Drawn, drawn
 from symdyn.model.symbols import Coordinate, as_coordinate
+from symdyn.model.sympy_vectors import as_frame, frames_of, is_dyadic, is_sympy_vector
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.diagnosis import Diagnosis
@@ -44,6 +52,7 @@ class System:
     gravity      acceleration of gravity in the n-frame, m/s^2: 3 components, or 2 for a planar system
     planar       True: motion in the x-y plane, described by x, y, theta; default: gravity has 2 components
     parameters   if given, the only symbols that count as parameters, in this order; default: declared by use
+    frame        the n-frame as a ReferenceFrame of sympy.physics.mechanics, if there is one already: `system.frame`
 
     `ground` is the inertial n-frame (or, after `move_ground`, the moving base). `defaults` holds a number for each
     parameter, `initial` for coordinates, speeds, states and inputs, `duration` the usual time of simulation, `units`
@@ -52,14 +61,19 @@ class System:
     """
 
     def __init__(self, name: str, gravity: Any = None, planar: bool | None = None,
-                 parameters: Sequence[sp.Symbol] | None = None) -> None:
+                 parameters: Sequence[sp.Symbol] | None = None, frame: Any = None) -> None:
         self.name = name
         self._faults = Faults()
+        self._warned: set[str] = set()
+        if not isinstance(planar, (bool, np.bool_, NoneType)):
+            self._faults.append(f"planar is {shown(planar)}; pass True, False or None")
+            planar = None
+        frame = self._frame(frame, "the system's frame")
         if planar is None:
             planar = hasattr(gravity, "__len__") and len(gravity) == 2
         self.planar = planar
-        self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar)
-        self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)))
+        self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar, frame)
+        self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)), frame)
         self.declared = None if parameters is None else self._declared(parameters)
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
@@ -77,32 +91,40 @@ class System:
         self.duration = 10.0
         self.units: dict[Any, str] = {}
 
+    @property
+    def frame(self) -> Any:
+        """The n-frame as a ReferenceFrame of SymPy, for vectors such as `force=-k*x*system.frame.x`."""
+        return self.ground.frame
+
     # -- bodies and joints
 
-    def add_body(self, name: str, mass: Any = 0, inertia: Any = None, com: Any = ZERO) -> Body:
+    def add_body(self, name: str, mass: Any = 0, inertia: Any = None, com: Any = ZERO, frame: Any = None) -> Body:
         """Add a rigid body, or a point mass where no inertia is given.
 
         mass      kg
         inertia   about the centre of mass in body axes, kg m^2: (3, 3), or its diagonal; planar: one number about z
         com       centre of mass from the body's origin, body axes, m
+        frame     the body axes as a ReferenceFrame of sympy.physics.mechanics, if there is one already: inertia may be a dyadic,
+                  and com a vector, written in it. Later `body.frame` is the frame that vectors of the body are written in
         """
-        where = f"body {name!r}"
+        where = f"body {shown(name)}"
         faults = self._faults
+        frame = self._frame(frame, f"{where}: frame")
         if inertia is None:
             matrix = sp.ImmutableMatrix(sp.zeros(3, 3))
-        elif self.planar and not hasattr(inertia, "__len__"):
+        elif self.planar and not hasattr(inertia, "__len__") and not is_dyadic(inertia):
             matrix = sp.ImmutableMatrix(sp.diag(0, 0, faults.expression(inertia, f"{where}: inertia")))
         else:
-            matrix = faults.matrix(inertia, f"{where}: inertia")
+            matrix = faults.matrix(inertia, f"{where}: inertia", frame)
         body = Body(name, faults.expression(mass, f"{where}: mass"), matrix,
-                    faults.vector(com, f"{where}: com", self.planar))
+                    faults.vector(com, f"{where}: com", self.planar, frame), frame)
         self.bodies.append(body)
         return body
 
     def add_joint(self, joint: Joint) -> Joint:
         """Add a joint; parent and child may be given as bodies or by name."""
         if not isinstance(joint, Joint):
-            self._faults.append(f"add_joint was given {joint!r}; pass a joint such as sd.Revolute(...)")
+            self._faults.append(f"add_joint was given {shown(joint)}; pass a joint such as sd.Revolute(...)")
         else:
             self.joints.append(joint)
         return joint
@@ -134,7 +156,8 @@ class System:
         the others.
         """
         if not isinstance(joint, (Joint, Gear)):
-            self._faults.append(f"close_loop was given {joint!r}; pass a joint such as sd.Revolute(...), an sd.Rod or an sd.Gear")
+            self._faults.append(f"close_loop was given {shown(joint)}; pass a joint such as sd.Revolute(...), an sd.Rod or an "
+                                "sd.Gear")
         else:
             self.loops.append(joint)
         return joint
@@ -147,7 +170,8 @@ class System:
             if isinstance(taken, Coordinate):
                 self.extra_coordinates.append(taken)
             else:
-                self._faults.append(f"add_coordinate was given {given!r}; make coordinates with sd.coordinates and pass them "
+                self._faults.append(f"add_coordinate was given {shown(given)}; make coordinates with sd.coordinates and pass "
+                                    "them "
                                     "one by one")
 
     def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
@@ -165,39 +189,63 @@ class System:
         """A force (N) on a body.
 
         point     where it acts, body axes, m; default: the centre of mass
-        frame     the body in whose axes the components are given; default: the n-frame
+        frame     the body in whose axes the components are given; default: the n-frame. A vector of SymPy's, such as
+                  F*body.frame.x, has its frame with it: that of a body, or `system.frame`
         reaction  the body that feels the opposite force at the same place, if any
         """
-        label = name or f"force_{len(self.loads) + 1}"
-        at = None if point is None else self._faults.vector(point, f"{label}: point", True)
-        self.loads.append(Force(body, self._faults.vector(force, label, self.planar), at, frame, reaction, label))
+        label = self._label(name, f"force_{len(self.loads) + 1}")
+        at = None if point is None else self._faults.vector(point, f"{label}: point", True, self._body(body))
+        frame, axes = self._written_in(force, frame, label)
+        self.loads.append(Force(body, self._faults.vector(force, label, self.planar, axes), at, frame, reaction, label))
 
     def add_torque(self, body: Any, torque: Any, frame: Any = None, reaction: Any = None, name: str = "") -> None:
         """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force."""
-        label = name or f"torque_{len(self.loads) + 1}"
-        if self.planar and not hasattr(torque, "__len__"):
+        label = self._label(name, f"torque_{len(self.loads) + 1}")
+        if self.planar and not hasattr(torque, "__len__") and not is_sympy_vector(torque):
             torque = [0, 0, torque]
-        self.loads.append(Torque(body, self._faults.vector(torque, label), frame, reaction, label))
+        frame, axes = self._written_in(torque, frame, label)
+        self.loads.append(Torque(body, self._faults.vector(torque, label, frame=axes), frame, reaction, label))
 
     def add_joint_force(self, joint: Any, value: Any, name: str = "") -> None:
         """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
-        label = name or f"joint_force_{len(self.loads) + 1}"
+        label = self._label(name, f"joint_force_{len(self.loads) + 1}")
         self.loads.append(JointForce(joint, self._faults.expressions(value, label), label))
 
     def add_spring_damper(self, body_a: Any, body_b: Any, point_a: Any = ZERO, point_b: Any = ZERO, stiffness: Any = 0,
                           damping: Any = 0, length: Any = 0, name: str = "") -> None:
-        """A spring (N/m, unstretched length m) and damper (N s/m) between a point of body_a and one of body_b."""
-        label = name or f"spring_{len(self.loads) + 1}"
+        """A spring (N/m, unstretched length m) and damper (N s/m) between a point of body_a and one of body_b.
+
+        Both ends are pulled by stiffness (distance - length) + damping times the rate of the distance. Stiffness, damping and
+        length are numbers or expressions as for a force. A spring whose stiffness and length depend on parameters only has a
+        potential energy; any other is a load that does work, like a force.
+        """
+        label = self._label(name, f"spring_{len(self.loads) + 1}")
         f = self._faults
         self.loads.append(SpringDamper(
-            body_a, body_b, f.vector(point_a, f"{label}: point_a", True), f.vector(point_b, f"{label}: point_b", True),
+            body_a, body_b, f.vector(point_a, f"{label}: point_a", True, self._body(body_a)),
+            f.vector(point_b, f"{label}: point_b", True, self._body(body_b)),
             f.expression(stiffness, f"{label}: stiffness"), f.expression(damping, f"{label}: damping"),
             f.expression(length, f"{label}: length"), label))
+
+    def add_force_between(self, body_a: Any, body_b: Any, force: Any, point_a: Any = None, point_b: Any = None,
+                          name: str = "") -> None:
+        """A force (N) along the line of a point of body_a and a point of body_b; positive where it draws them together.
+
+        force   any expression, such as a law in d = sd.distance(body_a, body_b, point_a, point_b) and its rate d.dot: a rope
+                that only pulls is Max(0, k*(d - length) + c*d.dot)
+        point_a, point_b   body axes, m; default: the origins
+        """
+        label = self._label(name, f"force_{len(self.loads) + 1}")
+        f = self._faults
+        points = [f.vector(ZERO if point is None else point, f"{label}: {what}", True, self._body(body))
+                  for point, what, body in ((point_a, "point_a", body_a), (point_b, "point_b", body_b))]
+        self.loads.append(ForceBetween(body_a, body_b, f.expression(force, label), points[0], points[1], label))
 
     def add_load(self, load: Load) -> Load:
         """Add a load that follows from the pose and motion of a body, such as sd.Buoyancy or sd.MooringLine, or added mass."""
         if not isinstance(load, (Element, AddedMass)):
-            self._faults.append(f"add_load was given {load!r}; pass a load such as sd.Buoyancy(...) or sd.LinearDamping(...)")
+            self._faults.append(f"add_load was given {shown(load)}; pass a load such as sd.Buoyancy(...) or "
+                                "sd.LinearDamping(...)")
         else:
             load.label = load.label or f"{load.kind}_{len(self.loads) + 1}"
             self.loads.append(load)
@@ -209,25 +257,31 @@ class System:
         """A named output: an expression in coordinates, speeds, states, inputs, t and parameters, a list of them, or
         a point of a body: sd.position, sd.velocity, sd.acceleration, sd.jacobian, sd.bias_acceleration(body, point)."""
         if isinstance(value, Point):
-            at = self._faults.vector(value.at, f"output {name!r}: point", True)
+            at = self._faults.vector(value.at, f"output {shown(name)}: point", True, self._body(value.body))
             taken: Any = Point(value.body, tuple(at), value.quantity)
         elif hasattr(value, "__len__"):
-            taken = self._faults.expressions(value, f"output {name!r}")
+            taken = self._faults.expressions(value, f"output {shown(name)}")
         else:
-            taken = self._faults.expression(value, f"output {name!r}")
+            taken = self._faults.expression(value, f"output {shown(name)}")
         self.outputs.append(NamedOutput(name, taken))
 
     def add_state(self, symbol: Any, rate: Any) -> None:
-        """An extra state z with z_dot = rate, an expression as for add_output."""
+        """An extra state z with z_dot = rate: of an actuator, a filter, a controller.
+
+        symbol   what z is in the expressions of rates, loads and outputs: made by sd.coordinates("z"), or a symbol of SymPy's
+                 mechanics (dynamicsymbols("z")). It has no unit and no inertia; its initial value goes into system.initial[z]
+        rate     z_dot, an expression as for add_output
+        """
         taken = as_coordinate(symbol)
         if not isinstance(taken, Coordinate):
-            self._faults.append(f"add_state was given {symbol!r} as its state; pass a symbol such as sd.coordinates('z')")
+            self._faults.append(f"add_state was given {shown(symbol)} as its state; pass a symbol such as sd.coordinates('z')")
             taken = Coordinate(f"state_{len(self.states) + 1}")
         self.states.append(State(taken, self._faults.expression(rate, f"rate of state {symbol}")))
 
     def add_constraint(self, expression: Any, name: str = "") -> None:
         """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
-        label = name or f"constraint_{len(self.constraints) + 1}"
+        unnamed = name is None or (isinstance(name, str) and not name)
+        label = f"constraint_{len(self.constraints) + 1}" if unnamed else name
         faults = len(self._faults)
         taken = self._faults.expression(expression, label)
         if len(self._faults) == faults:
@@ -237,14 +291,20 @@ class System:
                   reset: Mapping[Any, Any] | None = None) -> None:
         """An event where a value passes zero: its time and state are found and recorded in every simulation.
 
-        value      an expression as for add_output, or a component of a point, such as sd.position(ball)[1] - h
-        direction  1: only upwards through zero, -1: only downwards, 0: either way
+        Within every step the value is sampled as finely as it varies, so that zeros close together are found as well (see
+        symdyn.panels); where it varies so quickly that this has no end, simulate warns. A peak that is far narrower than a
+        seventh of a step and alone in it can still be missed: give simulate a max_step of its width.
+
+        value      an expression as for add_output, such as sd.position(ball)[1] - h
+        direction  1: only upwards through zero, -1: only downwards, 0: either way; in the course of the run, so that in a run
+                   backward in time (t decreasing) what falls with t passes upwards, as in SciPy. A value that is zero at the
+                   start, to rounding, and leaves in the direction 1 or -1 counts as passing then; with 0 it does not count
         stop       end the motion there
         reset      coordinates, speeds and extra states with expressions for what they become, from the state before the
                    event: {v: -e*v} for a ball that bounces. Events at the same time make their resets in the order in which
                    they were added, each from the state before all of them: of two for one speed the later counts
         """
-        self.events.append(make_event(self._faults, name, value, direction, stop, reset, self.planar))
+        self.events.append(make_event(self._faults, name, value, direction, stop, reset))
 
     def draw(self, body: Any, *shapes: Any, color: Any = None) -> None:
         """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
@@ -253,10 +313,23 @@ class System:
         """
         self.shapes += drawn(self._faults, body, shapes, color, self.planar)
 
+    def _label(self, name: Any, default: str) -> str:
+        """The name of a load or constraint, the default where none is given; anything but text is a fault."""
+        if name is None or (isinstance(name, str) and not name):
+            return default
+        if not isinstance(name, str):
+            self._faults.append(f"{default}: its name is {shown(name)}; pass text such as 'spring', or leave it out")
+            return default
+        return name
+
     # -- what comes of it
 
     def check(self) -> Model:
-        """The checked, frozen model. Raises ModelError with every fault found."""
+        """The checked, frozen model; it prints as a summary, with `details()` for all of it.
+
+        What is doubtful but possible, such as moments of inertia that no real body has, is warned of once for each system
+        (ModelWarning) and stays in the model's `doubts`. Raises ModelError with every fault found.
+        """
         return check(self)
 
     def embedding(self, frames: str = "body") -> EmbeddedEquations:
@@ -325,9 +398,18 @@ class System:
 
         return choose(self.check(), tune)
 
-    def compile(self, backend: str | None = None, tune: bool = False, **options: Any) -> Any:
-        """A numeric module of `equations(tune)`; see symdyn.pipeline.compile_equations for the backend and the options."""
-        return self.equations(tune).compile(backend, **options)
+    def compile(self, backend: str | None = None, tune: bool = False, templates: str | os.PathLike[str] | None = None,
+                specialize: Mapping[Any, float] | None = None) -> Any:
+        """A numeric module of `equations(tune)`.
+
+        backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
+        templates    folder whose templates take precedence
+        specialize   parameters, by symbol or name, that become numbers in the code and are folded
+
+        Raises what `equations` raises, CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects
+        the code.
+        """
+        return self.equations(tune).compile(backend, templates, specialize)
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write a tree of fixed, revolute and prismatic joints as a URDF file, with the parameters' default numbers.
@@ -345,16 +427,44 @@ class System:
 
         return write_urdf(self.check(), path)
 
+    def _frame(self, given: Any, what: str) -> Any:
+        """A ReferenceFrame that was given, or None."""
+        try:
+            return as_frame(given, what)
+        except ModelError as error:
+            self._faults.extend(error.faults)
+            return None
+
+    def _body(self, body: Any) -> Any:
+        """A body that is given by itself or by name; what is none as it is."""
+        return next((b for b in (self.ground, *self.bodies) if isinstance(body, str) and body == b.name), body)
+
+    def _written_in(self, value: Any, frame: Any, label: str) -> tuple[Any, Any]:
+        """In whose axes a load is given, None for the n-frame, and the body that has them, by the frame that a SymPy vector is
+        written in."""
+        if not is_sympy_vector(value) or len(frames_of(value)) != 1:
+            return frame, self.ground
+        written = frames_of(value)[0]
+        named = [b for b in (self.ground, *self.bodies) if isinstance(b.name, str)]
+        owner = next((b for b in named if b.frame == written), None)
+        if owner is not None and frame is not None and self._body(frame) is not owner:
+            self._faults.append(f"{label} is the SymPy vector {value}, written in the axes of {owner.name}, and frame is "
+                                f"{getattr(frame, 'name', frame)}; leave out frame")
+        return (None if owner is None or owner is self.ground else owner), owner or self.ground
+
     def _declared(self, given: Any) -> tuple[sp.Symbol, ...]:
-        listed = list(given) if hasattr(given, "__iter__") and not isinstance(given, str) else [given]
+        listed = list(given) if isinstance(given, (list, tuple, set, frozenset, Mapping, sp.MatrixBase)) else [given]
         wrong = [p for p in listed if not isinstance(p, sp.Symbol)]
         if wrong:
-            self._faults.append(f"parameters has {', '.join(map(repr, wrong))}; pass a list of symbols, "
+            self._faults.append(f"parameters has {', '.join(map(shown, wrong[:8]))}; pass a list of symbols, "
                                 "such as sd.parameters('m l g')")
         return tuple(p for p in listed if isinstance(p, sp.Symbol))
 
     def __repr__(self) -> str:
-        return f"System({self.name!r}, {len(self.bodies)} bodies, {len(self.joints)} joints)"
+        parts = [counted(len(self.bodies), "body", "bodies"), counted(len(self.joints), "joint")]
+        parts += [counted(len(things), one) for things, one in ((self.loops, "loop closure"), (self.constraints, "constraint"))
+                  if things]
+        return f"System({shown(self.name)}, {', '.join(parts)})"
 
     def set_defaults(self, defaults: Mapping[Any, float]) -> System:
         """Add numbers for parameters; returns the system."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from symdyn.model.bodies import Component, Point
 from symdyn.model.closures import Gear, Rod
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
-from symdyn.model.loads import Force, JointForce, SpringDamper, Torque
+from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
+from symdyn.model.points import Point
+from symdyn.model.quantity import quantities_in
 from symdyn.model.record import joint_speeds
 from symdyn.model.symbols import Coordinate, time
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -22,47 +25,60 @@ if TYPE_CHECKING:
 _FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
-def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], bool]]:
-    """(where, expressions, whether only parameters may occur), in the order of description."""
+class Scope(IntEnum):
+    """What may occur in an expression; each adds to those before it."""
+
+    PARAMETERS = 0
+    COORDINATES = 1  # and t
+    MOTION = 2  # speeds, states, inputs; points and orientations of bodies
+    FORCES = 3  # accelerations of points, multipliers, reactions
+
+
+def uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], Scope]]:
+    """(where, expressions, what may occur in them), in the order of description; points of quantities follow those."""
+    for where, expressions, scope in _uses(system, joints, loads):
+        listed = list(expressions)
+        yield where, listed, scope
+        for quantity in quantities_in(listed):
+            for point in quantity.measure.points:
+                yield f"{where}: point of {quantity}", point, Scope.PARAMETERS
+
+
+def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iterable[tuple[str, Iterable[sp.Expr], Scope]]:
     s = system
-    yield "gravity", s.gravity, True
+    yield "gravity", s.gravity, Scope.PARAMETERS
     for body in s.bodies:
-        yield f"body {body.name!r}", [body.mass, *body.com, *body.inertia], True
+        yield f"body {shown(body.name)}", [body.mass, *body.com, *body.inertia], Scope.PARAMETERS
     for gear in (g for g in s.loops if isinstance(g, Gear)):
-        yield f"gear {gear.name!r}", [gear.ratio, gear.offset], True
+        yield f"gear {shown(gear.name)}", [gear.ratio, gear.offset], Scope.PARAMETERS
     for joint in [*joints, *(j for j in s.loops if isinstance(j, Joint))]:
-        yield f"joint {joint.name!r}", joint.constants, True
-        yield (f"joint {joint.name!r}: coordinates",
-               [q for q in joint.coordinates if not isinstance(q, Coordinate)], False)
+        yield f"joint {shown(joint.name)}", joint.constants, Scope.PARAMETERS
+        yield (f"joint {shown(joint.name)}: coordinates",
+               [q for q in joint.coordinates if not isinstance(q, Coordinate)], Scope.COORDINATES)
     if s.ground_motion is not None:
-        yield "move_ground", s.ground_motion.coordinates, False
+        yield "move_ground", s.ground_motion.coordinates, Scope.COORDINATES
     for load in loads:
+        if isinstance(load, (Force, Torque, JointForce, SpringDamper, ForceBetween)):
+            yield load.label, expressions_of(load), Scope.FORCES
         if isinstance(load, Force):
-            yield load.label, load.force, False
-            yield f"{load.label}: point", load.point, True
-        elif isinstance(load, Torque):
-            yield load.label, load.torque, False
-        elif isinstance(load, JointForce):
-            yield load.label, load.values, False
-        elif isinstance(load, SpringDamper):
-            yield load.label, [*load.point_a, *load.point_b, load.stiffness, load.damping, load.length], True
+            yield f"{load.label}: point", load.point, Scope.PARAMETERS
+        elif isinstance(load, (SpringDamper, ForceBetween)):
+            yield f"{load.label}: points", [*load.point_a, *load.point_b], Scope.PARAMETERS
         elif isinstance(load, (Element, AddedMass)):
-            yield load.label, load.constants, True
-            yield load.label, load.expressions, False
+            yield load.label, load.constants, Scope.PARAMETERS
+            yield load.label, load.expressions, Scope.MOTION
     for output in s.outputs:
         if isinstance(output.value, Point):
-            yield f"output {output.name!r}: point", output.value.at, True
+            yield f"output {shown(output.name)}: point", output.value.at, Scope.PARAMETERS
         else:
             value = output.value
-            yield f"output {output.name!r}", value if isinstance(value, tuple) else [value], False
+            yield f"output {shown(output.name)}", value if isinstance(value, tuple) else [value], Scope.FORCES
     for event in s.events:
-        if isinstance(event.value, Component):
-            yield f"event {event.name!r}: point", event.value.point.at, True
-        yield f"event {event.name!r}", event.expressions, False
+        yield f"event {shown(event.name)}", event.expressions, Scope.FORCES
     for state in s.states:
-        yield f"rate of state {state.symbol}", [state.rate], False
+        yield f"rate of state {state.symbol}", [state.rate], Scope.FORCES
     for constraint in s.constraints:
-        yield constraint.name, [constraint.expression], False
+        yield constraint.name, [constraint.expression], Scope.MOTION
 
 
 def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> dict[sp.Symbol, str]:
@@ -105,6 +121,9 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
             for value, unit in zip(load.values, () if driven is None else driven.speed_units, strict=False):
                 if unit in _FORCES:
                     note([value], _FORCES[unit])
+        elif isinstance(load, ForceBetween):
+            note([load.force], "N")
+            note([*load.point_a, *load.point_b], "m")
         elif isinstance(load, SpringDamper):
             note([load.stiffness], "N/m")
             note([load.damping], "N s/m")
@@ -115,7 +134,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
     for output in s.outputs:
         if isinstance(output.value, Point):
             note(output.value.at, "m")
-    for event in s.events:
-        if isinstance(event.value, Component):
-            note(event.value.point.at, "m")
+    for _, used, _ in _uses(s, joints, loads):
+        for quantity in quantities_in(used):
+            for point in quantity.measure.points:
+                note(point, "m")
     return units

@@ -24,6 +24,7 @@ from symdyn.pages import page_environment, write_text
 from symdyn.report import full_condition, full_equations, full_pictures, full_work
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.run_tables import facts
+from symdyn.shown import shown
 from symdyn.stress.flow import stands_still
 from symdyn.stress.record import number
 from symdyn.stress.run import stress
@@ -55,7 +56,7 @@ def full_report(system: Any, path: Any, budget: float = BUDGET, formulation: str
     """
     target = _target(path)
     if isinstance(budget, bool) or not isinstance(budget, (int, float)) or not 0 < budget < math.inf:
-        raise ArgumentError(f"the budget {budget!r} must be a positive number of seconds")
+        raise ArgumentError(f"the budget {shown(budget)} must be a positive number of seconds")
     told("equations")
     equations = _equations(system, formulation, coordinates, tune)
     given = isinstance(system, Equations)
@@ -86,7 +87,7 @@ def _equations(system: Any, formulation: str, coordinates: str, tune: bool) -> E
     if isinstance(system, str):
         system = named(system)
     if not isinstance(system, System):
-        raise ArgumentError(f"the report takes a System, equations or a name of the catalogue, found {system!r}")
+        raise ArgumentError(f"the report takes a System, equations or a name of the catalogue, found {shown(system)}")
     return formulated(system, formulation, tune, coordinates)
 
 

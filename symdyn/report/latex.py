@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.errors import ArgumentError
+from symdyn.kinds import flag, whole
 from symdyn.report.notation import entry_latex, name_latex
 from symdyn.report.shorthand import Shorthand
+from symdyn.shown import shown
 from symdyn.tape.node import Node
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Output
@@ -70,7 +72,7 @@ def latex(value: Any, name: str = "", shorthand: bool = False, width: int = WIDT
 def equations_latex(equations: Equations, name: str, shorthand: bool = False, intermediates: bool = False, width: int = WIDTH,
                     simplify: bool = True) -> Typeset:
     """A quantity of equations in LaTeX; see Equations.latex."""
-    if not intermediates:
+    if not flag(intermediates, "intermediates"):
         return latex(equations.explicit(name, simplify), name, shorthand, width)
     steps = named_steps(equations, name)
     return _typeset([*steps[:-1], (name, steps[-1][1])], shorthand, width, raw=len(steps) - 1)
@@ -111,17 +113,18 @@ def _intermediates(equations: Equations, name: str) -> list[tuple[Node, str]]:
 
 def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: int = 0) -> Typeset:
     """raw: so many of the rows have a left side that is LaTeX already."""
-    if width < NARROWEST:
+    if whole(width, f"the width of lines, {NARROWEST} letters at least,") < NARROWEST:
         raise ArgumentError(f"lines of {width} letters asked for; pass a width from {NARROWEST} on")
+    flag(shorthand, "shorthand")
     for _, value in rows:
         if not isinstance(value, (sp.MatrixBase, sp.Expr)):
-            raise ArgumentError(f"latex takes a SymPy expression or matrix, found {value!r} of type {type(value).__name__}")
+            raise ArgumentError(f"latex takes a SymPy expression or matrix, found {shown(value)} of type {type(value).__name__}")
     short = Shorthand([v for _, v in rows]) if shorthand else None
     lines: list[str] = []
     for k, (name, value) in enumerate(rows):
-        shown = short.short(value) if short else value
+        printed = short.short(value) if short else value
         left = name if k < raw or not name else name_latex(name)
-        lines += _matrix(left, name, shown, width) if isinstance(shown, sp.MatrixBase) else _sum(left, shown, width)
+        lines += _matrix(left, name, printed, width) if isinstance(printed, sp.MatrixBase) else _sum(left, printed, width)
     return Typeset(tuple(lines), short.legend if short else ())
 
 

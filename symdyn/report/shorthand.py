@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import sympy as sp
 
-from symdyn.model.symbols import Moving
+from symdyn.model.symbols import Moving, symbols_of
 
 
 class Short(Moving):
@@ -22,7 +22,7 @@ class Shorthand:
 
     def __init__(self, expressions: Iterable[sp.Basic]) -> None:
         found = set().union(*[e.atoms(sp.sin, sp.cos) for e in expressions])
-        angles = sorted({f.args[0] for f in found}, key=lambda a: (len(a.free_symbols), sp.default_sort_key(a)))
+        angles = sorted({f.args[0] for f in found}, key=lambda a: (len(symbols_of(a)), sp.default_sort_key(a)))
         labels = {angle: _label(angle) for angle in angles}
         taken = list(labels.values())
         unique = {a: label if taken.count(label) == 1 else str(sp.latex(a)) for a, label in labels.items()}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import time as clock
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import sympy as sp
@@ -11,6 +13,7 @@ from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.simplify.fu import TR10i
 
 from symdyn.model.symbols import Rate, Speed
+from symdyn.report.limit import TimeUp, within
 
 # SymPy's general methods are tried on expressions up to this many operations: their time cannot be bounded.
 _SHORT = 60
@@ -20,14 +23,19 @@ _LONGEST = 4000
 def simplified(value: Any, seconds: float) -> Any:
     """An expression or a matrix, entry by entry, as simple as it gets before the time is up; short entries first.
 
-    Every entry is equal to the one given; entries whose turn comes after the limit stay as they are.
+    Every entry is equal to the one given; entries whose turn comes after the limit stay as they are, and the entry at whose turn
+    the time is up is as simple as it was then.
     """
     deadline = clock.monotonic() + seconds
     if not isinstance(value, sp.MatrixBase):
         return _entry(value, deadline)
     known: dict[sp.Expr, sp.Expr] = {}
     result = value.copy().as_mutable()
-    for k in sorted(range(len(value)), key=lambda k: sp.count_ops(value[k])):
+    try:
+        order = within(seconds, lambda: sorted(range(len(value)), key=lambda k: sp.count_ops(value[k])))
+    except TimeUp:
+        return result
+    for k in order:
         e = value[k]
         if e not in known:
             opposite = known.get(-e)
@@ -46,12 +54,20 @@ def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
     """The shortest of what each method makes of the best so far."""
     best = e
     for attempt in (_polynomial, _angle_sums, _by_speeds, sp.factor_terms, _general):
-        if clock.monotonic() > deadline:
-            break
-        candidate = attempt(best)
-        if _length(candidate) < _length(best):
-            best = candidate
-    return best.replace(_is_minus_sum, lambda e: sp.Add(*[-term for term in e.args[1].args]))
+        try:
+            best = within(deadline - clock.monotonic(), partial(_shorter, attempt, best))
+        except TimeUp:
+            return best
+    try:
+        return within(deadline - clock.monotonic(), lambda: best.replace(
+            _is_minus_sum, lambda e: sp.Add(*[-term for term in e.args[1].args])))
+    except TimeUp:
+        return best
+
+
+def _shorter(attempt: Callable[[sp.Expr], sp.Expr], e: sp.Expr) -> sp.Expr:
+    candidate = attempt(e)
+    return candidate if _length(candidate) < _length(e) else e
 
 
 def _is_minus_sum(e: sp.Expr) -> bool:

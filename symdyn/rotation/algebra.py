@@ -14,6 +14,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ArgumentError
+from symdyn.shown import shown
 
 
 class Algebra(ABC):
@@ -182,13 +183,13 @@ def _flattened(value: Any) -> tuple[tuple[int, ...], list[Any]]:
 
 def _expression(value: Any, what: str) -> Any:
     if isinstance(value, str):
-        raise ArgumentError(f"{what}: the text {value!r}; text is never evaluated: pass numbers or SymPy expressions")
+        raise ArgumentError(f"{what}: the text {shown(value)}; text is never evaluated: pass numbers or SymPy expressions")
     try:
         taken = sp.sympify(value, strict=True)
     except sp.SympifyError:
-        raise ArgumentError(f"{what}: {value!r} of type {type(value).__name__}; pass numbers or SymPy expressions") from None
+        raise ArgumentError(f"{what}: {shown(value)} of type {type(value).__name__}; pass numbers or SymPy expressions") from None
     if not isinstance(taken, sp.Expr):
-        raise ArgumentError(f"{what}: {value!r} of type {type(value).__name__}; pass numbers or SymPy expressions")
+        raise ArgumentError(f"{what}: {shown(value)} of type {type(value).__name__}; pass numbers or SymPy expressions")
     if taken.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise ArgumentError(f"{what}: the value {taken}; pass finite numbers or expressions")
     if taken.has(sp.I):
@@ -200,9 +201,10 @@ def _floats(array: np.ndarray, what: str) -> np.ndarray:
     """Fractions and the like as floats; texts, truth values, complex numbers and all else refused."""
     for entry in array.flat:
         if isinstance(entry, str):
-            raise ArgumentError(f"{what}: the text {str(entry)!r}; text is never evaluated: pass numbers or SymPy expressions")
+            raise ArgumentError(f"{what}: the text {shown(str(entry))}; text is never evaluated: pass numbers or SymPy "
+                                "expressions")
         if isinstance(entry, (bool, np.bool_, complex, np.complexfloating, bytes)) or not hasattr(entry, "__float__"):
-            raise ArgumentError(f"{what}: {entry!r} of type {type(entry).__name__}; pass real numbers or SymPy expressions")
+            raise ArgumentError(f"{what}: {shown(entry)} of type {type(entry).__name__}; pass real numbers or SymPy expressions")
     try:
         return np.array([float(entry) for entry in array.flat]).reshape(array.shape)
     except (OverflowError, TypeError, ValueError) as error:

@@ -7,6 +7,7 @@ lock, b and c fit to it, so that R comes back to the last digits at any distance
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +26,8 @@ LOCKED = 1e-15
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EulerSolutions:
-    """The Euler angles of a rotation.
+class EulerSolutions(Sequence[Any]):
+    """The Euler angles of a rotation: a sequence of the two solutions, `angles` and `other`.
 
     sequence   name of the sequence
     locked     whether it is at gimbal lock
@@ -47,6 +48,12 @@ class EulerSolutions:
     sign: Any
     value: Any
     R: Any
+
+    def __len__(self) -> int:
+        return 2
+
+    def __getitem__(self, index: Any) -> Any:
+        return (self.angles, self.other)[index]
 
     @property
     def fixed(self) -> Any:

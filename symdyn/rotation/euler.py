@@ -12,6 +12,7 @@ from symdyn.rotation.algebra import Algebra, Expressions, algebra_of
 from symdyn.rotation.matrices import turn
 from symdyn.rotation.sequence import EulerSequence, gimbal_lock, sequence_of
 from symdyn.rotation.zero import vanishes
+from symdyn.shown import shown
 
 # Sine or cosine of the second angle that G^-1 is divided by: below, more than half of the digits are lost.
 LOCK = 1e-8
@@ -78,7 +79,7 @@ def frame_of(frame: Any) -> bool:
     """Whether a frame of components is "n" rather than "b"; ArgumentError for anything else."""
     if frame in ("n", "b") and isinstance(frame, str):
         return frame == "n"
-    raise ArgumentError(f"there are no components in {frame!r}; pass 'n' (fixed frame) or 'b' (body)")
+    raise ArgumentError(f"there are no components in {shown(frame)}; pass 'n' (fixed frame) or 'b' (body)")
 
 
 def _turns(algebra: Algebra, of: EulerSequence, angles: Any) -> list[Any]:

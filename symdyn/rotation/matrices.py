@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.errors import ArgumentError, NotNormalized, ZeroAxis
 from symdyn.rotation.algebra import Algebra, Expressions, algebra_of
 from symdyn.rotation.zero import all_zero
+from symdyn.shown import shown
 
 # How far the length of a vector given as a unit vector, or of Euler parameters, may be from 1; how far from zero the entries
 # of S + S^T of a skew-symmetric S of size 1.
@@ -62,7 +63,8 @@ def axis_number(axis: Any) -> int | None:
     if isinstance(axis, str):
         if axis.upper() in ("X", "Y", "Z"):
             return "XYZ".index(axis.upper())
-        raise ArgumentError(f"there is no axis {axis!r}; pass 'X', 'Y', 'Z', the numbers 0, 1, 2, or a vector of 3 components")
+        raise ArgumentError(f"there is no axis {shown(axis)}; pass 'X', 'Y', 'Z', the numbers 0, 1, 2, or a vector of 3 "
+                            "components")
     if isinstance(axis, (Integral, sp.Integer)) and not isinstance(axis, bool):
         if int(axis) in (0, 1, 2):
             return int(axis)

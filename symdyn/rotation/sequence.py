@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.errors import ArgumentError
 from symdyn.model.orientation import SEQUENCES
+from symdyn.shown import shown
 
 _OF_AXIS = {"X": "phi", "Y": "theta", "Z": "psi"}
 
@@ -79,7 +80,7 @@ def sequence_of(name: Any) -> EulerSequence:
     if isinstance(name, str) and name in SEQUENCES:
         return EulerSequence(name)
     hint = "; letters are capitals: the axes are those of the body" if isinstance(name, str) and name.upper() in SEQUENCES else ""
-    raise ArgumentError(f"there is no Euler sequence {name!r}; the twelve are {', '.join(SEQUENCES)}{hint}")
+    raise ArgumentError(f"there is no Euler sequence {shown(name)}; the twelve are {', '.join(SEQUENCES)}{hint}")
 
 
 def gimbal_lock(sequence: str) -> Lock:

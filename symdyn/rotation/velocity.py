@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ArgumentError
-from symdyn.model.symbols import Acceleration, Input, time
+from symdyn.model.symbols import Acceleration, Input, symbols_of, time
 from symdyn.rotation.algebra import Expressions, algebra_of
 from symdyn.rotation.euler import frame_of
 from symdyn.rotation.proper import rotation_matrix
@@ -59,14 +59,11 @@ def _check_rate(S: np.ndarray) -> None:
 
 def _rate(expression: Any) -> Any:
     """The derivative by time."""
-    rate = sp.diff(expression, time)
-    for symbol in sorted(expression.free_symbols - {time}, key=lambda symbol: symbol.name):
+    for symbol in sorted(symbols_of(expression), key=lambda symbol: symbol.name):
         if isinstance(symbol, (Acceleration, Input)):
             raise ArgumentError(f"R depends on {symbol}, whose derivative by time has no symbol; "
                                 "write R in coordinates, their rates and t")
-        if hasattr(symbol, "dot"):
-            rate += sp.diff(expression, symbol) * symbol.dot
-    return rate
+    return sp.diff(expression, time)
 
 
 def _collected(expression: Any) -> Any:

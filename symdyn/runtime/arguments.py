@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, no_value
+from symdyn.real_numbers import NotReal, number, real_of
+from symdyn.shown import name_of, shown
 
 
 def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, float | None], owner: str) -> np.ndarray:
-    """Values in the order of names.
+    """Values in the order of names, in an array of their own: what the caller changes later in its arrays changes nothing here.
 
     values    None for the defaults, a mapping from names or symbols, or a sequence in order
     defaults  name -> number or None; a name that is left out takes it
@@ -22,10 +24,7 @@ def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, fl
         values = {}
     if isinstance(values, Mapping):
         return _from_mapping(values, names, what, defaults, owner)
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{owner}: {what} must be numbers, found {values!r}") from None
+    array = np.array(real_of(values, owner, f"{what} must be numbers"))
     if array.ndim == 0 and len(names) == 1:
         array = array.reshape(1)
     if array.shape != (len(names),):
@@ -33,6 +32,13 @@ def take(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, fl
                             f"{': ' + ', '.join(names) if names else ''}")
     _finite(array, names, what, owner)
     return array
+
+
+def fixed(array: np.ndarray) -> np.ndarray:
+    """A view that cannot be written to, of what results are evaluated from later."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def some(values: Any, names: Sequence[str], what: str, owner: str) -> dict[str, float]:
@@ -43,9 +49,9 @@ def some(values: Any, names: Sequence[str], what: str, owner: str) -> dict[str, 
     if values is None:
         return {}
     if not isinstance(values, Mapping):
-        raise ArgumentError(f"{owner}: {what} must be a mapping from symbols or names to numbers, found {values!r}")
+        raise ArgumentError(f"{owner}: {what} must be a mapping from symbols or names to numbers, found {shown(values)}")
     array = take(values, names, what, dict.fromkeys(names, 0.0), owner)
-    given = {str(getattr(key, "name", key)) for key in values}
+    given = {name_of(key) for key in values}
     return {name: float(value) for name, value in zip(names, array, strict=True) if name in given}
 
 
@@ -54,16 +60,17 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
     given: dict[str, Any] = {}
     faults = []
     for key, value in values.items():
-        name = str(getattr(key, "name", key))
+        name = name_of(key)
         if name not in names:
             near = difflib.get_close_matches(name, names, 3, cutoff=0.5)
             hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(names) or 'none'}"
-            faults.append(f"there is no {name!r}{hint}")
+            faults.append(f"there is no {shown(name)}{hint}")
             continue
         try:
-            given[name] = float(value)
-        except (TypeError, ValueError):
-            faults.append(f"the value of {name} is {value!r}, not a number")
+            given[name] = number(value)
+        except NotReal as error:
+            why = "" if isinstance(value, str) else f": {error}"
+            faults.append(f"the value of {name} is {shown(value)}, not a number{why}")
     missing = [n for n in names if n not in given and defaults.get(n) is None]
     missing = [n for n in missing if not any(n in f for f in faults)]
     if missing:

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationWarning
+from symdyn.real_numbers import real_of
 from symdyn.runtime.batch_arguments import take_rows, together
+from symdyn.runtime.memory import demand
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -49,7 +52,8 @@ def parameter_rows(module: Module, params: Any) -> np.ndarray:
 def input_rows(module: Module, inputs: Any, defaults: Mapping[str, float]) -> np.ndarray:
     """Constant inputs, (n, n_in), or (1, n_in) where none varies."""
     names = module.metadata["inputs"]
-    given = None if inputs is None or (not isinstance(inputs, Mapping) and np.size(inputs) == 0) else inputs
+    left_out = inputs is None or (isinstance(inputs, (list, tuple)) and not inputs) or getattr(inputs, "size", 1) == 0
+    given = None if left_out else inputs
     return take_rows(given, names, "inputs", {n: defaults.get(n, 0.0) for n in names}, module.name)
 
 
@@ -67,6 +71,7 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
     arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, module.metadata["initial"]),
               "params": parameter_rows(module, params)}
     n = together(arrays, module.name)
+    demand(n * n_x * (1 if module.backend == "c" else 3), module.name, f"{n} rows of {n_x} numbers", "pass fewer rows at a time")
     xd = _result(module, states, (n, n_x), out)
     if out is not None:  # what is read must not be written before
         arrays = {what: a.copy() if np.may_share_memory(a, out) else a for what, a in arrays.items()}
@@ -86,7 +91,7 @@ def _result(module: Module, states: np.ndarray, shape: tuple[int, int], out: np.
         return np.empty(shape[::-1]).T if by_entry else np.empty(shape)
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.float64 or not out.flags.behaved:
         raise ArgumentError(f"{module.name}: out must be a writable array of doubles of the shape {shape}, found "
-                            f"{getattr(out, 'shape', out)!r} of {getattr(out, 'dtype', type(out).__name__)}")
+                            f"{shown(getattr(out, 'shape', out))} of {getattr(out, 'dtype', type(out).__name__)}")
     return out
 
 
@@ -140,13 +145,7 @@ def _one_by_one(unit: Any, rows: np.ndarray, arguments: tuple[np.ndarray, ...], 
 
 
 def _numbers(module: Module, values: Any, what: str) -> np.ndarray:
-    try:
-        if np.iscomplexobj(values):
-            raise TypeError
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{module.name}: {what} must be real numbers, found {values!r:.200}") from None
-    return array if array.dtype.isnative else array.astype(float)
+    return real_of(values, module.name, f"{what} must be real numbers")
 
 
 def _given_not_finite(module: Module, x: np.ndarray) -> str:

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import real_of
 from symdyn.runtime.arguments import take
+from symdyn.shown import name_of, shown
 
 
 def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[str, float | None], owner: str) -> np.ndarray:
@@ -20,15 +22,15 @@ def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[st
     Raises ArgumentError for what does not fit. What varies may be NaN: that is a fault of one trajectory alone.
     """
     if not isinstance(values, Mapping):
-        array = _real(values if values is not None else 0.0, owner, f"{what} must be real numbers")
+        array = real_of(values if values is not None else 0.0, owner, f"{what} must be real numbers")
         if values is None or array.ndim < 2:
             return take(values, names, what, defaults, owner)[None, :]
         if array.ndim > 2 or array.shape[1] != len(names):
             raise ArgumentError(f"{owner}: {what} has the shape {array.shape}, needed is (trajectories, {len(names)})"
                                 f"{': ' + ', '.join(names) if names else ''}")
         return array
-    given = {str(getattr(key, "name", key)): value for key, value in values.items()}
-    columns = {name: _column(value, name, what, owner) for name, value in given.items() if np.ndim(value)}
+    given = {name_of(key): value for key, value in values.items()}
+    columns = {name: _column(value, name, what, owner) for name, value in given.items() if _several(value)}
     faults = [_unknown(name, names) for name in columns if name not in names]
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
@@ -54,17 +56,13 @@ def together(tables: Mapping[str, np.ndarray], owner: str) -> int:
     return next(iter(lengths.values()), 1)
 
 
-def _real(values: Any, owner: str, wanted: str) -> np.ndarray:
-    try:
-        if np.iscomplexobj(values):
-            raise TypeError
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{owner}: {wanted}, found {values!r:.200}") from None
+def _several(value: Any) -> bool:
+    """Whether a value is a list or an array, of whatever."""
+    return isinstance(value, (list, tuple)) or bool(getattr(value, "ndim", 0))
 
 
 def _column(value: Any, name: str, what: str, owner: str) -> np.ndarray:
-    column = _real(value, owner, f"{what}: the values of {name} must be real numbers")
+    column = real_of(value, owner, f"{what}: the values of {name} must be real numbers")
     if column.ndim != 1:
         raise ArgumentError(f"{owner}: {what}: the values of {name} have the shape {column.shape}; give one number, or one for "
                             "each trajectory")
@@ -74,4 +72,4 @@ def _column(value: Any, name: str, what: str, owner: str) -> np.ndarray:
 def _unknown(name: str, names: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, names, 3, cutoff=0.5)
     hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(names) or 'none'}"
-    return f"there is no {name!r}{hint}"
+    return f"there is no {shown(name)}{hint}"

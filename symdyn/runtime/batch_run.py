@@ -6,7 +6,7 @@ import ctypes
 import time as clock
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,19 +17,25 @@ from symdyn.runtime.batch_arguments import take_rows, together
 from symdyn.runtime.batch_solution import BatchSolution
 from symdyn.runtime.batch_watches import outside
 from symdyn.runtime.charts import CHARTS, locked
+from symdyn.runtime.chatter import SWITCHES
 from symdyn.runtime.events import wanted
-from symdyn.runtime.inputs import take_inputs
+from symdyn.runtime.inputs import take_inputs, varies_over_time
 from symdyn.runtime.masses import negative_masses
-from symdyn.runtime.simulate import checked_positive, checked_times, checked_tolerances
+from symdyn.runtime.memory import demand
+from symdyn.runtime.sampled import check_span
+from symdyn.runtime.simulate import checked_method, checked_positive, checked_times, checked_tolerances
 from symdyn.runtime.stops import describe_stop
+from symdyn.runtime.watches import WATCHES
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 # Steps of every lane in one call: a fraction of a second, so that Ctrl-C is heard.
 PIECE = 5_000
-# The method of motions that are integrated at once; options of `simulate` that are for one by one.
-METHOD, OPTIONS = "dop853", ("method", "max_steps", "stabilization", "events")
+# Where the right-hand side jumps: so many calls in which no motion ends before those under way are looked at for chattering.
+PATIENCE = 4
+# The method of motions that are integrated at once.
+METHOD = "dop853"
 NO_VECTORS = "the C compiler has no vectors"
 TOLD = 3
 _DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
@@ -55,66 +61,48 @@ class _Asked:
 
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
                    inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
-                   first_step: float = 0.0, **options: Any) -> BatchSolution:
-    """Integrate many motions of one mechanism, each with its own steps.
-
-    q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
-                left out takes the system's initial value, else 0
-    params      (n_p,), (n, n_p), or by name or symbol, each a number or an array (n,)
-    inputs      constants, in the same ways; or what `simulate` takes, the same for all
-    t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
-    rtol, atol, max_step, first_step   as for `simulate`
-    options     others of `simulate`: method, max_steps, stabilization, events
-
-    With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
-    `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters or
-    events, inputs that vary over time, other methods and options, and the NumPy backend run one by one through `simulate`; `note`
-    of the solution says so.
-
-    A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
-    raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning tells in how many motions loads
-    leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
-    ArgumentError for what does not fit.
-    """
+                   first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
+                   events: Any = True, interpolation: str = "linear", extend: str = "error") -> BatchSolution:
+    """See Module.simulate_batch."""
     metadata = module.metadata
-    unknown = [o for o in options if o not in OPTIONS]
-    if unknown:
-        raise ArgumentError(f"{module.name}: simulate_batch has no option {', '.join(unknown)}; besides its own it takes "
-                            f"{', '.join(OPTIONS)}")
-    options = {k: v for k, v in options.items() if v is not None and not (k == "method" and v == METHOD)}
-    events = options.pop("events", True)
+    checked_method(module, method)
+    chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
+    options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
     has_events = bool(wanted(module, events).any())
     initial = metadata["initial"]
     groups = [take_rows(values, metadata[what], f"initial {what}", {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
-    by_time = _varies_over_time(inputs)
+    by_time = varies_over_time(inputs)
     fixed = input_rows(module, None if by_time else inputs, initial)
     rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
     n = together(rows, module.name)
+    times, span = _times(module, t)
+    # The states that are kept, and starts, parameters, inputs and the report of each motion.
+    demand(n * (len(times) * metadata["sizes"]["x"] + metadata["sizes"]["x"] + 12), module.name,
+           f"{n} motions with {len(times)} states of {metadata['sizes']['x']} numbers each", "simulate fewer at a time, or call "
+           "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
     starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
-    times, span = _times(module, t)
+    along = take_inputs(inputs, metadata["inputs"], initial, module.name, span, interpolation, extend) if by_time else None
+    if along is not None:  # what does not fit is an error before any motion runs
+        check_span(along.samplers, span, module.name)
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
     note = why_one_by_one(module, has_events) or _why_these(by_time, options)
     options["events"] = events
-    solution = _one_by_one(module, asked, inputs if by_time else None, note, options) if note else _on_vectors(module, asked)
+    if by_time:
+        options |= {"interpolation": interpolation, "extend": extend}
+    given = np.full((n, len(times), metadata["sizes"]["inputs"]), np.nan) if by_time and metadata.get(WATCHES) else fixed
+    varying = inputs if by_time else None
+    solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
     if solution.messages:
         told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
         more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
         warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
-    given = take_inputs(inputs, metadata["inputs"], initial, module.name).rows if by_time else fixed
     near = locked(module, times, solution.x, asked.rtol) if metadata.get(CHARTS) else []
     for sentence in outside(module, times, solution.x, asked.params, given) + near:
         warnings.warn(sentence, SimulationWarning, stacklevel=3)
     return solution
-
-
-def _varies_over_time(inputs: Any) -> bool:
-    def by_time(value: Any) -> bool:
-        return callable(value) or (isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1)
-
-    return by_time(inputs) or (isinstance(inputs, Mapping) and any(by_time(v) for v in inputs.values()))
 
 
 def _times(module: Module, t: Any) -> tuple[np.ndarray, tuple[float, float]]:
@@ -173,14 +161,18 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     go = unit.function("batch_go")
     go.restype = ctypes.c_long
     begun = clock.perf_counter()
-    interrupted = False
+    interrupted, done, waited = False, 0, 0
+    jumping = bool(module.metadata.get(SWITCHES))
     try:
         unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out)
-        while go(batch, ctypes.c_long(PIECE)) < n:
-            pass
+        while (now := go(batch, ctypes.c_long(PIECE))) < n and not (jumping and waited == PATIENCE):
+            done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
     seconds = clock.perf_counter() - begun
+    late = np.flatnonzero(np.isnan(report[:, _STATUS]))
+    if len(late) and not interrupted:
+        return _with_late(module, asked, x, report, late, begun)
     success = report[:, _STATUS] == _DONE
     messages = {int(k): wrong.get(int(k)) or _message(unit, report[k]) for k in np.flatnonzero(~success)}
     counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
@@ -189,6 +181,24 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     if interrupted:
         raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
     return solution
+
+
+def _with_late(module: Module, asked: _Asked, x: np.ndarray, report: np.ndarray, late: np.ndarray, begun: float) -> BatchSolution:
+    """Motions some of which take so many steps that they may chatter: these one by one, which finds that out."""
+    part = replace(asked, n=len(late), **{name: rows[late] if len(rows := getattr(asked, name)) > 1 else rows
+                                          for name in ("starts", "params", "inputs")})
+    single = _one_by_one(module, part, None, part.inputs, "", {"events": False})
+    success = report[:, _STATUS] == _DONE
+    unit: Any = module.unit(UNIT)
+    messages = {int(k): _message(unit, report[k]) for k in np.flatnonzero(~success) if k not in late}
+    messages |= {int(late[k]): message for k, message in single.messages.items()}
+    counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
+    x[late], success[late] = single.x, single.success
+    counts[late] = np.column_stack([single.n_steps, single.n_rejected])
+    note = (f"{len(late)} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and the right-hand side "
+            "jumps, so that they may chatter")
+    return BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
+                         width(module), note, clock.perf_counter() - begun)
 
 
 def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
@@ -224,11 +234,14 @@ def _message(unit: Any, row: np.ndarray) -> str:
 # -- one by one
 
 
-def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str, options: Mapping[str, Any]) -> BatchSolution:
+def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, note: str,
+                options: Mapping[str, Any]) -> BatchSolution:
+    """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary."""
     n, n_x, sizes = asked.n, module.metadata["sizes"]["x"], module.metadata["sizes"]
     x = np.full((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
     messages: dict[int, str] = {}
+    doubts: list[str] = []
     times = asked.times if len(asked.times) > 1 else np.array(asked.span)
     begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
@@ -253,11 +266,18 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, note: str, options: 
             messages[k] = str(error)
             continue
         success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
+        doubts += [f"{k}: {doubt}" for doubt in done.doubts]
         if len(asked.times) > 1:
             there = dict(zip(done.t.tolist(), done.x, strict=True))
             x[k] = [there.get(t, nowhere) for t in times.tolist()]
         elif done.success:  # at the end, or where an event ended the motion
             x[k] = done.x[-1]
+        if used.ndim == 3:
+            kept = dict(zip(done.t.tolist(), done.inputs, strict=True))
+            used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
         if not done.success:
             messages[k] = done.message
+    if doubts:
+        more = f"; and {len(doubts) - TOLD} more" if len(doubts) > TOLD else ""
+        warnings.warn(f"of {n} motions {'; '.join(doubts[:TOLD])}{more}", SimulationWarning, stacklevel=4)
     return solution()

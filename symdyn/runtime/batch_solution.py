@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.shown import name_of, shown
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,10 @@ class BatchSolution:
 
     def __getitem__(self, name: Any) -> np.ndarray:
         """One coordinate, speed or extra state by name or symbol, (n, n_t)."""
-        text = str(getattr(name, "name", name))
+        text = name_of(name)
         if text not in self.metadata["x"]:
-            raise ArgumentError(f"{self.metadata['name']}: there is no state {text!r}; there are {', '.join(self.metadata['x'])}")
+            raise ArgumentError(f"{self.metadata['name']}: there is no state {shown(text)}; there are "
+                                f"{', '.join(self.metadata['x'])}")
         return self.x[..., self.metadata["x"].index(text)]
 
     def __len__(self) -> int:

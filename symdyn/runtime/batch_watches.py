@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +14,11 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 
-Inputs = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray | Inputs) -> list[str]:
+def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> list[str]:
     """A sentence for every value that is not as it is meant in some of the motions, at the states that are kept.
 
     t, x             (n_t,), (n, n_t, n_x), NaN where there is no state
-    params, inputs   (n, n_p), (n, n_in), or one row for all; or inputs at times and states, (n,), (n, n_x) -> (n, n_in)
+    params, inputs   (n, n_p), (n, n_in), or one row for all; or inputs at every time, (n, n_t, n_in)
     """
     about = module.metadata.get(WATCHES, ())
     if not about or not len(x):
@@ -33,8 +29,8 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
     for p, group in zip(params, groups, strict=True):
         states, times = x[group].reshape(-1, x.shape[2]), np.tile(t, len(x[group]))
         there = np.flatnonzero(np.isfinite(states).all(axis=1))
-        if callable(inputs):
-            given = inputs(times[there], states[there])
+        if inputs.ndim == 3:
+            given = inputs[group].reshape(-1, inputs.shape[2])[there]
         else:
             given = np.repeat(np.broadcast_to(inputs, (len(x), inputs.shape[1]))[group], len(t), axis=0)[there]
         found = np.full((len(states), len(about)), np.nan)

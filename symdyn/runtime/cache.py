@@ -1,4 +1,4 @@
-"""Build shared libraries once per user and machine, keyed by everything that shapes the result."""
+"""Build shared libraries once per user and machine, keyed by everything that shapes the result, each kept with its digest."""
 
 from __future__ import annotations
 
@@ -17,51 +17,50 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-from symdyn.errors import CompileError
+from symdyn.errors import CacheError, CompileError
+from symdyn.runtime.cache_folder import cache_dir
 from symdyn.runtime.compiler import LINUX, WINDOWS, Compiler, flags
+from symdyn.runtime.stored import PRIVATE, digest, write_whole, writers
+from symdyn.shown import shown
 
-MACOS = sys.platform == "darwin"
-SUFFIX = ".dll" if WINDOWS else ".dylib" if MACOS else ".so"
+SUFFIX = ".dll" if WINDOWS else ".dylib" if sys.platform == "darwin" else ".so"
 STALE_SECONDS = 24 * 3600.0
 OUTPUT_LINES = 40
-
-
-def cache_dir() -> Path:
-    """The folder of built libraries, created if need be.
-
-    $SYMDYN_CACHE_DIR, else the platform's cache folder; a private folder among the temporary files if that
-    one cannot be written.
-    """
-    folder = _preferred()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:  # a file in the way, a read-only disk
-        return _temporary()
-    return folder if os.access(folder, os.W_OK | os.X_OK) else _temporary()
+# Characters of a mechanism's name that stand in names of files, which file systems limit to 255 bytes.
+LONGEST = 100
 
 
 def build(source: str, stem: str, compiler: Compiler) -> Path:
-    """Path of the shared library of this C source, compiled only if it is not there yet.
+    """Path of the shared library of this C source, compiled only if it is not there yet, whole to the last bit.
 
-    Raises CompileError with the command and the compiler's own output; the source is kept beside it.
+    Raises CompileError with the command and the compiler's own output, the source is kept beside it; CacheError where the cache
+    folder does not take the library.
     """
     target = _target(source, stem, compiler)
-    if not target.exists():
+    if not _is_whole(target):
         _compile(source, target, compiler, replace=False)
     return target
 
 
+def discard(library: Path) -> None:
+    """Remove a built library."""
+    library.unlink(missing_ok=True)
+    _seal(library).unlink(missing_ok=True)
+
+
 def is_built(source: str, stem: str, compiler: Compiler) -> bool:
-    """Whether the shared library of this source is there already."""
-    return _target(source, stem, compiler).exists()
+    """Whether the shared library of this source is there already, whole to the last bit."""
+    return _is_whole(_target(source, stem, compiler))
 
 
 def load(source: str, stem: str, compiler: Compiler) -> ctypes.CDLL:
-    """The loaded library of this C source; a damaged file in the cache is built once more.
+    """The loaded library of this C source; a damaged or foreign file in the cache is never loaded, and is built once more.
 
-    Raises CompileError if the source does not compile or if the fresh library cannot be loaded either.
+    Raises CompileError if the source does not compile or if the fresh library cannot be loaded either, CacheError where the cache
+    folder does not take it.
     """
     target = build(source, stem, compiler)
     try:
@@ -72,54 +71,45 @@ def load(source: str, stem: str, compiler: Compiler) -> ctypes.CDLL:
         return _open(target)
     except OSError as error:
         raise CompileError(
-            f"The library built for {stem!r} cannot be loaded: {error}. "
+            f"The library built for {shown(stem)} cannot be loaded: {error}. "
             f"It was built twice, the last time by {shlex.join(compiler.command)} ({compiler.version}). "
             f"Look for a missing function in the source, or set SYMDYN_CC to another compiler."
         ) from error
 
 
-def _preferred() -> Path:
-    named = os.environ.get("SYMDYN_CACHE_DIR")
-    if named:
-        return Path(named).expanduser().absolute()
-    # expanduser keeps the "~" where no home is known; such a folder must not appear in the working directory.
-    home = Path(os.path.expanduser("~"))
-    if not home.is_absolute():
-        return _temporary()
-    if WINDOWS:
-        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "symdyn" / "cache"
-    if MACOS:
-        return home / "Library" / "Caches" / "symdyn"
-    xdg = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return (xdg if xdg.is_absolute() else home / ".cache") / "symdyn"
-
-
-def _temporary() -> Path:
-    if sys.platform == "win32":  # already a folder of this user alone
-        folder = Path(tempfile.gettempdir(), "symdyn")
-        folder.mkdir(exist_ok=True)
-        return folder
-    folder = Path(tempfile.gettempdir(), f"symdyn-{os.getuid()}")
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """What the disk raises while a file of the cache is written becomes a CacheError."""
     try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
+        yield
+    except OSError as error:
+        why = "there is a folder of that name; remove it" if path.is_dir() else (
+            f"{error.strerror or error}. Free some space, remove what is in the way, or set SYMDYN_CACHE_DIR to another folder")
+        raise CacheError(f"{path.name} cannot be put into the cache folder {path.parent}: {why}") from error
+
+
+def _seal(library: Path) -> Path:
+    """The file that holds a library's digest; it is not put into the library itself, whose format signatures may cover."""
+    return library.with_name(f"{library.name}.sha256")
+
+
+def _is_whole(library: Path) -> bool:
+    """Whether a library is as it was built, and nobody else could write to it.
+
+    The system's loader does not look: damaged code ends the process, or computes something else.
+    """
+    try:
+        sealed = _seal(library).read_bytes()
+        return sealed == digest(library.name, library.read_bytes()).encode() and not writers(library)
     except OSError:
-        return _private()
-    # Libraries are loaded from here: a folder that another user made or may write to cannot be trusted.
-    mine = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
-    return folder if mine else _private()
-
-
-@functools.cache
-def _private() -> Path:
-    return Path(tempfile.mkdtemp(prefix="symdyn-"))
+        return False
 
 
 def _target(source: str, stem: str, compiler: Compiler) -> Path:
     machine = (_cpu(), sys.platform, platform.machine(), str(struct.calcsize("P")))
     parts = (source, *flags(compiler), *compiler.command, compiler.version, *machine)
     key = hashlib.sha256("\0".join(parts).encode("utf-8")).hexdigest()[:16]
-    return cache_dir() / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', stem)}-{key}{SUFFIX}"
+    return cache_dir() / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', stem)[:LONGEST]}-{key}{SUFFIX}"
 
 
 @functools.cache
@@ -145,7 +135,7 @@ def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> No
     """
     cache = target.parent
     _sweep(cache)
-    with tempfile.TemporaryDirectory(prefix="build-", dir=cache, ignore_cleanup_errors=True) as folder:
+    with writing(target), tempfile.TemporaryDirectory(prefix="build-", dir=cache, ignore_cleanup_errors=True) as folder:
         text, library = Path(folder, target.stem + ".c"), Path(folder, target.name)
         text.write_text(source, encoding="utf-8", newline="\n")
         fault, output = _run(_command(compiler, text, library), cache)
@@ -157,13 +147,18 @@ def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> No
             raise CompileError(_failure(compiler, kept, target, fault, output))
         with library.open("r+b") as written:  # a power cut must not leave the name on an empty file
             os.fsync(written.fileno())
-        if not replace and target.exists():
+        if not replace and _is_whole(target):  # another process was quicker
             return
+        library.chmod(stat.S_IRWXU)
+        sealed = digest(target.name, library.read_bytes()).encode()
         try:
             os.replace(library, target)
         except PermissionError:  # Windows: another process was first and has loaded it
-            if not target.exists():
+            if not _is_whole(target):
                 raise
+            return
+        # Whoever looks before the digest is there takes the library for a damaged one and builds it, too: time is lost, no more.
+        write_whole(_seal(target), lambda file: file.write(sealed), PRIVATE, sync=False)
 
 
 def _run(command: list[str], cache: Path) -> tuple[str, str]:
@@ -204,32 +199,21 @@ def _command(compiler: Compiler, source: Path, library: Path) -> list[str]:
 def _sweep(folder: Path) -> None:
     """Remove what builds that were killed have left behind."""
     limit = time.time() - STALE_SECONDS
-    for left in folder.glob("build-*"):
+    for left in [*folder.glob("build-*"), *folder.glob(".*.tmp")]:
         try:
-            if left.is_dir() and left.stat().st_mtime < limit:
+            if left.lstat().st_mtime >= limit:
+                continue
+            if left.is_dir() and not left.is_symlink():
                 shutil.rmtree(left, ignore_errors=True)
+            elif left.suffix == ".tmp":
+                left.unlink()
         except OSError:  # another process was quicker
             continue
 
 
 def _open(library: Path) -> ctypes.CDLL:
-    _check_whole(library)
     _share_libm()
     return ctypes.CDLL(str(library))
-
-
-def _check_whole(library: Path) -> None:
-    """OSError if a 64-bit ELF file ends before its section table.
-
-    The loader of Linux does not look: mapping such a file can end the whole process.
-    """
-    with library.open("rb") as file:
-        head = file.read(64)
-    if head[:6] != b"\x7fELF\x02\x01":
-        return
-    fields = struct.unpack_from("<40xQ10xHH", head.ljust(64, b"\xff"))
-    if library.stat().st_size < fields[0] + fields[1] * fields[2]:
-        raise OSError(f"{library} is truncated")
 
 
 @functools.cache

@@ -5,17 +5,21 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import time as clock
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import SymdynError
-from symdyn.runtime.events import EVENTS, at_once, ended, not_known
+from symdyn.errors import SimulationWarning, SymdynError
+from symdyn.runtime.chatter import STEPS, chatter_of
+from symdyn.runtime.events import CHATTER, EVENTS, Happened, at_once, ended, not_known, too_quick
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
+from symdyn.runtime.short_steps import ShortSteps
 from symdyn.runtime.stabilization import Corrections, not_converged
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
@@ -29,7 +33,8 @@ STEPS_AT_ONCE = 4096
 _DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
 _PROJECTION_FAILED = -6
 _EVENT_STOPPED, _EVENT_FAILED, _EVENT_AT_ONCE = 3, -7, -8
-# Most events that wait to be taken, besides one of each kind; see `noted` in the generated source.
+_NO_SERIES = -9
+# Most events that wait to be taken, besides two of each kind; see `noted` in the generated source.
 _EVENTS_WAITING = 64
 _INPUT_STOPPED = 100_000
 _InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
@@ -39,8 +44,9 @@ _InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(
 class Problem(ctypes.Structure):
     """Parameters, constants and inputs of a run; see `problem` in the generated source."""
 
-    _fields_ = [("p", ctypes.c_void_p), ("c", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("n_table", ctypes.c_long),
-                ("table_t", ctypes.c_void_p), ("table", ctypes.c_void_p), ("function", _InputFunction),
+    _fields_ = [("p", ctypes.c_void_p), ("c", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("n_pieces", ctypes.c_long),
+                ("breaks", ctypes.c_void_p), ("pieces", ctypes.c_void_p), ("n_stops", ctypes.c_long), ("stops", ctypes.c_void_p),
+                ("function", _InputFunction),
                 # only in units that can project; the others do not read as far
                 ("project", ctypes.c_int), ("length", ctypes.c_double)]
 
@@ -71,21 +77,30 @@ class _Run:
         self.status = self._timed("simulation_start", ctypes.byref(self.problem), ctypes.c_void_p(span.ctypes.data),
                                   ctypes.c_void_p(request.x0.ctypes.data), ctypes.c_void_p(request.atol.ctypes.data))
         self.written = ctypes.c_long(0)
-        self.happened: list[tuple[int, float, np.ndarray]] = []
+        self.happened: list[Happened] = []
+        self.too_quick: list[tuple[int, float]] = []
         self.rows: np.ndarray | None = None
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
-            self.rows = np.zeros((_EVENTS_WAITING + len(self.look), 2 + self.n_x))
+            self.rows = np.zeros((_EVENTS_WAITING + 2 * len(self.look), 2 + 2 * self.n_x))
             unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data))
+            if request.carried is not None:
+                carried = np.ascontiguousarray(request.carried[:3], dtype=float)
+                unit.function("simulation_carry")(self.address, ctypes.c_void_p(carried.ctypes.data),
+                                                  ctypes.c_int(request.carried.reset))
 
     def _inputs(self, request: Request) -> None:
         free = request.inputs
         constant = np.ascontiguousarray(free.constant)
         self.kept.append(constant)
         self.problem.inputs = constant.ctypes.data
-        if free.table is not None and free.times is not None:
-            self.problem.n_table = len(free.times)
-            self.problem.table_t, self.problem.table = free.times.ctypes.data, free.table.ctypes.data
+        stops = np.sort(free.stops(request.span))
+        self.kept.append(stops)
+        self.problem.n_stops, self.problem.stops = len(stops), stops.ctypes.data
+        if free.pieces is not None:
+            breaks, pieces = (np.ascontiguousarray(a) for a in (free.pieces.breaks, free.pieces.coefficients))
+            self.kept += [breaks, pieces]
+            self.problem.n_pieces, self.problem.breaks, self.problem.pieces = len(pieces), breaks.ctypes.data, pieces.ctypes.data
         if free.function is not None:
             n_x, n_in, n_state = self.n_x, len(constant), request.n_state
 
@@ -124,7 +139,11 @@ class _Run:
             take = self.unit.function("simulation_events")
             take.restype = ctypes.c_long
             n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
-            self.happened += [(int(row[0]), float(row[1]), row[2:].copy()) for row in self.rows[:n]]
+            for k, t, *states in self.rows[:n]:
+                if k < 0:
+                    self.too_quick.append((-1 - int(k), float(t)))
+                else:
+                    self.happened.append(Happened(int(k), float(t), *np.array(states).reshape(2, -1)))
         return status
 
     def _timed(self, name: str, *arguments: Any) -> int:
@@ -148,7 +167,11 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     """
     unit: Any = module.unit(unit_name(field, method))
     run = _Run(unit, with_own_tolerances(request, method))
-    interrupted, stopped = False, False
+    chatter = chatter_of(module, request)
+    piece = PIECE if chatter is None and request.inputs.function is None else STEPS
+    short = _short_steps(module, request, method, field)
+    warned = []
+    interrupted, stopped, chatters = False, False, ""
     times, n_x = request.times, run.n_x
     stored: list[tuple[np.ndarray, np.ndarray]] = []
     x_out = np.empty((len(times), n_x)) if times is not None else np.empty((STEPS_AT_ONCE, n_x))
@@ -161,7 +184,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
             if left is not None and left <= 0 and status != _STORE_FULL:
                 stopped = True
                 break
-            limit = PIECE if left is None else min(PIECE, left)
+            limit = piece if left is None else min(piece, left)
             status = run.at(t_out, x_out, limit) if times is not None else run.steps(t_out, x_out, limit)
             if times is None and (status == _STORE_FULL or run.written.value == len(t_out)):
                 n = run.written.value
@@ -173,6 +196,13 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
                 position = now
             if status not in (_STEP_LIMIT, _STORE_FULL):
                 break
+            report = run.report()
+            chatters = chatter(float(report[0]), report[8:8 + n_x], int(report[2])) if chatter is not None else ""
+            if chatters:
+                break
+            if short is not None and (warning := short(float(report[0]), report[8:8 + n_x], int(report[2]))):
+                warned.append(warning)
+                warnings.warn(warning, SimulationWarning, stacklevel=5)  # now: such a run may take very long
     except KeyboardInterrupt:
         interrupted = True
     if run.trouble and isinstance(run.trouble[0], KeyboardInterrupt):
@@ -186,19 +216,35 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     else:
         t, x = times[:written], x_out[:written]
     report = run.report()
-    early = interrupted or stopped or run.raised is not None
+    early = interrupted or stopped or bool(chatters) or run.raised is not None
     over = status == _EVENT_STOPPED and not early
     success = over or (status == _DONE and not early)
-    message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped)
+    message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped, chatters)
     if over:
-        message = ended(module, next(k for k, s, _ in reversed(run.happened) if module.metadata[EVENTS][k]["stop"]), report[0])
+        stopping = (one.event for one in reversed(run.happened) if module.metadata[EVENTS][one.event]["stop"])
+        message = ended(module, next(stopping), report[0])
     if over or not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
+    doubts = [too_quick(module, run.too_quick), _doubt(module, request, method, report) if status >= 0 else ""]
     dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
     return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), run.seconds,
                    Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),
-                   int(report[15 + 2 * n_x]), _doubt(module, request, method, report) if status >= 0 else "",
-                   None if run.raised is None else run.raised.__cause__)
+                   int(report[15 + 2 * n_x]), tuple(filter(None, doubts)),
+                   warned, None if run.raised is None else run.raised.__cause__,
+                   _series_reason(run, report) if status == _NO_SERIES and not early else "",
+                   next_step=float(report[1]))
+
+
+def _short_steps(module: Module, request: Request, method: str, field: str) -> ShortSteps | None:
+    """What looks for steps that are far too short; None where their length is given or follows from a table of inputs."""
+    if method == "gauss" or request.inputs.has_kinks:
+        return None
+
+    def trial(t: float, x: np.ndarray, step: float, n: int) -> Outcome:
+        part = replace(request, span=(t, request.span[1]), times=None, x0=x.copy(), first_step=step, max_steps=n, look=None)
+        return run_compiled(module, part, method, field=field)
+
+    return ShortSteps(module, request, trial)
 
 
 def _doubt(module: Module, request: Request, method: str, report: np.ndarray) -> str:
@@ -216,17 +262,21 @@ def _doubt(module: Module, request: Request, method: str, report: np.ndarray) ->
             f"tolerance; use method='{DEFAULT}'")
 
 
-def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool) -> str:
+def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool,
+             chatters: str) -> str:
     n, metadata = run.n_x, run.unit.metadata
     t, x = report[0], report[8:8 + n]
     if interrupted:
         return describe_stop(metadata, t, x, "interrupted")
     if run.raised is not None:
         return describe_stop(module.metadata, run.raised.t, run.raised.x, str(run.raised))
+    if chatters:
+        return describe_stop(metadata, t, x, chatters)
     if stopped:
         return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
     if status == _EVENT_AT_ONCE:
-        return describe_stop(metadata, t, x, at_once(module, run.happened[-1][0]))
+        near = CHATTER * abs(run.request.span[1] - run.request.span[0])
+        return describe_stop(metadata, t, x, at_once(module, run.happened, near))
     if status == _EVENT_FAILED:
         why = run.unit.reason(int(report[5])) if report[5] else not_known(module, int(report[6]))
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
@@ -234,6 +284,9 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         x_fail = report[8 + n:8 + 2 * n]
         why = _dependent(module, run, report[7], x_fail) + _inputs(module, run, report[7], x_fail)
         return describe_stop(metadata, report[7], x_fail, run.unit.reason(int(report[5])) + why)
+    if status == _NO_SERIES:
+        why = f"the right-hand side has no Taylor series: {_series_reason(run, report)}; use method='{DEFAULT}'"
+        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _NOT_FINITE:
         bad = int(report[6])
         name = metadata["x"][bad] if 0 <= bad < n else "the state"
@@ -245,9 +298,17 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         why = _dependent(module, run, report[7], x_fail)
         return describe_stop(metadata, report[7], x_fail, f"no way back onto the constraints: {_off(module, run, report)}{why}")
     if status == _STEP_TOO_SMALL:
+        chatter = chatter_of(module, run.request)
         why = nearly_singular(module, t, x[:module.metadata["sizes"]["x"]], run.request.p) + _dependent(module, run, t, x)
+        why += chatter.of_small_steps(t, x) if chatter is not None else ""
         return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
     return describe_stop(metadata, t, x, f"the integrator refused (status {status})")
+
+
+def _series_reason(run: _Run, report: np.ndarray) -> str:
+    """Why a right-hand side that can be evaluated has no series."""
+    reason = int(report[5])
+    return run.unit.reason(reason) if reason else "its coefficients are not finite"
 
 
 def _dependent(module: Module, run: _Run, t: float, x: np.ndarray) -> str:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from symdyn.errors import CompilerNotFound
+from symdyn.shown import shown
 
 LINUX = sys.platform.startswith("linux")
 WINDOWS = sys.platform == "win32"
@@ -113,12 +114,12 @@ def _asked() -> tuple[str | None, str | None, str | None]:
 def _search(named: str | None, cc: str | None, path: str | None) -> tuple[Compiler | None, str]:
     """(compiler, "") or (None, reason)."""
     if named is not None and named.strip().lower() in ("", "none"):
-        return None, f"No C compiler is used, as SYMDYN_CC={named!r} asks; unset it to look for one."
+        return None, f"No C compiler is used, as SYMDYN_CC={shown(named)} asks; unset it to look for one."
     if named is not None:
         found = probe(_split(named, path), path)
         if isinstance(found, str):
             raise CompilerNotFound(
-                f"SYMDYN_CC={named!r} asks for a C compiler that cannot be used: {found}. "
+                f"SYMDYN_CC={shown(named)} asks for a C compiler that cannot be used: {found}. "
                 f"Correct it, unset it to look for another, or set SYMDYN_CC=none to do without."
             )
         return found, ""
@@ -137,7 +138,7 @@ def _search(named: str | None, cc: str | None, path: str | None) -> tuple[Compil
 
 def _candidates(cc: str | None, path: str | None) -> Iterator[tuple[str, tuple[str, ...]]]:
     if cc is not None and cc.strip():
-        yield f"$CC={cc!r}", _split(cc, path)
+        yield f"$CC={shown(cc)}", _split(cc, path)
     for name in ("cc", "gcc", "clang"):
         yield name, (name,)
     ziglang = package_path("ziglang")
@@ -169,7 +170,7 @@ def probe(command: tuple[str, ...], path: str | None) -> Compiler | str:
     """The compiler behind a command, or the reason why it cannot be used."""
     program = shutil.which(command[0], path=path)
     if program is None:
-        return f"there is no program {command[0]!r}" if os.path.dirname(command[0]) else "not on PATH"
+        return f"there is no program {shown(command[0])}" if os.path.dirname(command[0]) else "not on PATH"
     command = (os.path.abspath(program), *command[1:])
     try:
         done = subprocess.run(

@@ -8,12 +8,14 @@ of Multibody Systems, chapter 3.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.real_numbers import NotReal
+from symdyn.real_numbers import number as double
 from symdyn.runtime.arguments import take
 from symdyn.runtime.constraints import (
     CONSISTENT,
@@ -24,6 +26,8 @@ from symdyn.runtime.constraints import (
     position_residual,
     velocity_residual,
 )
+from symdyn.shown import name_of, shown
+from symdyn.tape.kernels import MASSLESS
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -90,8 +94,10 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
         keep = (keep,)
     elif not isinstance(keep, Iterable):
         raise ArgumentError(f"{module.name}: pass coordinates and speeds as keep, by name or symbol, or None for none of them, "
-                            f"found {keep!r}")
-    kept = [str(getattr(k, "name", k)) for k in keep]
+                            f"found {shown(keep)}")
+    if getattr(keep, "ndim", 1) == 0:
+        raise ArgumentError(f"{module.name}: keep is {shown(keep)}; pass a list of names or symbols")
+    kept = [name_of(k) for k in keep]
     unknown = [k for k in kept if k not in metadata["q"] and k not in metadata["u"]]
     if unknown:
         known = ", ".join([*metadata["q"], *metadata["u"]])
@@ -109,20 +115,40 @@ def on_constraints(module: Module, t: float, x: np.ndarray, params: np.ndarray) 
     return _Search(module, t, params, []).positions(x)
 
 
-def closest(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> np.ndarray:
-    """The consistent state near x. Raises ArgumentError as `consistent`."""
-    search = _Search(module, t, params, [])
+def closest(module: Module, t: float, x: np.ndarray, params: np.ndarray, keep: Sequence[str] = ()) -> np.ndarray:
+    """The consistent state near x; keep: names of coordinates and speeds that stay. Raises ArgumentError as `consistent`."""
+    search = _Search(module, t, params, list(keep))
     return search.speeds(search.positions(x))
+
+
+def smallest_acceleration(module: Module, t: float, x: np.ndarray, params: np.ndarray, ud: np.ndarray,
+                          gaps: np.ndarray, keep: Sequence[str] = ()) -> np.ndarray:
+    """The accelerations near ud (n_u,) with C_scale C_r u_dot = C_scale C_r ud + gaps, by the smallest change in the metric of
+    the mass matrix; keep: names of speeds whose rates stay. Raises ArgumentError where there are none.
+    """
+    search = _Search(module, t, params, list(keep))
+    J = module.evaluate("C_r", t, x, params) * module.evaluate("C_scale", t, x, params)[:, None]
+    free = np.eye(search.n_u)[:, [k for k in range(search.n_u) if k not in search.kept_u]]
+    change = search.smallest(x, J, gaps, free)
+    found = ud if change is None else ud + change
+    left = gaps - J @ (found - ud)
+    size = float(np.abs(gaps).max(initial=0.0))
+    if (np.abs(left) > _GOOD * size).any():
+        kept = f" with those of {', '.join(keep)} kept" if keep else ""
+        raise ArgumentError(f"{module.name}: no accelerations fulfil the constraints here{kept}: the nearest violate "
+                            f"{listed(module, left, _GOOD * size)} (m/s^2); the position is singular, constraints contradict "
+                            "each other, or too much is kept")
+    return found
 
 
 def number(value: Any, what: str, owner: str) -> float:
     """A finite number; raises ArgumentError, with `what` as what to pass, for anything else."""
     try:
-        found = float(value)
-    except (TypeError, ValueError):
-        found = float("nan")
+        found = double(value)
+    except NotReal as error:
+        raise ArgumentError(f"{owner}: pass {what}, found {shown(value)}: {error}") from None
     if not np.isfinite(found):
-        raise ArgumentError(f"{owner}: pass {what}, found {value!r}")
+        raise ArgumentError(f"{owner}: pass {what}, found {shown(value)}")
     return found
 
 
@@ -207,7 +233,7 @@ class _Search:
         J, scale = self._evaluate("C_r", x), self._evaluate("C_scale", x)
         C = self._evaluate("C", x)
         rows = self.holonomic
-        return self._smallest(x, (J * scale[:, None])[rows], -(C * scale)[rows], self._free(x))
+        return self.smallest(x, (J * scale[:, None])[rows], -(C * scale)[rows], self._free(x))
 
     def speeds(self, x: np.ndarray) -> np.ndarray:
         """The state with u projected onto the constraints."""
@@ -216,7 +242,7 @@ class _Search:
         free = np.eye(self.n_u)[:, [k for k in range(self.n_u) if k not in self.kept_u]]
         guess = float(np.abs(x[self.n_q:self.n_q + self.n_u] * self.velocities).max(initial=0.0))
         for _ in range(3):
-            du = self._smallest(x, J, -self._evaluate("C_dot", x) * scale, free)
+            du = self.smallest(x, J, -self._evaluate("C_dot", x) * scale, free)
             if du is None:
                 break
             x = x.copy()
@@ -228,29 +254,29 @@ class _Search:
         u[np.abs(u * self.velocities) <= 1e-15 * guess] = 0.0
         return x
 
-    def _smallest(self, x: np.ndarray, J: np.ndarray, right: np.ndarray, free: np.ndarray) -> np.ndarray | None:
-        """The dv (n_u,) in the columns of `free` with J dv = right, as well as it can be, smallest in the metric of the mass."""
+    def smallest(self, x: np.ndarray, J: np.ndarray, right: np.ndarray, free: np.ndarray) -> np.ndarray | None:
+        """The dv (n_u,) in the columns of `free` with J dv = right, as well as it can be, smallest in the metric of the mass.
+
+        dv = B y with |y| the size of dv as a velocity, m/s: of all y that solve the constraints, y_p the shortest and Z the
+        directions that they leave, y = y_p - Z (Z^T M Z)^+ Z^T M y_p has the least kinetic energy; along directions that move no
+        mass it is the shortest. Nothing is added to the mass matrix: speeds before an impact become those after it.
+        """
         if free.shape[1] == 0 or len(J) == 0:
             return None
-        root = self._inverse_root(x, free)
-        A = J @ free @ root
-        U, values, Vt = np.linalg.svd(A, full_matrices=False)
+        B = free @ np.linalg.inv(np.linalg.cholesky(free.T @ np.diag(self.velocities**2) @ free)).T
+        U, values, Vt = np.linalg.svd(J @ B)
         if not values.size or values[0] == 0:
             return None
-        kept = values > _CUT * values[0]
-        return free @ (root @ (Vt[kept].T @ ((U[:, kept].T @ right) / values[kept])))
-
-    def _inverse_root(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """R with R R^T the inverse of the mass matrix on the columns of `free`; directions without mass get a little."""
-        D = self.velocities
-        M = self._evaluate("mass_matrix", x) / np.outer(D, D)  # kg
-        largest = float(np.abs(M).max(initial=0.0)) or 1.0
-        M = (M + 1e-6 * largest * np.eye(self.n_u)) * np.outer(D, D)
-        try:
-            root: np.ndarray = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free)).T
-        except np.linalg.LinAlgError:  # not even positive: all directions alike
-            root = np.linalg.inv(np.linalg.cholesky(free.T @ np.diag(D**2) @ free)).T
-        return root
+        rank = int((values > _CUT * values[0]).sum())
+        y = Vt[:rank].T @ ((U[:, :rank].T @ right) / values[:rank])
+        Z = Vt[rank:].T
+        M = B.T @ self._evaluate("mass_matrix", x) @ B
+        masses, along = np.linalg.eigh(Z.T @ M @ Z)
+        largest = float(np.abs(np.linalg.eigvalsh(M)).max(initial=0.0))
+        if masses.size and masses[0] >= -MASSLESS * largest:  # a mass matrix that is not even positive has no least energy
+            heavy = masses > MASSLESS * largest
+            y = y - Z @ (along[:, heavy] @ ((along[:, heavy].T @ (Z.T @ (M @ y))) / masses[heavy]))
+        return free @ (free.T @ (B @ y))
 
     def _free(self, x: np.ndarray) -> np.ndarray:
         """Columns: velocities that leave the kept coordinates as they are, orthonormal, (n_u, n)."""

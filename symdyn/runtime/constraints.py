@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.turning import turns
+
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
@@ -28,7 +30,7 @@ def length(module: Module, params: Any) -> float:
 
 def turning(module: Module) -> np.ndarray:
     """For every speed whether it is an angular velocity or has no length in it, (n_u,)."""
-    return np.array([module.metadata["units"].get(u) in ("rad/s", "1/s") for u in module.metadata["u"]], dtype=bool)
+    return np.array([turns(module.metadata["units"].get(u)) for u in module.metadata["u"]], dtype=bool)
 
 
 def as_velocities(module: Module, params: Any) -> np.ndarray:

@@ -19,6 +19,7 @@ from symdyn.runtime.constraints import names, rank
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.scipy_run import Field, Run
 from symdyn.runtime.stabilization import Projector
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -35,7 +36,7 @@ def check_ggl(module: Module, x: np.ndarray, params: np.ndarray, t: float, stabi
         raise ArgumentError(f"{module.name}: method 'ggl' is for equations with constraints, and there are none; leave it out")
     if stabilization is not None:
         raise ArgumentError(f"{module.name}: method 'ggl' keeps the constraints itself; leave out "
-                            f"stabilization={stabilization!r}")
+                            f"stabilization={shown(stabilization)}")
     if work:
         raise ArgumentError(f"{module.name}: method 'ggl' does not integrate the work of loads; leave out work=True, or take "
                             "another method")

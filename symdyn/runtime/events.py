@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn import panels
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.shown import LENGTH, name_of
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 EVENTS, RESETS = "events", "event_resets"
-# Parts of a step at whose ends the quantities are looked at: two zeros within one part go unseen.
-PARTS = 8
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14
 # So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
@@ -30,6 +30,27 @@ class EventRows(NamedTuple):
     x: np.ndarray
 
 
+class Happened(NamedTuple):
+    """One event: which, when, the states (n_x,) just before and just after, which differ by its reset."""
+
+    event: int
+    t: float
+    before: np.ndarray
+    after: np.ndarray
+
+
+class Carried(NamedTuple):
+    """What a run takes over from the one before it, at whose end it begins: sides of the quantities of events, (n_e,), 0 where
+    unknown; of those that have just vanished rates (n_e,), a second, NaN of all others, and what was left of them, (n_e,); reset:
+    whether the state was changed since.
+    """
+
+    sides: np.ndarray
+    rates: np.ndarray
+    left: np.ndarray
+    reset: bool
+
+
 def wanted(module: Module, asked: Any) -> np.ndarray:
     """Which of the module's events are looked for, (n_e,) of bool; asked: True, False or names.
 
@@ -38,21 +59,22 @@ def wanted(module: Module, asked: Any) -> np.ndarray:
     names = [e["name"] for e in module.metadata.get(EVENTS, ())]
     if isinstance(asked, (bool, np.bool_)) or asked is None:
         return np.full(len(names), asked is None or bool(asked))
-    chosen = [str(a) for a in ([asked] if isinstance(asked, str) or not isinstance(asked, Iterable) else asked)]
+    chosen = [name_of(a) for a in ([asked] if isinstance(asked, str) or not isinstance(asked, Iterable) else asked)]
     strange = [a for a in chosen if a not in names]
     if strange:
-        raise ArgumentError(f"{module.name}: events {', '.join(strange)} asked for; there are {', '.join(names) or 'none'}; "
+        raise ArgumentError(f"{module.name}: events {', '.join(name[:LENGTH] for name in strange[:8])} asked for; there are "
+                            f"{', '.join(names) or 'none'}; "
                             "add one to the system with add_event")
     return np.array([n in chosen for n in names], dtype=bool)
 
 
-def rows_of(module: Module, happened: Sequence[tuple[int, float, np.ndarray]], n_x: int) -> dict[str, EventRows]:
+def rows_of(module: Module, happened: Sequence[Happened], n_x: int) -> dict[str, EventRows]:
     """Times and states by event."""
     rows = {}
     for k, event in enumerate(module.metadata.get(EVENTS, ())):
-        own = [(t, x) for index, t, x in happened if index == k]
-        states = np.array([x[:n_x] for _, x in own]).reshape(len(own), n_x)
-        rows[event["name"]] = EventRows(np.array([t for t, _ in own]), states)
+        own = [one for one in happened if one.event == k]
+        states = np.array([one.before[:n_x] for one in own]).reshape(len(own), n_x)
+        rows[event["name"]] = EventRows(np.array([one.t for one in own]), states)
     return rows
 
 
@@ -61,10 +83,14 @@ def ended(module: Module, k: int, t: float) -> str:
     return f"event {module.metadata[EVENTS][k]['name']} ended the motion at t = {t:.9g} s"
 
 
-def at_once(module: Module, k: int) -> str:
-    """What to say where a reset is followed by the same event at once, again and again."""
-    name = module.metadata[EVENTS][k]["name"]
-    return (f"{MOST_RESETS} events, {name} the last, with hardly any time between: its reset leads back to it, or the motion "
+def at_once(module: Module, happened: Sequence[Happened], near: float) -> str:
+    """What to say where resets are followed by the same event at once, again and again; near: such a time, s."""
+    last = happened[-1]
+    times = np.array([one.t for one in happened if module.metadata[EVENTS][one.event]["reset"]])
+    gaps = np.abs(np.diff(times)) <= near
+    n = 1 + int(np.argmin(gaps[::-1]) if not gaps.all() else len(gaps))
+    name = module.metadata[EVENTS][last.event]["name"]
+    return (f"{n} events, {name} the last, with hardly any time between: its reset leads back to it, or the motion "
             "comes to rest there; give it stop=True, or a reset that lets the quantity leave zero")
 
 
@@ -73,8 +99,18 @@ def not_known(module: Module, k: int) -> str:
     return f"event {module.metadata[EVENTS][k]['name']} cannot be evaluated: the result is not finite"
 
 
+def too_quick(module: Module, found: Sequence[tuple[int, float]]) -> str:
+    """What to warn of where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
+    if not found:
+        return ""
+    names = [f"{module.metadata[EVENTS][k]['name']} (from t = {t:.9g} s on)" for k, t in found]
+    return (f"{module.name}: zeros of events may be missed: {', '.join(names)} var{'y' if len(names) > 1 else 'ies'} so quickly "
+            f"within a step that {panels.MOST_DIVISIONS} divisions do not resolve it; give a max_step as short as its "
+            "shortest wave")
+
+
 class Locator:
-    """Looks for events in the steps of a run.
+    """Looks for events in the steps of a run: the algorithm is that of c/events.c.jinja.
 
     p        parameters; look: which events, (n_e,) of bool; given: inputs at (t, x)
     n_state  entries of x that are the mechanism's state; span: of the run, s
@@ -84,12 +120,20 @@ class Locator:
                  span: float) -> None:
         self.module, self.p, self.look, self.given, self.n_state = module, p, look, given, n_state
         self.records = module.metadata[EVENTS]
+        self.direction = np.array([record["direction"] for record in self.records])
+        self.resets = np.array([len(record["reset"]) > 0 for record in self.records])
         self.resolution = AT_ONCE * abs(span)
-        self.side, self.left = np.zeros(len(look)), np.zeros(len(look))
+        n_e = len(look)
+        self.side, self.left, self.now, self.leaving = np.zeros(n_e), np.zeros(n_e), np.zeros(n_e), np.zeros(n_e)
+        self.change = np.zeros(n_e)  # of the quantities in a small step before the latest event
+        self.kept = np.zeros(n_e, dtype=bool)  # whose side is known where the run goes on from another one
+        self.unresolved = np.zeros(n_e, dtype=bool)
         self.starts = np.cumsum([0, *[len(record["reset"]) for record in self.records]])
         self.latest, self.repeated = np.inf, 0  # of resets
         self.fired: list[int] = []  # the events of the latest time
-        self.happened: list[tuple[int, float, np.ndarray]] = []
+        self.happened: list[Happened] = []
+        self.too_quick: list[tuple[int, float]] = []  # quantities that vary too quickly, and from when on
+        self.size: Any = 0.0  # of the entries of the state over the latest step
         self.known = 0.0  # up to when the quantities are known
         self.apart = module.unit(EVENTS).evaluator(EVENTS)
         self.apart.set_params(p)
@@ -113,27 +157,67 @@ class Locator:
             raise EvaluationError(not_known(self.module, int(lost.argmax())))
         return values
 
-    def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float) -> None:
-        """Note on which side of zero every quantity is, or, at zero, which it goes to; step: a small one, with sign."""
-        value = self.values(t, x)
+    def carry(self, carried: Carried, step: float) -> None:
+        """Go on from another run; step: that of `begin`."""
+        vanished = np.isfinite(carried.rates)
+        self.fired = np.flatnonzero(vanished).tolist()
+        self.change = step * np.where(vanished, carried.rates, 0.0)
+        self.side, self.left = np.where(vanished, np.sign(self.change), carried.sides), carried.left
+        self.kept = ~vanished & (self.side != 0) & (not carried.reset)
+
+    def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float, after_reset: bool = False) -> None:
+        """At the start of the run and after a reset: note on which side of zero every quantity is, or, at zero, which it goes to
+        within a small step, with sign (0: that is not known yet).
+
+        Zero counts where a quantity goes on in the direction of its event, of what has just vanished only where its reset has
+        stopped it.
+        """
+        self.now = value = self.values(t, x)
         change = self.values(t + step, x + step * xd) - value
+        fired = np.isin(np.arange(len(value)), self.fired)
         # What has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it from there.
         left = 2 * np.abs(self.left) + np.abs(change)
-        at_zero = (value == 0) | (np.isin(np.arange(len(value)), self.fired) & (np.abs(value) <= left))
-        self.side = np.sign(np.where(at_zero, change, value))
+        self.size = np.abs(x)
+        at_zero = (np.abs(value) <= self._noise(t, x)) | (fired & (np.abs(value) <= left))
+        stopped = after_reset & self.resets & (np.abs(change) <= 1e-6 * np.abs(self.change))
+        leaving = np.where(fired, self.side * stopped, np.where(self.side != self.direction, self.direction, 0))
+        self.leaving = np.where(at_zero & ~self.kept, leaving, 0.0)
+        self.side = np.where(self.kept, self.side, np.sign(np.where(at_zero, change, value)))
+        self.kept[:] = False
         self.known = t
 
     def first(self, t_old: float, t_new: float, between: Between) -> float | None:
-        """The time of the first events in a step, which are noted; between(s): the state within it. None: there is none."""
-        left = t_old
-        for s in np.linspace(t_old, t_new, PARTS + 1)[1:]:
-            now = np.sign(self.values(s, between(s)))
-            passed = [int(k) for k in np.flatnonzero(self.look & (now != self.side) & (self.side != 0))
-                      if self.records[k]["direction"] in (0, -self.side[k])]
-            if passed:
-                return self._note({k: self._root(k, left, float(s), between) for k in passed}, t_old, between)
-            self.side = np.where(now != 0, now, self.side)
-            left = self.known = float(s)
+        """The time of the first events in a step, after `known`, which are noted; between(s): the state within it. None: there
+        is none."""
+        left, ends, divisions = self.known, [t_new], 0
+        self.size = np.maximum(np.abs(between(t_old)), np.abs(between(t_new)))
+        most = panels.FEW_DIVISIONS if self.unresolved.any() else panels.MOST_DIVISIONS
+        while ends:
+            right = ends[-1]
+            middle, width = 0.5 * (left + right), abs(right - left)
+            divisible = width > max(2 * self.resolution, 16 * np.finfo(float).eps * abs(right))
+            try:
+                samples, end = self._samples(left, right, between)
+            except EvaluationError:
+                if not divisible or width < panels.EVALUATED * abs(t_new - t_old):
+                    raise
+                ends.append(middle)
+                continue
+            wavy = self._undecided(samples, right, end) if divisible else None
+            if wavy is not None and divisions < most:
+                divisions += 1
+                ends.append(middle)
+                continue
+            if wavy is not None and not self.unresolved[wavy]:
+                self.unresolved[wavy] = True
+                self.too_quick.append((wavy, left))
+            roots = self._roots(left, right, samples, between)
+            if roots:
+                return self._note(roots, t_old, t_new, between)
+            now = samples[panels.N - 1]
+            self.side = np.where(now != 0, np.sign(now), self.side)
+            self.now, self.known, left = now, right, right
+            ends.pop()
         return None
 
     def after(self, t: float, x: np.ndarray) -> np.ndarray | None:
@@ -146,6 +230,51 @@ class Locator:
         for k in changed:
             state[self.records[k]["reset"]] = becomes[self.starts[k]:self.starts[k + 1]]
         return state
+
+    def goes_on(self, after: np.ndarray) -> None:
+        """Note the state after the resets of the latest events."""
+        n = len(self.fired)
+        self.happened[-n:] = [happened._replace(after=after) for happened in self.happened[-n:]]
+
+    def _samples(self, left: float, right: float, between: Between) -> tuple[np.ndarray, np.ndarray]:
+        """The quantities on a panel, (N + 1, n_e), see symdyn.panels, and the state at its end."""
+        times = left + panels.NODES * (right - left)
+        times[panels.N - 1] = right
+        states = [between(float(s)) for s in times[1:]]
+        inputs = [self.given(float(s), x[:self.n_state]) for s, x in zip(times[1:], states, strict=True)]
+        try:
+            values = self.module.evaluate(EVENTS, times[1:], np.array(states)[:, :self.n_state], self.p, np.array(inputs))
+        except EvaluationError:  # of one that is not looked for, perhaps
+            values = np.array([self.values(float(s), x) for s, x in zip(times[1:], states, strict=True)])
+        return np.vstack([self.now, values]), states[panels.N - 2]
+
+    def _noise(self, t: float, x: np.ndarray) -> np.ndarray:
+        """What the quantities change by with the rounding of t and of a state within the latest step."""
+        eps = np.finfo(float).eps
+        nearby = x + eps * panels.roundings(len(x)) * self.size
+        return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))
+
+    def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
+        """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
+        wavy = self.look & panels.undecided(samples)
+        if not wavy.any():
+            return None
+        try:
+            noise = self._noise(right, end)
+        except EvaluationError:
+            return int(wavy.argmax())
+        wavy &= panels.size(samples) > panels.NOISE * noise
+        return int(wavy.argmax()) if wavy.any() else None
+
+    def _roots(self, left: float, right: float, samples: np.ndarray, between: Between) -> dict[int, float]:
+        """Events on a panel on which every quantity is monotone or has no zero, with their times."""
+        now = np.sign(samples[panels.N - 1])
+        self.side = np.where(self.side == 0, now, self.side)
+        leaves = self.look & (self.side != 0) & (self.side == self.leaving)
+        self.leaving = np.where((self.side != 0) & ~leaves, 0.0, self.leaving)
+        passed = self.look & ~leaves & (self.side != 0) & (now != self.side) & np.isin(self.direction * self.side, (0, -1))
+        roots = {int(k): self._root(int(k), left, right, between) for k in np.flatnonzero(passed)}
+        return roots | {int(k): left for k in np.flatnonzero(leaves)}
 
     def _root(self, k: int, left: float, right: float, between: Between) -> float:
         """The zero of one quantity, which leaves its side between left and right."""
@@ -162,19 +291,27 @@ class Locator:
             a, b = (middle, b) if value(middle) > 0 else (a, middle)
         return float(brentq(value, a, b, xtol=max(4e-16 * abs(b), 1e-300), rtol=1e-15)) if value(b) < 0 else b
 
-    def _note(self, roots: dict[int, float], t_old: float, between: Between) -> float:
+    def _note(self, roots: dict[int, float], t_old: float, t_new: float, between: Between) -> float:
         t = min(roots.values(), key=lambda s: abs(s - t_old))
         before = between(t)
         self.left = self.values(t, before)
         self.known = t
-        self.fired = events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
-        self.happened += [(k, t, before) for k in events]
+        events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
+        # Again at once, although its reset sends it away from zero: it goes less far than is resolved.
+        no_time = abs(t - self.latest) <= self.resolution
+        fresh = [k for k in events if self.leaving[k] == 0 or self.leaving[k] != self.side[k]]
+        again = no_time and any(self.resets[k] for k in fresh if k in self.fired)
+        self.fired, self.now = events, self.left
+        self.side[fresh], self.leaving[events] = -self.side[fresh], 0.0
+        self.happened += [Happened(k, t, before, before) for k in events]
         if any(self.records[k]["reset"] for k in events):
             near = abs(t - self.latest) <= CHATTER / AT_ONCE * self.resolution
-            self.repeated, self.latest = self.repeated + 1 if near else 1, t
+            self.repeated, self.latest = MOST_RESETS if again else self.repeated + 1 if near else 1, t
+            earlier = t - min(1e-6 * abs(t_new - t_old), abs(t - t_old)) * np.sign(t_new - t_old)
+            self.change = self.left - self.values(earlier, between(earlier))
         stopping = [k for k in events if self.records[k]["stop"]]
         if stopping:
             self.over = ended(self.module, stopping[0], t)
         elif self.repeated >= MOST_RESETS:
-            self.failed = at_once(self.module, events[0])
+            self.failed = at_once(self.module, self.happened, CHATTER / AT_ONCE * self.resolution)
         return t

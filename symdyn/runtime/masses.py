@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -31,6 +32,6 @@ def negative_masses(module: Module, params: np.ndarray) -> dict[int, str]:
     for name, column in zip(module.metadata["parameters"], params.T, strict=True):
         if name in masses:
             for k in np.flatnonzero(column < 0).tolist():
-                found.setdefault(k, f"{module.name}: the parameter {name}, the mass of body {masses[name]!r}, is "
+                found.setdefault(k, f"{module.name}: the parameter {name}, the mass of body {shown(masses[name])}, is "
                                     f"{column[k]:g} kg; pass a number that is not below zero")
     return found

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.outcome import Request
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-DEFAULT = "dop853"
+DEFAULT, SERIES = "dop853", "taylor"
 # What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
 SMALLEST_RTOL = 1e-15
 
@@ -23,7 +24,7 @@ class CompiledMethod:
 
     needs    functions that the module must have
     unfit    why it does not take a module or a request, with what to use instead; empty if it does
-    kinked   what tolerances are multiplied by where inputs have kinks, which its estimate of errors underrates
+    kinked   what tolerances are multiplied by where functions of inputs may have kinks, which its estimate of errors underrates
     """
 
     name: str
@@ -50,22 +51,27 @@ def _switching(module: Module, so: str) -> str:
 
 def _not_expanded(module: Module, request: Request) -> str:
     """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
-    if request.inputs.function is not None or request.inputs.table is not None:
+    if request.inputs.function is not None or request.inputs.pieces is not None:
         return f"inputs that vary have no Taylor series; use method='{DEFAULT}', or write them as expressions of the time t"
     return _switching(module, "and has no Taylor series there")
 
 
 def _not_collocated(module: Module, request: Request) -> str:
-    """Constant steps do not end at kinks; inputs by functions may be smooth, those by tables are linear between rows."""
+    """Constant steps do not end at kinks and see few of them; tables have kinks at their times, functions are smooth if they are
+    declared to be."""
     if request.inputs.has_kinks:
         return (f"inputs by a table have a kink at each of its times, which constant steps go across; use method='{DEFAULT}', "
-                "a smooth function of t and x, or expressions of the time t")
+                "a smooth function of t and x, sd.Smooth(function), or expressions of the time t")
+    if request.inputs.may_have_kinks:
+        return (f"an input by a function may jump or have kinks, which constant steps go across; use method='{DEFAULT}', 'bs54', "
+                "'radau' or 'radau5', whose steps get shorter there, or declare a function that is smooth along the motion: "
+                "sd.Smooth(function)")
     return _constrained(module, request) or _switching(module, "where it may have kinks, which constant steps go across")
 
 
 COMPILED = {m.name: m for m in (
     CompiledMethod("dop853"), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
-    CompiledMethod("taylor", unfit=_not_expanded),
+    CompiledMethod(SERIES, unfit=_not_expanded),
     # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
     CompiledMethod("radau", ("jacobian_x",), kinked=0.01), CompiledMethod("radau5", ("jacobian_x",), kinked=0.01),
 )}
@@ -73,7 +79,7 @@ COMPILED = {m.name: m for m in (
 
 def with_own_tolerances(request: Request, method: str) -> Request:
     """The request with the tolerances that a compiled method needs for its inputs."""
-    part = COMPILED[method].kinked if request.inputs.has_kinks else 1.0
+    part = COMPILED[method].kinked if request.inputs.may_have_kinks else 1.0
     return request if part == 1.0 else replace(request, rtol=max(part * request.rtol, SMALLEST_RTOL), atol=part * request.atol)
 
 
@@ -96,10 +102,10 @@ def check_compiled(module: Module, request: Request, method: str) -> None:
     """Raises ArgumentError where a compiled method does not fit, with the reason and what to use instead."""
     if module.backend != "c":
         instead = "'Radau'" if method.startswith("radau") else "'DOP853'"
-        raise ArgumentError(f"{module.name}: the compiled integrator {method!r} needs the C backend; this module "
+        raise ArgumentError(f"{module.name}: the compiled integrator {shown(method)} needs the C backend; this module "
                             f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
     record = COMPILED[method]
     missing = [n for n in record.needs if n not in module.metadata.get("functions", record.needs)]
     why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)
     if why:
-        raise ArgumentError(f"{module.name}: method {method!r} does not fit: {why}")
+        raise ArgumentError(f"{module.name}: method {shown(method)} does not fit: {why}")

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn.counting import counted
 from symdyn.errors import ArgumentError
-from symdyn.runtime.arguments import take
+from symdyn.kinds import text
+from symdyn.real_numbers import DOUBLE, number_of, real_of
+from symdyn.runtime.arguments import fixed, take
+from symdyn.runtime.calls import Call, ordered
+from symdyn.runtime.paths import as_path, writing
+from symdyn.runtime.sampled import Sampled
+from symdyn.runtime.tables import Table
 from symdyn.runtime.unit import Evaluator, Unit
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.runtime.actuation import Actuation
     from symdyn.runtime.batch_solution import BatchSolution
+    from symdyn.runtime.labelled import Labelled
     from symdyn.runtime.solution import Solution
     from symdyn.runtime.statics.campbell import Campbell
     from symdyn.runtime.statics.equilibria import Equilibria
@@ -25,6 +36,14 @@ if TYPE_CHECKING:
     from symdyn.runtime.statics.stability import Stability
 
 Provider = Callable[[str], Unit]
+Numbers = Sequence[float] | np.ndarray
+# In order, or by name or symbol.
+Values = Sequence[float] | np.ndarray | Mapping[Any, Any]
+# Numbers; tables over time, as pairs of times and values or as Table; functions of (t, x); controllers whose values are held; or
+# mappings from names to these.
+InputValues = Values | Table | tuple[Any, Any] | Callable[[float, np.ndarray], Any] | Sampled
+# Times that the generated code takes as they are.
+_TIMES = (float, np.float64)
 
 
 class Jacobian(NamedTuple):
@@ -56,32 +75,31 @@ class Module:
         self._units: dict[str, Unit] = {}
         self._writer = writer
         self._reporter = reporter
-        self._local = threading.local()
+        self._local, self._notes = threading.local(), threading.local()
         self._lock = threading.Lock()
-        self._n_x: int = metadata["sizes"]["x"]
         self._n_in: int = metadata["sizes"]["inputs"]
+        self._one, self._free = (metadata["sizes"]["x"],), (self._n_in,)
         self._defaults = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
 
     # -- evaluation
 
     def rhs(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> np.ndarray:
-        """x_dot (n_x,) at time t and state x = [q; u; z]; inputs that are left out take their initial values, as everywhere."""
+        """x_dot (n_x,) at time t and state x = [q; u; z].
+
+        params, inputs   in order, or by name or symbol; inputs that are left out take their initial values, as everywhere
+        """
         try:
             evaluator, seen, mark = self._local.rhs
         except AttributeError:
             evaluator, seen, mark = self._ready("rhs", params)
         if params is not seen or _mark(params) != mark:
             evaluator, seen, mark = self._ready("rhs", params)
-        try:
-            if len(x) == self._n_x != 1 and len(inputs) == self._n_in:
-                if self._n_in == 0:
-                    return evaluator.one(t, x)
-                if self._n_in > 1:
-                    return evaluator.one(t, x, inputs)
-                if isinstance(inputs, (list, tuple)) or inputs.ndim == 1:  # one number, not one row
-                    return evaluator.one(t, x, inputs)
-        except (TypeError, ValueError):  # rows of states or of times, or no numbers at all
-            return self.evaluate("rhs", t, x, params, inputs)
+        # One state of doubles at a finite time needs no further look; text, complex and masked numbers take the other way.
+        if type(x) is np.ndarray and x.dtype is DOUBLE and x.shape == self._one and _is_time(t):
+            if self._n_in == 0 and not len(inputs):
+                return evaluator.one(t, x)
+            if type(inputs) is np.ndarray and inputs.dtype is DOUBLE and inputs.shape == self._free:
+                return evaluator.one(t, x, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
 
     def rhs_batch(self, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
@@ -108,16 +126,14 @@ class Module:
 
     def evaluate(self, name: str, t: Any, x: Any, params: Any = None, inputs: Any = (), ud: Any = ()) -> np.ndarray:
         """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
+        text(name, f"{self.name}: the name of a function", "mass_matrix")
         evaluator = self._evaluator(name, params)
         state = self._rows(x, "x", "x")
         free = self._rows(inputs, "inputs", "inputs")
         acceleration = self._rows(ud, "ud", "ud", self._unit(name).metadata)
-        try:
-            times = np.asarray(t, dtype=float)
-        except (TypeError, ValueError):
-            times = np.array(np.nan)
-        if not np.isfinite(times).all():
-            raise ArgumentError(f"{self.name}: t must be a finite time, or one for each state, found {t!r}")
+        times = real_of(t, self.name, "t must be a finite time, or one for each state")
+        if times.ndim > 1 or not np.isfinite(times).all():
+            raise ArgumentError(f"{self.name}: t must be a finite time, or one for each state, found {shown(t)}")
         if max(state.ndim, free.ndim, acceleration.ndim, times.ndim + 1) == 1:
             return evaluator.one(float(times), state, free, acceleration)
         rows = [np.atleast_1d(times), *[np.atleast_2d(a) for a in (state, free, acceleration)]]
@@ -127,30 +143,110 @@ class Module:
                                 "or the same number")
         return evaluator.many(*rows)
 
-    def mass_matrix(self, q: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
-        """M_tilde (n_u, n_u)."""
-        return self.evaluate("mass_matrix", t, self._state(q), params)
+    def mass_matrix(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+        """M_tilde (n_u, n_u): mass_matrix(t, x, params), where coordinates alone do for x, or mass_matrix(q, params, t=0).
 
-    def k_tilde(self, q: Any, u: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
-        """k_tilde (n_u,): Coriolis, centrifugal and gyroscopic terms."""
-        return self.evaluate("k_tilde", t, self._state(q, u), params)
+        The two orders of arguments, by time and state as for `rhs`, or by parts of the state, hold for k_tilde, F_tilde, J,
+        energy and inverse_dynamics, too; every argument can be named. Raises ArgumentError where what is given fits both.
+        """
+        call = ordered(self, "mass_matrix", at, {"x": x, "q": q, "params": params, "t": t}, ("q", "params", "t"))
+        return self._called("mass_matrix", call)
 
-    def F_tilde(self, q: Any, u: Any, params: Any = None, t: float = 0.0, inputs: Any = ()) -> np.ndarray:
-        """F_tilde (n_u,): generalized forces of all loads and gravity."""
-        return self.evaluate("F_tilde", t, self._state(q, u), params, inputs)
+    def k_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+        """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0)."""
+        call = ordered(self, "k_tilde", at, {"x": x, "q": q, "u": u, "params": params, "t": t}, ("q", "u", "params", "t"))
+        return self._called("k_tilde", call)
 
-    def J(self, q: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
-        """J (6 n_b, n_u), planar (3 n_b, n_u): [v_G; omega] of every body = J u, n-frame."""
-        return self.evaluate("J", t, self._state(q), params)
+    def F_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
+                inputs: Any = None) -> np.ndarray:
+        """F_tilde (n_u,), generalized forces of all loads and gravity: F_tilde(t, x, params, inputs) or
+        F_tilde(q, u, params, t=0, inputs=())."""
+        named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "F_tilde", at, named, ("q", "u", "params", "t", "inputs"))
+        return self._called("F_tilde", call)
 
-    def energy(self, q: Any, u: Any, params: Any = None, t: float = 0.0) -> np.ndarray:
-        """Kinetic and potential energy (2,), J."""
-        return self.evaluate("energy", t, self._state(q, u), params)
+    def J(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+        """J (6 n_b, n_u), planar (3 n_b, n_u), with [v_G; omega] of every body = J u, n-frame: J(t, x, params) or
+        J(q, params, t=0)."""
+        call = ordered(self, "J", at, {"x": x, "q": q, "params": params, "t": t}, ("q", "params", "t"))
+        return self._called("J", call)
 
-    def inverse_dynamics(self, q: Any, u: Any, ud: Any, params: Any = None, t: float = 0.0,
-                         inputs: Any = ()) -> np.ndarray:
-        """tau (n_u,) = M_tilde u_dot + k_tilde - F_tilde: what must be added for the accelerations ud."""
-        return self.evaluate("inverse_dynamics", t, self._state(q, u), params, inputs, ud)
+    def energy(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+        """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0)."""
+        call = ordered(self, "energy", at, {"x": x, "q": q, "u": u, "params": params, "t": t}, ("q", "u", "params", "t"))
+        return self._called("energy", call)
+
+    def inverse_dynamics(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, ud: Any = None, params: Any = None,
+                         t: Any = None, inputs: Any = None, lam: Any = None) -> np.ndarray:
+        """tau (n_u,) = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, what must be added along the speeds for the accelerations
+        ud, N or N m: inverse_dynamics(t, x, ud, params, inputs) or inverse_dynamics(q, u, ud, params, t=0, inputs=()).
+
+        lam   multipliers of the constraints (n_c,), or rows of them, in order or by the name of the constraint; with zeros the
+              loops are cut and tau is that of the tree alone
+        Raises ArgumentError where there are constraints and no lam: tau depends on how they share the forces. The inputs that
+        make a motion of a mechanism with loops, with its multipliers, are those of `actuation`.
+        """
+        named = {"x": x, "q": q, "u": u, "ud": ud, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "inverse_dynamics", at, named, ("q", "u", "ud", "params", "t", "inputs"))
+        constraints = self.metadata.get("constraints", ())
+        if not constraints:
+            if lam is not None and np.size(lam):
+                raise ArgumentError(f"{self.name}: multipliers lam were given, but there are no constraints; leave them out")
+            return self._called("inverse_dynamics", call)
+        if lam is None:
+            raise ArgumentError(f"{self.name}: inverse dynamics asked for, but the forces along the speeds depend on the "
+                                f"multipliers of the constraints {', '.join(constraints)}; pass lam={{...}} (zeros: those of the "
+                                "tree with its loops cut), or take module.actuation(t, q, u, ud), which finds the inputs that "
+                                "make the motion")
+        if self.metadata.get("implicit_loads"):
+            raise ArgumentError(f"{self.name}: inverse dynamics requested with multipliers, but the loads "
+                                f"{', '.join(self.metadata['implicit_loads'])} depend on accelerations, multipliers or reactions "
+                                "of the motion under these loads; pass them as inputs to ask for what other values need")
+        held = take(lam, constraints, "lam", dict.fromkeys(constraints, 0.0), self.name) if np.ndim(lam) < 2 else \
+            np.asarray(lam, dtype=float)
+        tau = self._called("inverse_dynamics", call)
+        return tau + np.einsum("...ij,...i->...j", self._called("C_r", call._replace(ud=None, inputs=None)), held)
+
+    def _called(self, name: str, call: Call) -> np.ndarray:
+        whole = call.x is not None and (isinstance(call.x, Mapping) or np.shape(call.x)[-1:] == self._one)
+        state = call.x if whole else self._state(call.q if call.x is None else call.x, call.u)
+        return self.evaluate(name, 0.0 if call.t is None else call.t, state, call.params,
+                             () if call.inputs is None else call.inputs, () if call.ud is None else call.ud)
+
+    def actuation(self, t: float, q: Any, u: Any, ud: Any, params: Any = None, inputs: Any = None, *, z: Any = None,
+                  start: Any = None, project: bool = False, keep: Sequence[Any] = ()) -> Actuation:
+        """The inputs that make a motion, with the multipliers of its constraints: inverse dynamics by the inputs.
+
+        q, u, ud   coordinates (n_q,), speeds (n_u,) and their rates (n_u,), in order, or by name or symbol (ud by the names of
+                   the speeds); what is left out takes the system's initial value, accelerations 0. They must fulfil the
+                   constraints, to 1e-6 of the mechanism's length, of its speed and of its accelerations
+        inputs     those that are kept, by name or symbol; all others are found
+        z          extra states (n_z,), default: their initial values
+        start      where the search begins for inputs that enter nonlinearly, by name or symbol; default: their initial values
+        project    move q, u and ud onto the constraints first, by the smallest change in the metric of the mass matrix
+        keep       coordinates and speeds, by name or symbol, that stay then, with the rates of these speeds: those of a platform,
+                   whose legs follow
+
+        The inputs are unique where as many as freedoms work independently; more of them are those of least norm, each counted
+        in its own unit; where there are fewer, the motion must be one that the mechanism can make with them. Inputs that enter
+        nonlinearly are found by Newton's method with the exact derivative, near `start` if there are several solutions.
+        Raises ArgumentError for a motion that violates the constraints, or that the inputs cannot make, with the direction in
+        coordinates and the force that is missing; where no solution is found; and where more inputs than freedoms enter
+        nonlinearly, by name. See symdyn.runtime.actuation.Actuation for the result, and for the source.
+        """
+        from symdyn.runtime.actuation import actuation
+
+        return actuation(self, t, q, u, ud, params, inputs, z, start, project, keep)
+
+    def input_matrix(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> Labelled:
+        """Exact derivative of the generalized forces F_tilde by the inputs, (n_u, n_in), at the state x = [q; u; z], in order or
+        by name; with the names of speeds and inputs, by which it is indexed, too.
+
+        inputs   where they enter nonlinearly the matrix depends on them; default: their initial values
+        """
+        from symdyn.runtime.actuation import input_matrix
+
+        return input_matrix(self, t, x, params, inputs)
 
     def outputs(self, t: Any, x: Any, params: Any = None, inputs: Any = ()) -> dict[str, np.ndarray]:
         """The user's named outputs."""
@@ -162,15 +258,18 @@ class Module:
 
         With Euler parameters the derivatives by the state hold along changes that keep their norm.
         """
-        unknown = [w for w in wrt if w not in Jacobian._fields]
+        if not isinstance(wrt, (list, tuple)):
+            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of x, inputs and params")
+        unknown = [w for w in wrt if not isinstance(w, str) or w not in Jacobian._fields]
         if unknown:
-            raise ArgumentError(f"{self.name}: jacobian by {', '.join(unknown)} asked for; there are x, inputs and params")
+            raise ArgumentError(f"{self.name}: jacobian by {', '.join(map(name_of, unknown))} asked for; there are x, inputs and "
+                                "params")
         return Jacobian(*[self.evaluate(f"jacobian_{w}", t, x, params, inputs) if w in wrt else None
                           for w in Jacobian._fields])
 
     def function(self, name: str) -> Callable[..., np.ndarray]:
         """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states."""
-        self._unit(name)
+        self._unit(text(name, f"{self.name}: the name of a function", "mass_matrix"))
 
         def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = (),
                  ud: Any = ()) -> np.ndarray:
@@ -179,7 +278,7 @@ class Module:
         return call
 
     def bind(self, params: Any = None) -> BoundModule:
-        """The module with fixed parameters: the prologue runs here and not again."""
+        """The module with these parameters, whatever becomes of `params` later: the prologue runs here and not again."""
         return BoundModule(self, self.parameters(params))
 
     def parameters(self, params: Any = None) -> np.ndarray:
@@ -188,8 +287,8 @@ class Module:
 
     @functools.cached_property
     def default_parameters(self) -> np.ndarray:
-        """Their defaults, (n_p,). Raises ArgumentError for those without one."""
-        return self.parameters()
+        """Their defaults, (n_p,), not to be written to: change a copy of them. Raises ArgumentError for those without one."""
+        return fixed(self.parameters())
 
     # -- constraints
 
@@ -200,8 +299,10 @@ class Module:
         q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. Of several
                 solutions (branches) the guess decides
         keep    coordinates and speeds, by name or symbol, that stay as given
-        The change is the smallest in the metric of the mass matrix, as that of the projection in `simulate`. Raises
-        ArgumentError with the residual of every constraint that is left where there is no solution nearby.
+        The change is the smallest in the metric of the mass matrix, as that of the projection in `simulate`: the speeds are
+        those after an impact, without rebound, of a mechanism whose constraints begin to hold, exact to rounding also with
+        redundant constraints; along motions that move no mass the smallest velocities are added. Raises ArgumentError with
+        the residual of every constraint that is left where there is no solution nearby.
         """
         from symdyn.runtime.consistent import consistent
 
@@ -224,50 +325,134 @@ class Module:
 
     # -- motion
 
-    def simulate(self, t: Any = None, q: Any = None, u: Any = None, params: Any = None, **options: Any) -> Solution:
-        """Integrate the motion; see symdyn.runtime.simulate.simulate for all options."""
+    def simulate(self, t: Numbers | None = None, q: Values | None = None, u: Values | None = None,
+                 params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None,
+                 rtol: float = 1e-8, atol: float | Numbers | None = None, method: str | type | None = None,
+                 steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
+                 progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
+                 events: bool | str | Sequence[str] = True, interpolation: str = "linear",
+                 extend: str = "error") -> Solution:
+        """Integrate the motion.
+
+        t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
+                    output times; default: from 0 over the system's duration
+        q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
+        params      as everywhere in Module
+        inputs      numbers; a table: (times, values), or a symdyn.Table; a function of (t, x); sd.Sampled(function, period) for a
+                    controller whose value is held between its instants, at which steps end; or a mapping from names to these
+        interpolation, extend   of tables that are pairs: "linear" or "cubic", a smooth spline (steps end at the times of both);
+                    beyond the first and the last time "error", or "hold": the first value, and the last one
+        rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol
+        method      compiled: one of symdyn.runtime.methods.COMPILED: "dop853" (default with the C backend), "bs54" for loose
+                    tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very
+                    long conservative motion (with first_step its steps have that length, but for some that a warning counts); or
+                    one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
+                    Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an
+                    implicit method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and
+                    constraints; `Solution.why` gives the reason
+        max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
+        progress    show a bar (needs tqdm), which also reports what is derived and compiled at the first use of a method
+        work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
+        stabilization   what keeps constraints, and the norm of Euler parameters, to rounding or within the tolerances:
+                    "projection": after every step, and at every output time, the smallest change in the metric of the mass
+                    matrix that fulfils them; "baumgarte", or ("baumgarte", a): C_ddot + 2 a C_dot + a^2 C = 0 instead of
+                    C_ddot = 0, unless given with a = 1/(twenty mean steps of a short run without); "none".
+                    Default: projection, with methods that build on several steps (BDF, LSODA) baumgarte
+        events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
+
+        Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
+        and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
+        see symdyn.runtime.chatter. Of steps that are far too short, and of events whose zeros may be missed, a SimulationWarning
+        is given and kept in the Solution's `doubts`. What a function of the user raises ends a run like that, and is its `cause`.
+        Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
+        Raises ArgumentError for values that do not fit.
+        """
         from symdyn.runtime.simulate import simulate
 
-        return simulate(self, t, q, u, params, **options)
+        return simulate(self, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method, steps=steps,
+                        max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
+                        stabilization=stabilization, events=events, interpolation=interpolation, extend=extend)
 
-    def simulate_batch(self, q: Any = None, u: Any = None, params: Any = None, **options: Any) -> BatchSolution:
-        """Integrate many motions; see symdyn.runtime.batch_run.simulate_batch for all options."""
+    def simulate_batch(self, q: Values | Numbers | None = None, u: Values | Numbers | None = None,
+                       params: Values | Numbers | None = None, *, z: Values | Numbers | None = None, t: Numbers | None = None,
+                       inputs: InputValues | None = None, rtol: float = 1e-8, atol: float | Numbers | None = None,
+                       max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
+                       max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
+                       events: bool | str | Sequence[str] = True, interpolation: str = "linear",
+                       extend: str = "error") -> BatchSolution:
+        """Integrate many motions of one mechanism, each with its own steps.
+
+        q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
+                    left out takes the system's initial value, else 0
+        params      (n_p,), (n, n_p), or by name or symbol, each a number or an array (n,)
+        inputs      constants, in the same ways; or what `simulate` takes, the same for all, with interpolation and extend (a
+                    sampled controller is asked in one motion after the other)
+        t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
+        rtol, atol, max_step, first_step   as for `simulate`
+        method, max_steps, stabilization, events   as for `simulate`, too; with others than the default they run one by one
+
+        With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
+        `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters
+        or events, inputs that vary over time, other methods and options, and the NumPy backend run one by one through
+        `simulate`; `note`
+        of the solution says so.
+
+        A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
+        raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions
+        loads leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
+        ArgumentError for what does not fit.
+        """
         from symdyn.runtime.batch_run import simulate_batch
 
-        return simulate_batch(self, q, u, params, **options)
+        return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
+                              first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
+                              events=events, interpolation=interpolation, extend=extend)
 
     # -- statics and linearization
 
     def equilibrium(self, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None, t: float = 0.0,
                     inputs: Any = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibrium:
-        """A state of rest, or of steady motion with given speeds, near a start: Newton's method with exact derivatives.
+        """A state of rest, or of steady motion with prescribed speeds, near a start: Newton's method with exact derivatives.
 
         free      coordinates that are found, by name or symbol; the others stay at the start. Default: all. Parameters and
                   inputs among them are found, too: each takes one value in `fixed` as its condition, whose equation then
                   holds (a coordinate that is named in both where it is not clear which)
         fixed     coordinates, speeds and extra states with the numbers they have; forces along them may be anything. The
                   coordinate of a speed that is given stays at its start (the azimuth of a rotor that spins steadily)
-        start     by name or symbol, in order (q, or x), or an Equilibrium; default: the system's initial values, speeds zero
+        start     by name or symbol, in order (q, or x), or an Equilibrium; default: the system's initial values, speeds zero.
+                  Inputs and parameters that are solved for may be named, too: guesses of them
         unknown_params   parameters that are found, in place of naming them in `free`; which values in `fixed` are their
-                  conditions is then told by their effect
+                  conditions is then decided by their effect
+
+        Inputs that hold a state (trim) are named in `free`, and the coordinates that they hold in `fixed`, one for each:
+        module.equilibrium(free=["tau1", "tau2"], fixed={"q1": 0.5, "q2": 0.3}).solved are the torques that hold an arm there.
+        Inputs that make a motion, of which rest is one, are those of `actuation`, which also takes more inputs than freedoms.
 
         Constraints are fulfilled at the same time. Raises NoEquilibrium with the forces that are left,
-        EquilibriumNotUnique with the direction that has no stiffness, ArgumentError for what does not fit.
+        EquilibriumNotUnique with the direction that has no stiffness, or none beyond rounding, ArgumentError for what does not
+        fit.
         """
         from symdyn.runtime.statics.equilibrium import equilibrium
 
         return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
 
-    def equilibria(self, starts: Any = 100, ranges: Any = None, seed: int = 0, **options: Any) -> Equilibria:
-        """Equilibria from many starts, told apart and named; see symdyn.runtime.statics.equilibria.equilibria.
+    def equilibria(self, starts: int | Sequence[Any] = 100, ranges: Mapping[Any, Any] | None = None, seed: int = 0,
+                   start: Any = None, free: Any = None, fixed: Any = None, params: Values | None = None, t: float = 0.0,
+                   inputs: Values | None = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibria:
+        """Equilibria from many starts.
 
-        starts    how many random ones, or the starts themselves, each as for `equilibrium`
-        ranges    coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`
-        options   of `equilibrium`
+        starts   how many random ones, or the starts themselves, each as for Module.equilibrium
+        ranges   coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`; a speed stands
+                 for the motion along it (rotations in Euler parameters: about that axis). Default: half a turn, 1 m
+        seed     of the random numbers, a whole number of at least 0
+        start, free, fixed, params, t, inputs, unknown_params, max_iterations   as for Module.equilibrium
+        Two are the same if coordinates differ by less than 1e-6, angles of joints that turn
+        all the way by whole turns, Euler parameters by their sign. A start that leads to none is listed in `failures`; raises
+        NoEquilibrium with the first message if none of them leads anywhere.
         """
         from symdyn.runtime.statics.equilibria import equilibria
 
-        return equilibria(self, starts, ranges, seed, **options)
+        return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
     def linearize(self, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
                   fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
@@ -294,7 +479,8 @@ class Module:
                  it is found first
         fixed    speeds (and coordinates) that are held at a value, such as {"azimuth_dot": 1.2}; the period is then 2 pi over it
         hold     what is held when disturbed, by name; default: what `fixed` names, or the equilibrium kept
-        period   of a prescribed periodic motion, s: needed where t appears in the equations
+        period   of a prescribed periodic motion, s: needed where t appears in the equations; a guess where neither t nor held
+                 speeds set the time, such as for a limit cycle, whose period is found with its state
         start    in place of `at`: a guess of the state, by name or in order
 
         Constant equations are judged by their eigenvalues, those that a change of variables makes constant (a rotor of three or
@@ -305,11 +491,31 @@ class Module:
 
         return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
 
-    def campbell(self, speed: Any, values: Any, **options: Any) -> Campbell:
-        """Natural frequencies over a rotor's speed; see symdyn.runtime.statics.campbell.campbell for all options."""
+    def campbell(self, speed: Any, values: float | Numbers, free: Any = None, fixed: Any = None, start: Any = None,
+                 params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
+                 blades: Sequence[Sequence[Any]] = (), azimuth: Any = None, azimuths: int = 12, max_iterations: int = 100,
+                 frame: str = "fixed", averaged: bool = False) -> Campbell:
+        """Natural frequencies over a rotor's speed.
+
+        speed      name or symbol; values: rad/s. At each the equilibrium with this speed is found, then its modes
+        free, fixed, start, params, t, inputs, max_iterations   as for Module.equilibrium
+        blades     sets of coordinates of the blades of a rotor, one set per shape: the same coordinate of every blade, in the
+                   order in which blades lie ahead of each other in the sense of the azimuth, such as
+                   [("flap1", "flap2", "flap3")]: modes are named by multi-blade coordinates. That these make the equations
+                   constant is checked at `azimuths` positions; where they do not (weight on the blades), the periodic motion
+                   is found and judged by Floquet theory
+        averaged   with blades: the mean of the equations over the azimuths in place of Floquet theory where they are periodic,
+                   which is quicker and leaves out what is periodic; how much the entries vary is printed
+        azimuth    the coordinate whose rate the speed is, where the names do not say it
+        frame      "fixed": frequencies that the fixed frame sees; "rotating": those in the coordinates of the model, where the
+                   equations are constant in them
+        Without blades a change of variables that makes the equations constant is looked for; where there is none (two blades, an
+        anisotropic rotor on anisotropic bearings), Floquet theory gives the modes. Raises NoEquilibrium, ArgumentError.
+        """
         from symdyn.runtime.statics.campbell import campbell
 
-        return campbell(self, speed, values, **options)
+        return campbell(self, speed, values, free, fixed, start, params, t, inputs, blades, azimuth, azimuths, max_iterations,
+                        frame, averaged)
 
     # -- about the module
 
@@ -326,7 +532,9 @@ class Module:
         """Write the generated files, complete with header, example and reference vectors; returns their paths."""
         if self._writer is None:
             raise ArgumentError(f"{self.name} was loaded from files; copy them, or compile the equations it came from")
-        return self._writer(Path(folder))
+        target = as_path(folder, "of the folder to write to", "generated/arm")
+        with writing(target):
+            return self._writer(target)
 
     def split_outputs(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """The user's outputs by name from the rows of the function `outputs`."""
@@ -353,13 +561,31 @@ class Module:
 
     def _unit(self, name: str) -> Unit:
         if name not in self._units:
-            with self._lock:  # the derivation behind it is for one thread at a time
-                if name not in self._units:
-                    unit = self._units[name] = self._provider(name)
-                    if name in unit.metadata["shapes"]:  # not in variations of rhs, where "rhs" means something else
-                        for other in unit.metadata["shapes"]:
-                            self._units.setdefault(other, unit)
+            note: Callable[[str], None] = getattr(self._notes, "take", lambda name: None)
+            note(name)
+            try:
+                self._make(name)
+            finally:
+                note("")
         return self._units[name]
+
+    def _make(self, name: str) -> None:
+        with self._lock:  # the derivation behind it is for one thread at a time
+            if name not in self._units:
+                unit = self._units[name] = self._provider(name)
+                if name in unit.metadata["shapes"]:  # not in variations of rhs, where "rhs" means something else
+                    for other in unit.metadata["shapes"]:
+                        self._units.setdefault(other, unit)
+
+    @contextlib.contextmanager
+    def noting(self, note: Callable[[str], None]) -> Iterator[None]:
+        """Have a function called whenever this thread makes a function of the module, which may take long: with its name at the
+        beginning, and with "" at the end."""
+        self._notes.take = note
+        try:
+            yield
+        finally:
+            del self._notes.take
 
     def _evaluator(self, name: str, params: Any) -> Evaluator:
         return self._ready(name, params)[0]
@@ -402,10 +628,7 @@ class Module:
         initial = self.metadata.get("initial", {}) if what != "ud" else {}
         if isinstance(values, Mapping):
             return take(values, names, what, {n: initial.get(n, 0.0) for n in names}, self.name)
-        try:
-            array = np.asarray(values if values is not None else "", dtype=float)
-        except (TypeError, ValueError):
-            raise ArgumentError(f"{self.name}: {what} must be numbers, found {values!r}") from None
+        array = real_of(values, self.name, f"{what} must be numbers")
         if array.ndim == 0 and wanted == 1:
             array = array.reshape(1)
         if array.shape == (0,) and what != "x":
@@ -417,7 +640,8 @@ class Module:
 
     def __repr__(self) -> str:
         sizes = self.metadata["sizes"]
-        return f"<Module {self.name}: {self.backend}, {sizes['q']} coordinates, {sizes['u']} speeds, {sizes['p']} parameters>"
+        what = ", ".join(counted(sizes[group], one) for group, one in (("q", "coordinate"), ("u", "speed"), ("p", "parameter")))
+        return f"<Module {self.name}: {self.backend}, {what}>"
 
 
 class BoundModule:
@@ -425,9 +649,9 @@ class BoundModule:
 
     def __init__(self, module: Module, p: np.ndarray) -> None:
         self.module = module
-        self.params = p
-        self._n_x: int = module.metadata["sizes"]["x"]
+        self.params = fixed(p)
         self._n_in: int = module.metadata["sizes"]["inputs"]
+        self._one, self._free = (module.metadata["sizes"]["x"],), (self._n_in,)
         initial = module.metadata.get("initial", {})
         self._inputs = np.array([initial.get(n, 0.0) for n in module.metadata["inputs"]], dtype=float)
         self._local = threading.local()
@@ -435,27 +659,31 @@ class BoundModule:
 
     def rhs(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
         """x_dot (n_x,) at time t and state x = [q; u; z]."""
-        try:
-            evaluator = self._local.rhs
-        except AttributeError:
-            evaluator = self._ready("rhs")
-        if len(x) == self._n_x and len(inputs) == self._n_in:
-            return evaluator.one(t, x, inputs) if self._n_in else evaluator.one(t, x)
-        return evaluator.one(t, x, self._zeros(x, inputs))
+        return self._one_state(getattr(self._local, "rhs", None) or self._ready("rhs"), t, x, inputs)
 
     def jacobian_x(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
         """d x_dot / d x (n_x, n_x)."""
-        evaluator = getattr(self._local, "jacobian_x", None) or self._ready("jacobian_x")
-        if len(x) == self._n_x and len(inputs) == self._n_in:
-            return evaluator.one(t, x, inputs) if self._n_in else evaluator.one(t, x)
-        return evaluator.one(t, x, self._zeros(x, inputs))
+        return self._one_state(getattr(self._local, "jacobian_x", None) or self._ready("jacobian_x"), t, x, inputs)
 
-    def _zeros(self, x: Any, inputs: Any) -> np.ndarray:
-        """Inputs that were left out: their initial values in the system, else 0."""
-        if len(x) != self._n_x or len(inputs):
-            raise ArgumentError(f"{self.module.name}: x has {len(x)} entries and inputs has {len(inputs)}, needed are "
-                                f"{self._n_x} and {self._n_in}")
-        return self._inputs
+    def _one_state(self, evaluator: Any, t: float, x: Any, inputs: Any) -> np.ndarray:
+        """A function at one state. Inputs that are left out take their initial values in the system, else 0."""
+        if type(x) is np.ndarray and x.dtype is DOUBLE and x.shape == self._one and _is_time(t):
+            if self._n_in == 0 and not len(inputs):
+                return evaluator.one(t, x)  # type: ignore[no-any-return]
+            if type(inputs) is np.ndarray and inputs.dtype is DOUBLE and inputs.shape == self._free:
+                return evaluator.one(t, x, inputs)  # type: ignore[no-any-return]
+        owner = self.module.name
+        if isinstance(inputs, Mapping):
+            names = self.module.metadata["inputs"]
+            inputs = take(inputs, names, "inputs", dict(zip(names, self._inputs.tolist(), strict=True)), owner)
+        state, free = real_of(x, owner, "x must be numbers"), real_of(inputs, owner, "inputs must be numbers")
+        time = number_of(t, owner, "t must be a finite time")
+        if state.shape != self._one or free.shape not in (self._free, (0,)):
+            raise ArgumentError(f"{owner}: x has the shape {state.shape} and inputs has {free.shape}, needed are "
+                                f"{self._one[0]} and {self._free[0]} numbers of one state; rows of states go to the module")
+        if not np.isfinite(time):
+            raise ArgumentError(f"{owner}: t must be a finite time, found {shown(t)}")
+        return evaluator.one(time, state, free if free.size else self._inputs)  # type: ignore[no-any-return]
 
     def _ready(self, name: str) -> Any:
         evaluator = self.module.unit(name).evaluator(name)
@@ -464,12 +692,29 @@ class BoundModule:
         return evaluator
 
 
+def _is_time(t: Any) -> bool:
+    """Whether t is a finite double."""
+    return type(t) in _TIMES and t - t == 0
+
+
 def _mark(params: Any) -> Any:
-    """What tells that parameters were changed in place."""
+    """What shows that parameters were changed in place: their numbers, also of what holds a number that may change."""
     if params is None:
         return None
-    if isinstance(params, np.ndarray):
+    if type(params) is np.ndarray and not params.dtype.hasobject:
         return params.tobytes()
     if isinstance(params, Mapping):
-        return tuple(params.items())
-    return tuple(params) if hasattr(params, "__iter__") else params
+        return tuple(params), [_number(value) for value in params.values()]
+    return [_number(value) for value in params] if getattr(params, "ndim", 1) and hasattr(params, "__iter__") else _number(params)
+
+
+def _number(value: Any) -> Any:
+    """A value, or the number that it holds now, such as that of an array without dimensions."""
+    if type(value) is float or type(value) is int or isinstance(value, (str, bytes, complex, np.complexfloating)):
+        return value
+    if isinstance(value, np.ndarray) and (np.ma.isMaskedArray(value) or value.dtype.kind not in "fiu"):
+        return value
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):  # no number: what takes the parameters over reports it
+        return value

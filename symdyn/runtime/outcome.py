@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from symdyn.runtime.events import Carried, Happened
 from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.sampled import Record
 from symdyn.runtime.stabilization import Corrections, Stabilization
 
 
@@ -18,6 +20,7 @@ class Request:
     n_state   entries of x0 that are the mechanism's state; one more may be the work of the loads
     look      which of the module's events are looked for, (n_e,) of bool; None: the module has none
     stabilization   what keeps the state on its constraints
+    carried   of events, where the run goes on from the end of another one
     """
 
     span: tuple[float, float]
@@ -33,6 +36,7 @@ class Request:
     n_state: int
     stabilization: Stabilization = field(default_factory=Stabilization)
     look: np.ndarray | None = None
+    carried: Carried | None = None
 
     @property
     def field_p(self) -> np.ndarray:
@@ -48,9 +52,12 @@ class Request:
 class Outcome:
     """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
 
-    happened   events in order: which, when, the state (n_x,) just before
-    doubt      what to warn of in a run that went on
+    happened   events in order, see runtime.events
+    doubts     what to warn of in a run that went on; warned: what was warned of on the way
     cause      what a function of the user raised, if that ended the run
+    no_series  why the right-hand side, which can be evaluated, has no Taylor series where the run stopped, if that ended it
+    next_step  length of the step that would be tried next, s; 0: not known
+    record     inputs as controllers held them; None: without controllers
     """
 
     t: np.ndarray
@@ -63,8 +70,12 @@ class Outcome:
     n_evaluations: int
     seconds: float | None = None
     corrections: Corrections = field(default_factory=Corrections)
-    happened: Sequence[tuple[int, float, np.ndarray]] = ()
+    happened: Sequence[Happened] = ()
     n_jacobians: int = 0
     n_factorizations: int = 0
-    doubt: str = ""
+    doubts: Sequence[str] = ()
+    warned: Sequence[str] = ()
     cause: BaseException | None = None
+    no_series: str = ""
+    next_step: float = 0.0
+    record: Record | None = None

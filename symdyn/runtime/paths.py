@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError
+from symdyn.shown import shown
+
+# Bytes of a name that file systems take.
+LONGEST = 255
 
 
 def as_path(path: Any, what: str, example: str) -> Path:
     """A path given as text or path-like; what, example: of the message. Raises ArgumentError for anything else."""
-    if not isinstance(path, (str, os.PathLike)) or isinstance(os.fspath(path), bytes) or "\0" in os.fspath(path):
-        raise ArgumentError(f"the path {what} is {path!r}; pass text or a Path, such as {example!r}")
+    try:
+        text = os.fspath(path)
+        fits = isinstance(text, str) and "\0" not in text and all(len(os.fsencode(p)) <= LONGEST for p in Path(text).parts)
+    except (TypeError, UnicodeError):
+        fits = False
+    if not fits:
+        raise ArgumentError(f"the path {what} is {shown(path)}; pass text or a Path, such as {example!r}, with names of "
+                            f"{LONGEST} bytes at most")
     return Path(path)
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """What the disk raises while a file or folder is written becomes an ArgumentError with the reason."""
+    try:
+        yield
+    except OSError as error:
+        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}; pass another path, or free some "
+                            "space") from error

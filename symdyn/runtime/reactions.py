@@ -3,47 +3,56 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.constraints import names, undetermined
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
 
 
-def reactions(solution: Solution) -> dict[str, np.ndarray]:
-    """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6)."""
+def reactions(solution: Solution, function: str = "reactions") -> dict[str, np.ndarray]:
+    """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6).
+
+    function   "reactions" or "cut_loads"
+    """
     names = list(solution.module.metadata.get("reactions", ()))
-    if not names or "reactions" not in solution.module.functions:
+    if not names or function not in solution.module.functions:
         return {}
-    rows = solution.rows("reactions")
+    rows = solution.rows(function)
     return {name: rows[:, k] for k, name in enumerate(names)}
 
 
-def reaction(solution: Solution, joint: Any, frame: str = "ground") -> np.ndarray:
-    """One joint's force and moment, (n_t, 6), in the axes of the n-frame, of its parent, its child, or a body by name."""
+def in_frame(solution: Solution, of_joints: Mapping[str, np.ndarray], joint: Any, frame: Any) -> np.ndarray:
+    """One joint's force and moment, (n_t, 6), in the axes of the n-frame, the ground, its parent, its child, or a body."""
     metadata = solution.module.metadata
-    name = str(getattr(joint, "name", joint))
+    name = name_of(joint)
     known = list(metadata.get("reactions", ()))
     if name not in known:
         near = difflib.get_close_matches(name, known, 3)
         there = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known) or 'none'}"
-        raise ArgumentError(f"{solution.module.name}: no reaction of a joint {name!r} is known; {there}")
-    values = solution.reactions[name]
-    frame = str(getattr(frame, "name", frame))
+        raise ArgumentError(f"{solution.module.name}: no reaction of a joint {shown(name)} is known; {there}")
+    values = of_joints[name]
+    frame = name_of(frame)
     ends = dict(zip(known, metadata.get("reaction_bodies", ()), strict=False))
     if frame in ("parent", "child") and name in ends:
         frame = ends[name][0 if frame == "parent" else 1]
     bodies = list(metadata.get("bodies", ()))
-    if frame == "ground":
+    still = "ground_rotation" not in solution.module.functions
+    if frame == "inertial" or (frame == "ground" and still):
         return values
-    if frame not in bodies:
-        raise ArgumentError(f"{solution.module.name}: there is no frame {frame!r}; there are ground, parent, child, "
-                            f"{', '.join(bodies)}")
-    R = solution.frames[:, bodies.index(frame), 3:].reshape(-1, 3, 3)
+    if frame == "ground":
+        R = solution.rows("ground_rotation")
+    elif frame in bodies:
+        R = solution.frames[:, bodies.index(frame), 3:].reshape(-1, 3, 3)
+    else:
+        raise ArgumentError(f"{solution.module.name}: there is no frame {shown(frame)}; there are inertial, ground, parent, "
+                            f"child, {', '.join(bodies)}")
     turned: np.ndarray = np.einsum("tji,tkj->tki", R, values.reshape(-1, 2, 3)).reshape(-1, 6)
     return turned
 

@@ -1,7 +1,8 @@
 """Keeps what was generated for mechanisms of the catalogue, so that the next run needs neither derivation nor SymPy.
 
-A record is a JSON file in the cache folder: the metadata of a module, and for every function that was used the source
-and the metadata of its unit. It holds as long as no file of symdyn changes; what it lacks is derived and added.
+A record is a file in the cache folder, a digest and JSON: the metadata of a module, and for every function that was used the
+source and the metadata of its unit. It holds as long as it is undamaged and no file of symdyn changes; what it lacks is derived
+and added.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 import sys
 from collections.abc import Mapping
 from functools import cached_property
@@ -20,6 +20,7 @@ import symdyn
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler, find_compiler, no_compiler_reason, require_compiler
 from symdyn.runtime.module import Module
+from symdyn.runtime.stored import read_sealed, write_sealed
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 
 
@@ -73,14 +74,13 @@ class _Memory:
                 return CUnit(source, metadata, self.compiler)
             return PythonUnit.from_source(source, metadata["name"])
         unit: Any = self.derived.unit(function)
-        source = unit.source if isinstance(unit, CUnit) else Path(unit.module.__file__).read_text(encoding="utf-8")
-        units[function] = {"source": source, "metadata": dict(unit.metadata)}
+        units[function] = {"source": unit.source, "metadata": dict(unit.metadata)}
         self._write()
         return unit
 
     def _read(self) -> dict[str, Any] | None:
         try:
-            record = json.loads(self.path.read_text(encoding="utf-8"))
+            record = json.loads(read_sealed(self.path) or b"")
             found = record["state"] == self.state and isinstance(record["units"], dict) and record["metadata"]["name"]
         except (OSError, ValueError, KeyError, TypeError):
             return None
@@ -88,10 +88,8 @@ class _Memory:
 
     def _write(self) -> None:
         """Whoever reads sees a whole record; if the disk is full there is none, and the next run derives again."""
-        scratch = self.path.with_suffix(f".{os.getpid()}.tmp")
         with contextlib.suppress(OSError):
-            scratch.write_text(json.dumps(self.record), encoding="utf-8")
-            os.replace(scratch, self.path)
+            write_sealed(self.path, json.dumps(self.record).encode())
 
 
 def _state_of_symdyn() -> str:

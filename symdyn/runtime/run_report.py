@@ -49,7 +49,8 @@ def page(solution: Solution) -> str:
 def _told(energy: run_tables.Energy | None) -> dict[str, Any] | None:
     if energy is None:
         return None
-    return {"work": run_tables.number(energy.work), "change": run_tables.number(energy.change),
+    resets = "".join(f", resets of {name} {run_tables.number(value)} J" for name, value in energy.resets.items())
+    return {"work": run_tables.number(energy.work), "resets": resets, "change": run_tables.number(energy.change),
             "difference": f"{energy.difference:.3g}", "relative": f"{energy.relative:.2g}", "doubtful": energy.doubtful,
             "of": "its energy: it rests" if energy.rests else "the larger of kinetic energy and range of potential energy"}
 

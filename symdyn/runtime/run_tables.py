@@ -20,11 +20,12 @@ DOUBTFUL = 1e-6
 
 @dataclass(frozen=True)
 class Energy:
-    """The balance of a run, J: work of the loads (input less dissipation), change of energy, the largest difference of the two on
-    the way, and this relative to the larger of kinetic energy and range of potential energy, of a mechanism at rest to its
-    energy; rows over time: work, change."""
+    """The balance of a run, J: work of the loads (input less dissipation), what resets of events added by event, change of
+    energy, the largest difference of what was added and the change on the way; this relative to the larger of kinetic energy
+    and range of potential energy, of a mechanism at rest to its energy; rows over time: work and resets, change."""
 
     work: float
+    resets: dict[str, float]
     change: float
     difference: float
     relative: float
@@ -140,10 +141,11 @@ def energy(solution: Solution) -> Energy | None:
     known = solution.has_work or solution.module.metadata["conservative"]
     if not known or "energy" not in solution.module.functions or not len(solution.t):
         return None
-    change = solution.energy - solution.energy[0]
-    difference = float(np.abs(change - solution.work).max())
-    return Energy(float(solution.work[-1]), float(change[-1]), difference, solution.energy_error(), solution.energy_scale[1],
-                  np.column_stack([solution.work, change]))
+    balance = solution.energy_balance
+    change, error = balance["change"], balance["error"]
+    resets = {name: float(rows[-1]) for name, rows in solution.reset_energy.items()}
+    return Energy(float(solution.work[-1]), resets, float(change[-1]), float(np.abs(error).max()), solution.energy_error(),
+                  solution.energy_scale[1], np.column_stack([change - error, change]))
 
 
 def constraints(solution: Solution) -> list[dict[str, str]]:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import difflib
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.events import Locator
+from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
+from symdyn.runtime.chatter import STEPS_OF_SCIPY, chatter_of
+from symdyn.runtime.events import Locator, too_quick
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
+from symdyn.runtime.short_steps import TRIED_OF_SCIPY, ShortSteps
 from symdyn.runtime.stabilization import Corrections, ProjectionFailed, Projector, Watch
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -32,13 +37,17 @@ def solver_class_of(module: Module, method: Any) -> Any:
             alike = difflib.get_close_matches(method.lower(), [name.lower() for name in known], 3)
             near = [name for name in known if name.lower() in alike]
             hint = f", did you mean {' or '.join(near)}? There are" if near else "; there are"
-            raise ArgumentError(f"{module.name}: there is no method {method!r}{hint} {', '.join(COMPILED)} (compiled), "
+            raise ArgumentError(f"{module.name}: there is no method {shown(method)}{hint} {', '.join(COMPILED)} (compiled), "
                                 f"{', '.join(_SCIPY)} (SciPy), auto (chooses one of them), ggl (with constraints), or pass an "
                                 "OdeSolver class")
-        return getattr(integrate, method)
+        method = getattr(integrate, method)
+    if method is integrate.Radau:
+        from symdyn.runtime.scipy_radau import RadauWithin
+
+        return RadauWithin
     if isinstance(method, type) and issubclass(method, integrate.OdeSolver):
         return method
-    raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {method!r}")
+    raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {shown(method)}")
 
 
 def takes_changed_states(solver_class: Any) -> bool:
@@ -113,7 +122,7 @@ class Run:
     """One run of a solver, with what is stored of it; solver_class: of SciPy, or called like these."""
 
     def __init__(self, module: Module, request: Request, solver_class: Any, field_name: str) -> None:
-        self.module, self.request, self.solver_class = module, request, solver_class
+        self.module, self.request, self.solver_class, self.field_name = module, request, solver_class, field_name
         self.metadata = module.unit(field_name).metadata
         self.field = Field(module, request, field_name)
         self.options = self._options()
@@ -124,12 +133,17 @@ class Run:
         if request.look is not None and request.look.any():
             span = request.span[1] - request.span[0]
             self.locator = Locator(module, request.p, request.look, self.field.given, request.n_state, span)
+        self.chatter = chatter_of(module, request)
+        self.short = None if request.inputs.has_kinks else ShortSteps(module, request, self._trial, TRIED_OF_SCIPY)
+        self.warned: list[str] = []
         self.here, self.state = request.span[0], request.x0
         self.ts, self.xs = [self.here], [self.state]
         self.pending = list(request.times[1:]) if request.times is not None else []
         self.accepted, self.spent, self.message, self.over = 0, (0, 0, 0, 0), "", False
         self.cause: BaseException | None = None  # as in Outcome
         self.raised: InputRaised | None = None
+        self.stops = list(request.inputs.stops(request.span))  # kinks of the inputs, at which steps end
+        self.proposed = 0.0  # length of the step to be tried next, were there no kink
         self.solver: Any = None
         self.dense: Any = None
 
@@ -144,7 +158,7 @@ class Run:
         if request.first_step and span:  # as in C: no longer than the run, no shorter than can matter in it
             options["first_step"] = min(max(request.first_step, float(np.finfo(float).eps) ** 2 * span), span)
         exact = request.stabilization.way != "baumgarte" and "jacobian_x" in self.module.functions
-        if self.solver_class in (integrate.Radau, integrate.BDF, integrate.LSODA) and exact:
+        if issubclass(self.solver_class, (integrate.Radau, integrate.BDF, integrate.LSODA)) and exact:
             options["jac"] = self.field.jacobian
         return options
 
@@ -154,14 +168,43 @@ class Run:
             self.xs[0] = self.state = self.projector(t0, self.request.x0)
         if not np.isfinite(self.field(t0, self.state)).all():  # SciPy would look for a first step for ever
             raise EvaluationError(self.field.trouble[-1]) from self.field.cause
-        self.solver = self.solver_class(self.field, t0, self.state, t_end, **self.options)
+        self.solver = self.solver_class(self.field, t0, self.state, self._bound(), **self._with_first_step(
+            self.options.get("first_step", 0.0)))
         if self.locator is not None:
-            self.locator.begin(t0, self.state, self.field(t0, self.state), 1e-9 * (t_end - t0))
+            step = 1e-9 * (t_end - t0)
+            if self.request.carried is not None:
+                self.locator.carry(self.request.carried, step)
+            self.locator.begin(t0, self.state, self.field(t0, self.state), step, after_reset=self.request.carried is not None)
+
+    def _bound(self) -> float:
+        """The kink of the inputs ahead, or the end of the run."""
+        t_end = self.request.span[1]
+        while self.stops and (self.stops[0] - self.here) * (t_end - self.here) <= 0:
+            self.stops.pop(0)
+        return float(self.stops[0]) if self.stops else t_end
+
+    def _with_first_step(self, length: float) -> dict[str, Any]:
+        """Options of a solver that begins here with a step of this length, 0: chosen."""
+        later = {k: v for k, v in self.options.items() if k != "first_step"}
+        return {**later, "first_step": min(length, abs(self._bound() - self.here))} if length else later
+
+    def _go_on_after_kink(self) -> None:
+        """By a new solver, as one of several steps builds on states before the kink."""
+        self.spent = self._used()
+        options = self._with_first_step(self._next_length)
+        self.solver = self.solver_class(self.field, self.here, self.state, self._bound(), **options)
+
+    @property
+    def _next_length(self) -> float:
+        """Of the step to be tried by a new solver after a kink, s; 0: chosen, as one of several steps begins by short ones."""
+        return self.proposed if takes_changed_states(self.solver_class) else 0.0
 
     def step(self) -> None:
         """One step, its events and outputs; a message if it is the last one."""
         solver, begun, start = self.solver, float(self.solver.t), self.state
+        before = getattr(solver, "h_abs", 0.0)
         note = solver.step()
+        self.proposed = max(before, getattr(solver, "h_abs", 0.0))
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             self.message = self._why_failed(note)
             return
@@ -180,8 +223,22 @@ class Run:
             self._go_on(cut)
         if not self.message and self.watch is not None and self.watch(self.here, self.state):
             self.message = self.watch(self.here, self.state) + self.dependent()
+        if not self.message and self.solver.status == "finished" and self.here != self.request.span[1]:
+            self._go_on_after_kink()
+        if not self.message and self.chatter is not None and self.accepted % STEPS_OF_SCIPY == 0:
+            self.message = self.chatter(self.here, self.state, self.accepted)
+        if not self.message and self.short is not None and self.accepted % TRIED_OF_SCIPY == 0:
+            warning = self.short(self.here, self.state, self.accepted)
+            if warning:
+                self.warned.append(warning)
+                warnings.warn(warning, SimulationWarning, stacklevel=7)  # now: such a run may take very long
         if not self.message and self.accepted == self.request.max_steps and self.solver.status == "running":
             self.message = f"stopped after {self.accepted} steps, as asked"
+
+    def _trial(self, t: float, x: np.ndarray, step: float, n: int) -> Outcome:
+        request = replace(self.request, span=(t, self.request.span[1]), times=None, x0=x.copy(), first_step=step, max_steps=n,
+                          look=None)
+        return type(self)(self.module, request, self.solver_class, self.field_name).through(None)
 
     def _why_failed(self, note: str | None) -> str:
         if self.field.trouble:
@@ -189,6 +246,7 @@ class Run:
         elif note:
             state = self.state[:self.request.n_state]
             why = note.rstrip(".") + nearly_singular(self.module, self.here, state, self.request.p)
+            why += self.chatter.of_small_steps(self.here, self.state) if self.chatter is not None else ""
         else:
             why = "the state is not finite"
         return why + self.dependent()
@@ -218,19 +276,17 @@ class Run:
         """Look for events in the latest step, from the state `start` at `begun`: where it ends early, if it does."""
         locator, solver = self.locator, self.solver
         assert locator is not None
-        left = begun
         try:
-            while (at := locator.first(left, float(solver.t), self.between)) is not None:
+            while (at := locator.first(begun, float(solver.t), self.between)) is not None:
                 x = self.between(at)
                 after = locator.after(at, x)
                 if after is not None:  # onto the constraints, whatever keeps the steps there
                     after = Projector(self.module, self.request.p)(at, after)
+                    locator.goes_on(after)
                 if after is not None or locator.over or locator.failed:
                     return _Cut(at, x, None if locator.over or locator.failed else after)
-                locator.begin(at, x, self.field(at, x), solver.direction * 1e-6 * solver.step_size)
                 if at == solver.t:
                     return None
-                left = at
         except (EvaluationError, ProjectionFailed) as error:
             locator.failed, self.cause = str(error).removeprefix(f"{self.module.name}: "), error.__cause__
             trusted = locator.known
@@ -239,7 +295,8 @@ class Run:
 
     def _store(self) -> None:
         """The latest step, or the output times that it has passed."""
-        if self.request.times is None and not (self.locator and self.locator.failed):
+        there = self.here == self.ts[-1]  # an event at the start of the step cuts it to nothing
+        if self.request.times is None and not there and not (self.locator and self.locator.failed):
             self.ts.append(self.here)
             self.xs.append(self.state)
         while self.pending and (self.pending[0] - self.here) * self.solver.direction <= 0:
@@ -261,9 +318,8 @@ class Run:
             return
         step = solver.direction * 1e-6 * solver.step_size
         self.spent = self._used()
-        later = {k: v for k, v in self.options.items() if k != "first_step"}
-        self.solver = self.solver_class(self.field, self.here, self.state, t_end, **later)
-        locator.begin(self.here, self.state, self.field(self.here, self.state), step)
+        self.solver = self.solver_class(self.field, self.here, self.state, self._bound(), **self._with_first_step(0.0))
+        locator.begin(self.here, self.state, self.field(self.here, self.state), step, after_reset=True)
 
     @property
     def running(self) -> bool:
@@ -281,10 +337,12 @@ class Run:
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
         rejected, evaluations, jacobians, factorizations = self._used()
+        doubts = [too_quick(self.module, self.locator.too_quick) if self.locator is not None else ""]
         return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, rejected, evaluations,
                        corrections=self.projector.corrections if self.projector is not None else Corrections(),
                        happened=self.locator.happened if self.locator is not None else (),
-                       n_jacobians=jacobians, n_factorizations=factorizations, cause=self.cause)
+                       n_jacobians=jacobians, n_factorizations=factorizations, doubts=tuple(filter(None, doubts)),
+                       warned=self.warned, cause=self.cause, next_step=self._next_length)
 
     def _used(self) -> tuple[int, int, int, int]:
         """Rejected steps where the solver counts them, evaluations, Jacobians and factorizations, of all solvers so far."""

@@ -2,34 +2,45 @@
 
 from __future__ import annotations
 
+import contextlib
 import time as clock
 import warnings
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning
+from symdyn.errors import ArgumentError, EvaluationError, SimulationInterrupted, SimulationWarning
+from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
+from symdyn.real_numbers import length_of, number, number_of, real, real_of
 from symdyn.runtime.arguments import take
 from symdyn.runtime.automatic import automatic
 from symdyn.runtime.charts import CHARTS, warn_near_lock
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.events import wanted
+from symdyn.runtime.handover import run_series
+from symdyn.runtime.held_run import run_held
 from symdyn.runtime.inputs import take_inputs
 from symdyn.runtime.masses import real_parameters
-from symdyn.runtime.methods import DEFAULT, SMALLEST_RTOL, check_compiled, is_compiled
+from symdyn.runtime.memory import demand
+from symdyn.runtime.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
 from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.sampled import check_span
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
 from symdyn.runtime.stabilization import Projector, Stabilization, choose, chosen_gain
 from symdyn.runtime.watches import WATCHES, warn
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 N_POINTS = 1001
+# What a long integer of C holds on every platform.
+MOST_STEPS = 2**31 - 1
 # With more, steps whose error is of the size of the motion itself pass: a double pendulum gained energy without end in 10 s from
 # 0.2 on (RK45) or 0.3 on (dop853, bs54), while at 0.1 it was wrong by a sixth at most with the compiled methods.
 LARGEST_RTOL = 0.1
@@ -40,94 +51,95 @@ TRIAL_STEPS = 100
 def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None,
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
-             progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True) -> Solution:
-    """Integrate the motion.
-
-    t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
-                output times; default: from 0 over the system's duration
-    q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
-    params      as everywhere in Module
-    inputs      numbers, (times, values), a function of (t, x), or a mapping from names to these
-    rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol
-    method      compiled: one of symdyn.runtime.methods.COMPILED: "dop853" (default with the C backend), "bs54" for loose
-                tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very
-                long conservative motion (with first_step its steps have that length, but for some that a warning counts); or one
-                of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
-                Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an implicit
-                method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and constraints;
-                `Solution.why` tells
-    max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
-    progress    show a bar (needs tqdm)
-    work        integrate the work of all loads but gravity and springs along with the motion: `Solution.work`
-    stabilization   what keeps constraints, and the norm of Euler parameters, to rounding or within the tolerances:
-                "projection": after every step, and at every output time, the smallest change in the metric of the mass
-                matrix that fulfils them; "baumgarte", or ("baumgarte", a): C_ddot + 2 a C_dot + a^2 C = 0 instead of
-                C_ddot = 0, unless given with a = 1/(twenty mean steps of a short run without); "none".
-                Default: projection, with methods that build on several steps (BDF, LSODA) baumgarte
-    events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
-
-    Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` tells when, where
-    and why, and a SimulationWarning is given. What a function of the user raises ends a run like that, and is its `cause`.
-    Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
-    Raises ArgumentError for values that do not fit.
-    """
+             progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
+             interpolation: str = "linear", extend: str = "error") -> Solution:
+    """See Module.simulate."""
     metadata = module.metadata
     p = real_parameters(module, params)
     start = _start(module, q, u, z)
-    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name)
+    steps, progress, work = (flag(v, f"{module.name}: {what}")
+                             for v, what in ((steps, "steps"), (progress, "progress"), (work, "work")))
+    method = checked_method(module, method)
     times, span, every = checked_times(module, t, steps)
-    if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and max_steps > 0)):
-        raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, or None, found {max_steps!r}")
+    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name, span, interpolation, extend)
+    check_span(free.samplers, span, module.name)
+    if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and 0 < max_steps <= MOST_STEPS)):
+        raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, {MOST_STEPS} at most, or None, "
+                            f"found {shown(max_steps)}")
     request = Request(span, None if every else times, start, p, free, *checked_tolerances(module, rtol, atol),
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
                       max_steps, len(start), look=wanted(module, events))
     if work and "power" not in metadata["functions"]:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
-    check_start(module, span[0], start, p)
-    why = ""
-    if isinstance(method, str) and method == "auto":
-        method, why = automatic(module, replace(request, look=None if request.look is None else np.zeros_like(request.look)),
-                                lambda asked, name: _trial(module, asked, name))
-    if is_compiled(method):
-        check_compiled(module, request, method)
-    if method == "ggl":
-        from symdyn.runtime.dae_run import check_ggl
-
-        check_ggl(module, start, p, span[0], stabilization, work)
-    else:
-        request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
-        if request.stabilization.way == "baumgarte":
-            request = replace(request, x0=Projector(module, p)(span[0], start))
     bar = _bar(module, span) if progress else None
-    begun = clock.perf_counter()
-    try:
-        outcome = _run(module, request.with_work() if work else request, method, bar)
-    finally:
+    with contextlib.ExitStack() as stack:
         if bar is not None:
-            bar.close()
-    solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
-                        work, (request.rtol, float(request.atol.max(initial=0.0))), why)
-    if outcome.interrupted:
-        raise SimulationInterrupted(solution, outcome.message)
-    if not outcome.success:
-        warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
-    if outcome.doubt:
-        warnings.warn(outcome.doubt, SimulationWarning, stacklevel=3)
-    if metadata.get(WATCHES) and len(solution.t):
-        warn(module, solution.rows(WATCHES), "in this motion", 3)
-    if metadata.get(CHARTS):
-        warn_near_lock(module, request, solution.t, solution.x, lambda part: _run(module, part, method), 3)
-    return solution
+            stack.callback(bar.close)
+            stack.enter_context(module.noting(lambda name: bar.set_description(_underway(module, name))))
+        check_start(module, span[0], start, p)
+        why = ""
+        if isinstance(method, str) and method == "auto":
+            blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())
+            method, why = automatic(module, blind, lambda asked, name: _trial(module, asked, name))
+        if is_compiled(method):
+            check_compiled(module, request, method)
+        if method == "ggl":
+            from symdyn.runtime.dae_run import check_ggl
+
+            check_ggl(module, start, p, span[0], stabilization, work)
+        else:
+            request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
+            if request.stabilization.way == "baumgarte":
+                request = replace(request, x0=Projector(module, p)(span[0], start))
+        begun = clock.perf_counter()
+        outcome = _run(module, request.with_work() if work else request, method, bar)
+        free = free.recorded(outcome.record)
+        solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
+                            work, (request.rtol, float(request.atol.max(initial=0.0))), why,
+                            partial(_repeated, module, replace(request.with_work() if work else request, inputs=free), method))
+        if outcome.interrupted:
+            raise SimulationInterrupted(solution, outcome.message)
+        if not outcome.success:
+            warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
+        for doubt in outcome.doubts:
+            warnings.warn(doubt, SimulationWarning, stacklevel=3)
+        if metadata.get(WATCHES) and len(solution.t):
+            warn(module, solution.rows(WATCHES), "in this motion", 3)
+        if metadata.get(CHARTS):
+            warn_near_lock(module, replace(request, inputs=free), solution.t, solution.x,
+                           lambda part: _run(module, part, method), 3)
+        return solution
 
 
 def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
+    if request.inputs.are_held:
+        return run_held(module, request, lambda part: _run(module, part, method, bar), method)
     if method == "ggl":
         from symdyn.runtime.dae_run import run_ggl
 
         return run_ggl(module, request, bar)
     field = "rhs" + "_work" * (len(request.x0) > request.n_state) + "_baumgarte" * (request.stabilization.way == "baumgarte")
-    return (run_compiled if is_compiled(method) else run_scipy)(module, request, method, bar, field)
+    run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
+    return run(module, request, method, bar, field)
+
+
+def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) -> np.ndarray:
+    """States of a motion at times (n_t,) that increase, (n_t, n_x), by the same steps.
+
+    Raises EvaluationError where the run does not get as far again, as with inputs that depend on more than t and x.
+    """
+    begin, end = request.span
+    ahead = times if end >= begin else times[::-1]
+    whole = ahead if len(ahead) and ahead[0] == begin else np.append(begin, ahead)
+    outcome = _run(module, replace(request, times=np.ascontiguousarray(whole)), method)
+    if outcome.interrupted:
+        raise KeyboardInterrupt
+    if not np.array_equal(outcome.t[:len(whole)], whole):
+        raise EvaluationError(f"{module.name}: the motion does not come as far as before when it is repeated: "
+                              f"{outcome.message}")
+    rows = outcome.x[len(whole) - len(ahead):len(whole)]
+    return rows if end >= begin else rows[::-1]
 
 
 def _stabilization(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
@@ -139,7 +151,7 @@ def _stabilization(module: Module, request: Request, method: Any, asked: Any) ->
     if chosen.gain:
         return chosen
 
-    short = replace(request, times=None, max_steps=TRIAL_STEPS)
+    short = replace(request, times=None, max_steps=TRIAL_STEPS, inputs=request.inputs.held())
     return replace(chosen, gain=chosen_gain(lambda: _trial(module, short, method, "none").t, request.span))
 
 
@@ -160,16 +172,27 @@ def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
     return normalised(module, np.concatenate(parts))
 
 
+def checked_method(module: Module, method: Any) -> Any:
+    """A method by name, or a class of SciPy's; what the names are is checked with the backend. None: the default's."""
+    if method is None or (isinstance(method, str) and method) or isinstance(method, type):
+        return method
+    raise ArgumentError(f"{module.name}: method must be a name or an OdeSolver class, found {shown(method)}; pass 'dop853' or "
+                        "another "
+                        "name, or a class derived from SciPy's")
+
+
 def checked_times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Output times, span, whether every step is stored."""
     if t is None:
         t = (0.0, module.metadata["duration"])
-    try:
-        times = np.ascontiguousarray(t, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of times, found {t!r}") from None
-    if times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
-        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of at least two finite times, found {t!r}")
+    # The times, what they are compared by, and the states at them.
+    n, n_x = length_of(t), module.metadata["sizes"]["x"]
+    if n is not None:
+        demand(n * (n_x + 3), module.name, f"a solution with {n} output times and {n_x} numbers at each",
+               "pass fewer times, or (start, end)")
+    times = np.array(real_of(t, module.name, "t must be (start, end) or an array of times"), order="C")  # kept: a copy
+    if np.ndim(t) != 1 or len(times) < 2 or not np.isfinite(times).all():
+        raise ArgumentError(f"{module.name}: t must be (start, end) or an array of at least two finite times, found {shown(t)}")
     direction = np.sign(times[-1] - times[0])
     if isinstance(t, (tuple, list)) and len(t) == 2:
         return np.linspace(times[0], times[1], N_POINTS), (times[0], times[1]), steps
@@ -182,10 +205,10 @@ def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.
     n = module.metadata["sizes"]["x"]
     absolute = rtol if atol is None else atol
     try:
-        relative, vector = float(rtol), np.ascontiguousarray(np.broadcast_to(np.asarray(absolute, dtype=float), (n,)))
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{module.name}: rtol must be a number and atol a number or {n} numbers, found rtol = {rtol!r}, "
-                            f"atol = {atol!r}") from None
+        relative, vector = number(rtol), np.array(np.broadcast_to(real(absolute), (n,)), order="C")
+    except ValueError as error:
+        raise ArgumentError(f"{module.name}: rtol must be a number and atol a number or {n} numbers, found rtol = {shown(rtol)}, "
+                            f"atol = {shown(atol)}: {error}") from None
     if not (relative >= 0 and (vector >= 0).all() and np.isfinite(vector).all() and (relative > 0 or (vector > 0).all())):
         raise ArgumentError(f"{module.name}: tolerances must be positive, found rtol = {rtol}, atol = {atol}")
     if relative > LARGEST_RTOL:
@@ -199,9 +222,17 @@ def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.
 
 
 def checked_positive(module: Module, value: Any, what: str) -> float:
-    if not (isinstance(value, (int, float, np.number)) and value >= 0):
-        raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {value!r}")
-    return 0.0 if not np.isfinite(value) else float(value)
+    seconds = number_of(value, module.name, f"{what} must be a positive number of seconds, or 0")
+    if not seconds >= 0:
+        raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {shown(value)}")
+    return 0.0 if np.isinf(seconds) else seconds
+
+
+def _underway(module: Module, name: str) -> str:
+    """What the bar shows while a function, or an integrator with its right-hand side, is made; empty name: the motion runs."""
+    field, _, method = name.partition(":")
+    what = f"{field} with the method {method}" if method else field
+    return f"{module.name}: first use of {what}, which is derived and compiled" if name else module.name
 
 
 def _bar(module: Module, span: tuple[float, float]) -> Any:

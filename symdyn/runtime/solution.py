@@ -7,20 +7,25 @@ import csv
 import difflib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.arguments import fixed
 from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
+from symdyn.runtime.energy_balance import reset_energy
 from symdyn.runtime.events import EventRows, rows_of
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.outcome import Outcome
-from symdyn.runtime.paths import as_path
-from symdyn.runtime.reactions import reaction, reactions, unique_reactions
+from symdyn.runtime.paths import as_path, writing
+from symdyn.runtime.reactions import in_frame, reactions, unique_reactions
+from symdyn.runtime.sampled import SampleRows
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -34,6 +39,7 @@ class Solution:
 
     t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
     success, message    whether the end was reached, and if not when, where and why
+    doubts   sentences that were warned of in a run that went on, such as zeros of events that may be missed
     cause    the exception by which a function of the user ended the motion, with its traceback; else None
     n_steps, n_rejected, nfev   of the integrator; njev, nlu: Jacobians and factorizations of implicit methods
     seconds, integrator_seconds   wall time of the call, and inside compiled code
@@ -44,21 +50,53 @@ class Solution:
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
-                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "") -> None:
+                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "",
+                 repeat: Callable[[np.ndarray], np.ndarray] | None = None) -> None:
         self.module = module
+        self._repeat = repeat
         self.t = outcome.t
         self.x = outcome.x[:, :-1] if work else outcome.x
         self._work = outcome.x[:, -1] if work else None
         self.success, self.message, self.cause = outcome.success, outcome.message, outcome.cause
+        self.doubts = (*outcome.warned, *outcome.doubts)
         self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
         self.njev, self.nlu = outcome.n_jacobians, outcome.n_factorizations
         self.integrator_seconds = outcome.seconds
         self.seconds = seconds
-        self.params, self.method, self.backend, self.why = params, method, module.backend, why
+        self.params, self.method, self.backend, self.why = fixed(params), method, module.backend, why
         self.corrections, self.tolerances = outcome.corrections, tolerances
         self._inputs = inputs
+        # A function of the user may depend on what changes after the run, such as the variable of a loop: it is called here.
+        self._input_rows = np.broadcast_to(inputs.rows(self.t, self.x), (len(self.t), len(inputs.constant)))
         self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata["sizes"]["x"])
+        self._happened = list(outcome.happened)
         self._n_c = len(names(module))
+
+    def __call__(self, t: Any) -> np.ndarray:
+        """States at any times of the motion, (n_x,) for a time, (..., n_x) for an array of times in any order, s.
+
+        The motion is integrated once more, by the same steps, with these as its output times: the states are as exact as those at
+        the output times of the run, and rows of the solution are met to the last bit. Pass all times at once: every call takes as
+        long as the run. At the time of an event the state is that before it, as in the run.
+        Raises ArgumentError for times outside of the motion and for motions that were not integrated by `simulate`.
+        """
+        if self._repeat is None:
+            raise ArgumentError(f"{self.module.name}: states at any time need a motion that simulate has integrated; this one "
+                                f"holds {len(self.t)} times, in sol.t")
+        try:
+            asked = np.asarray(t, dtype=float)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{self.module.name}: t must be a time or an array of times, found {t!r}") from None
+        first, last = float(self.t.min(initial=np.inf)), float(self.t.max(initial=-np.inf))
+        outside = asked[~((asked >= first) & (asked <= last))]
+        if outside.size:
+            if len(self.t) == 0:
+                raise ArgumentError(f"{self.module.name}: the motion holds no time at all: {self.message}")
+            raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
+                                f"its state was asked for at t = {outside.flat[0]:.9g} s")
+        times, places = np.unique(asked, return_inverse=True)
+        found = self._repeat(times)[:, :self._sizes["x"]]
+        return found[places.reshape(asked.shape)]
 
     def __getitem__(self, name: Any) -> np.ndarray:
         """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
@@ -66,7 +104,7 @@ class Solution:
 
         Raises ArgumentError for an unknown name.
         """
-        name = str(getattr(name, "name", name))
+        name = name_of(name)
         metadata = self.module.metadata
         if name in metadata["x"]:
             return self.x[:, metadata["x"].index(name)]
@@ -81,7 +119,7 @@ class Solution:
             return self.lam[:, constraints.index(name if name in constraints else name.removeprefix("lam_"))]
         known = [*metadata["x"], *metadata["inputs"], *self.outputs, *(["lam", *constraints] if self._n_c else ())]
         near = difflib.get_close_matches(name, known, 3)
-        raise ArgumentError(f"{self.module.name}: the solution has no {name!r}; "
+        raise ArgumentError(f"{self.module.name}: the solution has no {shown(name)}; "
                             + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
 
     @property
@@ -119,6 +157,31 @@ class Solution:
                                 "from sol.q and sol.u, or describe the mechanism by bodies and joints")
         return self._rows("energy")
 
+    def energy_at(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Kinetic plus potential energy at times (n,) and states (n, n_x), with the motion's parameters and inputs, (n,), J."""
+        rows = self.module.evaluate("energy", t, x, self.params, self._inputs.rows(t, x))
+        return np.array(rows.reshape(len(t), -1).sum(axis=1))
+
+    @cached_property
+    def reset_energy(self) -> dict[str, np.ndarray]:
+        """Energy that resets of events have added since the start, (n_t,), J, by the event's name, "a + b" for events at one
+        time; negative where it is lost, as in impacts. Empty without such events.
+
+        Raises ArgumentError for equations by hand, as `energies` does.
+        """
+        return reset_energy(self, self._happened) if len(self.energies) else {}
+
+    @property
+    def energy_balance(self) -> dict[str, np.ndarray]:
+        """Parts of the energy balance since the start, each (n_t,), J: "change" of kinetic and potential energy; "work" of the
+        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "error", the change less all others.
+
+        Raises ArgumentError as `work` does.
+        """
+        change = self.energy - self.energy[0]
+        parts = {"work": self.work, **{f"reset of {name}": rows for name, rows in self.reset_energy.items()}}
+        return {"change": change, **parts, "error": change - sum(parts.values())}
+
     @property
     def work(self) -> np.ndarray:
         """Work of all loads but gravity and springs since the start, (n_t,), J.
@@ -136,11 +199,17 @@ class Solution:
         """Whether the work of the loads was integrated along with the motion."""
         return self._work is not None
 
-    @cached_property
+    @property
     def inputs(self) -> np.ndarray:
-        """The inputs at every time, (n_t, n_in); not a number where a function of the user raises."""
-        rows = self._inputs.rows(self.t, self.x)
-        return np.broadcast_to(rows, (len(self.t), rows.shape[1]))
+        """The inputs at every time, (n_t, n_in), as they were when the run ended; at an instant of a sampled controller those
+        that take effect there; not a number where a function of the user raises."""
+        return self._input_rows
+
+    @property
+    def samples(self) -> dict[str, SampleRows]:
+        """Input name -> what its sampled controller set: when the values took effect, t (n,), and the values (n,)."""
+        record, known = self._inputs.record, self.module.metadata["inputs"]
+        return {} if record is None else {name: record.of(k) for k, name in enumerate(known) if record.fresh[:, k].any()}
 
     @cached_property
     def outputs(self) -> dict[str, np.ndarray]:
@@ -192,25 +261,47 @@ class Solution:
 
     @cached_property
     def reactions(self) -> dict[str, np.ndarray]:
-        """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6)."""
+        """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6).
+
+        A reaction is what the joint holds by its shape. What acts along its speeds is none: joint forces (drives, springs and
+        dampers in the joint), gears (sd.Gear), and constraints by expression. What holds a coordinate that is given by an
+        expression, prescribed or dependent (coordinate=2*p), is a reaction. `cut_loads` has both.
+        """
         return reactions(self)
 
-    def reaction(self, joint: Any, frame: str = "ground") -> np.ndarray:
-        """Force and moment of one joint, by name or as the joint, (n_t, 6), in the axes of a frame.
+    def reaction(self, joint: Any, frame: Any = "inertial") -> np.ndarray:
+        """Force and moment of one joint, by name or as the joint, (n_t, 6), in the axes of a frame, as `reactions`.
 
-        frame   "ground", "parent", "child", or the name of a body
+        frame   "inertial" (the n-frame), "ground" (the n-frame, or the ground that moves), "parent", "child", or a body
         Raises ArgumentError for another joint or frame.
         """
-        return reaction(self, joint, frame)
+        return in_frame(self, self.reactions, joint, frame)
+
+    @cached_property
+    def cut_loads(self) -> dict[str, np.ndarray]:
+        """Joint name -> all that passes through the joint to its child, as force (N) and moment (N m) about the joint's point on
+        the child, n-frame, (n_t, 6): the reaction, and the joint forces (drives, springs, dampers), gears and constraints that
+        act along the joint's speeds. It does not depend on how a drive or a gear is described. Loads between two bodies
+        (add_spring_damper, add_torque with reaction) pass outside of their joint."""
+        return reactions(self, "cut_loads")
+
+    def cut_load(self, joint: Any, frame: Any = "inertial") -> np.ndarray:
+        """All that passes through one joint, by name or as the joint, (n_t, 6), in the axes of a frame; see `cut_loads`.
+
+        frame   as for `reaction`
+        Raises ArgumentError for another joint or frame.
+        """
+        return in_frame(self, self.cut_loads, joint, frame)
 
     def energy_error(self) -> float:
-        """Largest |change of energy - work of the loads| over the larger of kinetic energy and range of potential energy; where
-        both are rounding errors, of a mechanism at rest, over its potential energy.
+        """Largest |change of energy - work of the loads - what resets of events added| over the larger of kinetic energy and
+        range of potential energy; where both are rounding errors, of a mechanism at rest, over its potential energy. See
+        `energy_balance` for the parts.
 
         Raises ArgumentError as `work` does.
         """
         scale, _ = self.energy_scale
-        return float(np.abs(self.energy - self.energy[0] - self.work).max() / scale) if scale > 0 else 0.0
+        return float(np.abs(self.energy_balance["error"]).max() / scale) if scale > 0 else 0.0
 
     @property
     def energy_scale(self) -> tuple[float, bool]:
@@ -266,40 +357,43 @@ class Solution:
         Raises ArgumentError for another ending.
         """
         path = as_path(path, "where to save the motion", "run.npz")
-        if path.suffix in (".npz", ".csv"):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix == ".npz":
-            about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
-                     "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
-                     "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
-            arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
-            if "energy" in self.module.functions:
-                arrays["energy"] = self.energy
-            if self.module.metadata["inputs"]:
-                arrays["inputs"] = self.inputs
-            if self._n_c:
-                about["constraints"] = names(self.module)
-                arrays |= {"lam": self.lam, "constraint_violation": self.constraint_violation,
-                           "velocity_violation": self.velocity_violation}
-            arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
-            np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
-                     about=np.array(json.dumps(about)), **arrays)
-        elif path.suffix == ".csv":
-            titles = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
-            columns = [self.t, *self.x.T, *self.inputs.T]
-            for name, rows in self.outputs.items():
-                flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
-                titles += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
-                columns += list(flat.T)
-            titles += [f"lam_{name}" for name in names(self.module)]
-            columns += list(self.lam.T)
-            with path.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                writer.writerow(titles)
-                writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
-        else:
+        if path.suffix not in (".npz", ".csv"):
             raise ArgumentError(f"cannot save to {path.name}: the ending must be .npz or .csv")
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            (self._save_arrays if path.suffix == ".npz" else self._save_columns)(path)
         return path
+
+    def _save_arrays(self, path: Path) -> None:
+        about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
+                 "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
+                 "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
+        arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
+        if "energy" in self.module.functions:
+            arrays["energy"] = self.energy
+        if self.module.metadata["inputs"]:
+            arrays["inputs"] = self.inputs
+        if self._n_c:
+            about["constraints"] = names(self.module)
+            arrays |= {"lam": self.lam, "constraint_violation": self.constraint_violation,
+                       "velocity_violation": self.velocity_violation}
+        arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
+        np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
+                 about=np.array(json.dumps(about)), **arrays)
+
+    def _save_columns(self, path: Path) -> None:
+        titles = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
+        columns = [self.t, *self.x.T, *self.inputs.T]
+        for name, rows in self.outputs.items():
+            flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
+            titles += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
+            columns += list(flat.T)
+        titles += [f"lam_{name}" for name in names(self.module)]
+        columns += list(self.lam.T)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(titles)
+            writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
 
     @property
     def _sizes(self) -> Mapping[str, int]:
@@ -323,10 +417,10 @@ class Solution:
     def _rows(self, name: str) -> np.ndarray:
         if len(self.t) == 0:
             return np.zeros((0, *self.module.shape(name)))
-        return self.module.evaluate(name, self.t, self.x, self.params, self._inputs.rows(self.t, self.x)).reshape(
+        return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(
             len(self.t), *self.module.shape(name))
 
     def __repr__(self) -> str:
-        end = f"{self.t[-1]:.6g}" if len(self.t) else "nothing"
-        return (f"<Solution of {self.module.name}: {len(self.t)} times to t = {end}, {self.n_steps} steps, "
+        end = f" to t = {self.t[-1]:.6g} s" if len(self.t) else ""
+        return (f"<Solution of {self.module.name}: {counted(len(self.t), 'time')}{end}, {counted(self.n_steps, 'step')}, "
                 f"{self.method} on {self.backend}: {self.message}>")

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.real_numbers import number_of
 from symdyn.runtime.constraints import as_velocities, length, names
+from symdyn.shown import shown
+from symdyn.turning import is_angle
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -57,12 +60,13 @@ def choose(module: Module, asked: Any, one_step: bool, method: str, params: np.n
     """
     gain = 0.0
     way = asked
-    if isinstance(asked, tuple) and len(asked) == 2 and asked[0] == "baumgarte":
+    if isinstance(asked, tuple) and len(asked) == 2 and isinstance(asked[0], str) and asked[0] == "baumgarte":
         way, gain = asked
-        if not (isinstance(gain, (int, float, np.number)) and 0 < gain < np.inf):
-            raise ArgumentError(f"{module.name}: Baumgarte's gain must be a positive number, 1/s, found {gain!r}")
-    if way is not None and way not in WAYS:
-        raise ArgumentError(f"{module.name}: stabilization {asked!r} asked for; there are 'projection', 'baumgarte', "
+        gain = number_of(gain, module.name, "Baumgarte's gain must be a positive number, 1/s")
+        if not 0 < gain < np.inf:
+            raise ArgumentError(f"{module.name}: Baumgarte's gain must be a positive number, 1/s, found {shown(gain)}")
+    if way is not None and (not isinstance(way, str) or way not in WAYS):
+        raise ArgumentError(f"{module.name}: stabilization {shown(asked)} asked for; there are 'projection', 'baumgarte', "
                             "('baumgarte', a) with a in 1/s, 'none', and None for what the method allows")
     constrained = bool(names(module))
     if way is None:
@@ -71,7 +75,7 @@ def choose(module: Module, asked: Any, one_step: bool, method: str, params: np.n
         raise ArgumentError(f"{module.name}: {method} builds on earlier steps, which a projection would contradict; use "
                             "stabilization='baumgarte', or method='Radau' (stiff), 'DOP853' or 'dop853'")
     if way == "baumgarte" and not constrained:
-        raise ArgumentError(f"{module.name}: there are no constraints; leave out stabilization={asked!r}")
+        raise ArgumentError(f"{module.name}: there are no constraints; leave out stabilization={shown(asked)}")
     if way == "projection" and not constrained and not module.metadata.get("unit_groups"):
         way = "none"
     return Stabilization(way, float(gain), length(module, params) if constrained else 1.0)
@@ -93,7 +97,7 @@ class Projector:
         self.length = length(module, params) if self.n_c else 1.0
         self.velocities = as_velocities(module, params) if self.n_c else np.ones(self.n_u)
         units = module.metadata["units"]
-        self.lengths = np.array([self.length if units.get(q) in ("rad", "1") else 1.0 for q in module.metadata["q"]])
+        self.lengths = np.array([self.length if is_angle(units.get(q)) else 1.0 for q in module.metadata["q"]])
         self.n_evaluations, self.n_steps = 0, 0
         self.largest = np.zeros(2)
         self._evaluators = {}

@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import importlib.util
-import os
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -21,6 +18,7 @@ from symdyn.errors import EvaluationError
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler
 from symdyn.runtime.raised import in_prologue, raise_by_text
+from symdyn.runtime.stored import PRIVATE, import_text, write_whole
 
 NOT_FINITE = -1
 
@@ -152,30 +150,30 @@ class PythonUnit:
 
     backend = "numpy"
 
-    def __init__(self, module: ModuleType) -> None:
+    def __init__(self, module: ModuleType, source: str) -> None:
         self.module = module
+        self.source = source
         self.metadata = module.METADATA
 
     @classmethod
     def from_source(cls, source: str, name: str) -> PythonUnit:
-        """Put the source into the cache and import it from there."""
-        key = hashlib.sha256(source.encode()).hexdigest()[:16]
-        path = cache.cache_dir() / f"{name}-{key}.py"
-        if not path.is_file() or path.read_text(encoding="utf-8") != source:
-            scratch = path.with_suffix(f".{os.getpid()}.tmp")
-            scratch.write_text(source, encoding="utf-8")
-            os.replace(scratch, path)
-        return cls.from_file(path)
+        """Put the source into the cache and import it, whatever lies there under its name.
+
+        Raises CacheError where the cache folder does not take it.
+        """
+        text = source.encode()
+        key = hashlib.sha256(text).hexdigest()[:16]
+        path = cache.cache_dir() / f"{name[:cache.LONGEST]}-{key}.py"
+        with cache.writing(path):
+            if not (path.is_file() and path.read_bytes() == text):
+                write_whole(path, lambda file: file.write(text), PRIVATE, sync=False)
+        return cls(import_text(source, path), source)
 
     @classmethod
     def from_file(cls, path: Path) -> PythonUnit:
         """Import a generated module from its file."""
-        spec = importlib.util.spec_from_file_location(f"symdyn_generated_{path.stem.replace('-', '_')}", path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        spec.loader.exec_module(module)
-        return cls(module)
+        source = path.read_text(encoding="utf-8")
+        return cls(import_text(source, path), source)
 
     def evaluator(self, name: str) -> PythonEvaluator:
         return PythonEvaluator(self, name)

@@ -96,8 +96,9 @@ def local_error(subject: Subject, end: float, rtol: float, scales: np.ndarray, s
     n = len(every.t) - 1
     worst = 0.0
     for k in np.unique(np.linspace(0, n - 1, MEASURED).astype(int)):
+        # By the same method: "auto" might take an explicit one where stiff motion begins beside its slow part.
         sharp = subject.run((every.t[k], every.t[k + 1]), every.x[k], rtol=FINE, atol=FINE * scales, steps=True,
-                            max_step=(every.t[k + 1] - every.t[k]) / 4)
+                            max_step=(every.t[k + 1] - every.t[k]) / 4, method=every.method)
         if sharp.success:
             worst = max(worst, float(np.linalg.norm((sharp.x[-1] - every.x[k + 1]) / scales)))
     return worst

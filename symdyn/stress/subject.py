@@ -28,8 +28,8 @@ RTOL = 1e-10
 BESIDE = {"floating_crane": {"beta": 0.2}}
 # Derivatives, and forms for other purposes.
 IDENTIFICATION, LONG = ("regressor", "inertial_parameters", "base_regressor", "base_parameters"), 1000
-SELDOM = ("jacobian_x", "jacobian_inputs", "jacobian_params", "power_x", "reactions_by_lam", "residual", "watches",
-          "drawn_lengths", "events", "event_resets")
+SELDOM = ("jacobian_x", "jacobian_inputs", "input_matrix", "jacobian_params", "power_x", "reactions_by_lam", "residual",
+          "watches", "ground_rotation", "drawn_lengths", "events", "event_resets")
 
 
 def named(name: str) -> System:
@@ -130,7 +130,7 @@ class Subject:
         other.method = method
         return other
 
-    def parts(self, x: np.ndarray) -> dict[str, np.ndarray]:
+    def parts(self, x: np.ndarray) -> dict[str, Any]:
         """A state as arguments of `simulate`."""
         sizes = self.module.metadata["sizes"]
         q, u, z = np.split(np.asarray(x, dtype=float), np.cumsum([sizes["q"], sizes["u"]]))

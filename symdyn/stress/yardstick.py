@@ -23,7 +23,7 @@ DEPENDENT = 1e-12
 CORRECTIONS = ("position_correction", "velocity_correction")
 FORCES = ("k_tilde", "F_tilde", "inverse_dynamics")
 # What may depend on accelerations and multipliers; whether it does is seen on its tape.
-MAY_DEPEND = ("outputs", "reactions", "power")
+MAY_DEPEND = ("outputs", "reactions", "cut_loads", "power")
 
 
 def exact(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray,
@@ -211,7 +211,7 @@ def together(subject: Subject, name: str, size: int) -> np.ndarray:
                   for _ in subject.equations.quantity(q).ravel()]
     elif name == "frames":
         labels = [k % 12 < 3 for k in range(size)]
-    elif name == "reactions":
+    elif name in ("reactions", "cut_loads"):
         labels = [k % 6 < 3 for k in range(size)]
     known = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     return np.array([known[label] for label in labels], dtype=int)
@@ -276,7 +276,7 @@ def terms(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.
         return ((loads + size("mass_matrix") * size("F_d") / gradient) / gradient)[:, None]
     if name == "outputs" and subject.has("positions"):  # often differences of places
         return size("positions")[:, None]
-    if name == "reactions":  # sums of weights, inertial forces, loads
+    if name in ("reactions", "cut_loads"):  # sums of weights, inertial forces, loads
         found = loads + (size("lam") * size("C_r") if subject.constrained else 0.0)
         if subject.has("mass_matrix"):
             found = found + size("mass_matrix") * speed**2

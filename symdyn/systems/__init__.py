@@ -11,6 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from symdyn.errors import SymdynError
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -46,6 +47,9 @@ _CONSTRAINED = {
     "double_wishbone": "suspensions:double_wishbone",
     "rolling_disc": "rolling:rolling_disc",
     "skate": "rolling:skate",
+    "sleigh": "rolling:sleigh",
+    "bicycle": "bicycles:bicycle",
+    "stewart_platform": "platforms:stewart_platform",
 }
 _FLOATING = {
     "floating_wind_turbine": "turbines:floating_wind_turbine",
@@ -72,9 +76,9 @@ def get(name: str, **options: Any) -> System:
     Raises SymdynError for a name that the catalogue does not have.
     """
     if not isinstance(name, str) or name not in _CATALOGUE:
-        near = difflib.get_close_matches(str(name), _CATALOGUE, n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name_of(name), _CATALOGUE, n=3, cutoff=0.5)
         hint = f"did you mean {' or '.join(near)}? It has" if near else "it has"
-        raise SymdynError(f"the catalogue has no system {name!r}; {hint} {', '.join(_CATALOGUE)}")
+        raise SymdynError(f"the catalogue has no system {shown(name)}; {hint} {', '.join(_CATALOGUE)}")
     return _function(name)(**options)
 
 

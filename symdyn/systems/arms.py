@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from symdyn.model.bodies import Body, position
+from symdyn.model.bodies import Body
 from symdyn.model.joints import Revolute
+from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
 

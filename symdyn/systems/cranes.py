@@ -6,9 +6,10 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model import shapes
-from symdyn.model.bodies import Body, position
+from symdyn.model.bodies import Body
 from symdyn.model.elements import Box, Buoyancy
 from symdyn.model.joints import Fixed, Free, Universal
+from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
 

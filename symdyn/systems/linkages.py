@@ -7,8 +7,8 @@ import math
 import sympy as sp
 
 from symdyn.errors import ModelError
-from symdyn.model.bodies import position
 from symdyn.model.joints import Revolute
+from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
 

@@ -8,6 +8,10 @@ from symdyn.errors import ModelError
 from symdyn.model.joints import Revolute
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
+from symdyn.shown import shown
+
+# More than any formulation derives in a day.
+MOST_RODS = 100_000
 
 
 def pendulum() -> System:
@@ -48,12 +52,12 @@ def n_link_pendulum(n: int = 5) -> System:
     of mass from hinge i (m); of all but the last li, distance to hinge i + 1 (m). The numbers are those of uniform rods
     of 1 m and 1 kg.
     """
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_RODS:
+        raise ModelError([f"n_link_pendulum was asked for {shown(n)} rods; pass 1 or more, a whole number up to {MOST_RODS}"])
     return _chain_of_rods(f"n_link_pendulum_{n}", n, (0.0,) * n)
 
 
 def _chain_of_rods(name: str, n: int, start: Sequence[float]) -> System:
-    if n < 1:
-        raise ModelError([f"n_link_pendulum was asked for {n} rods; pass 1 or more"])
     q = coordinates(f"q1:{n + 1}")
     m, inertia, lc, length = (parameters(f"{name}1:{n + 1}") for name in ("m", "I", "lc", "l"))
     g = parameters("g")

@@ -1,4 +1,4 @@
-"""Bodies held by constraints of their velocity: a rolling disc and a skate."""
+"""Bodies held by constraints of their velocity: a rolling disc, a skate and a sleigh."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 
 import sympy as sp
 
+from symdyn.model import shapes
 from symdyn.model.joints import Free, Planar
 from symdyn.model.orientation import EulerAngles
-from symdyn.model.symbols import coordinates, parameters
+from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
 
 
@@ -66,4 +67,36 @@ def skate() -> System:
     system.defaults = {m: 1.0, I: 0.02, a: 0.1}
     system.initial = {x.dot: -0.5, theta.dot: 4.0}
     system.duration = 5.0
+    return system
+
+
+def sleigh() -> System:
+    """Chaplygin's sleigh drawn along a line: a skate whose centre of mass is pulled to the line y = 0 by a force along y.
+
+    x, y (m) is the point where the knife edge touches the plane, theta (rad) the direction of the edge, counterclockwise. The
+    centre of mass is a ahead of this point; the force -k times its distance from the line acts on it. Planar, no gravity in the
+    plane. The constraint is -x_dot sin theta + y_dot cos theta = 0. It starts at 1 m/s along the line, 0.01 m beside it.
+
+    Outputs: track, centre, distances of the edge and of the centre of mass from the line (m). Input: T, a moment about the
+    vertical (N m).
+    Parameters: m mass (kg), I inertia about the vertical at the centre of mass (kg m^2), a (m), k (N/m).
+    Source: Neimark and Fufaev, Dynamics of Nonholonomic Systems, 1972. Along the line at the speed v small deviations obey
+    y_dot = v theta and (I + m a^2) theta_ddot + m a v theta_dot + k a (y + a theta) = T: without T they grow at any speed.
+    """
+    x, y, theta = coordinates("x y theta")
+    m, I, a, k = parameters("m I a k")
+    T = inputs("T")
+    system = System("sleigh", planar=True)
+    body = system.add_body("sleigh", mass=m, inertia=I, com=[a, 0])
+    system.add_joint(Planar("plane", system.ground, body, [x, y, theta]))
+    system.add_constraint(-x.dot * sp.sin(theta) + y.dot * sp.cos(theta), name="edge")
+    system.add_force(body, [0, -k * (y + a * sp.sin(theta))], point=[a, 0])
+    system.add_torque(body, T)
+    system.add_output("track", y)
+    system.add_output("centre", y + a * sp.sin(theta))
+    system.draw(body, shapes.Line([[-a, 0, 0], [2 * a, 0, 0]], 3.0), color="#4a6a8a")
+    system.defaults = {m: 1.0, I: 0.02, a: 0.1, k: 50.0}
+    system.initial = {x.dot: 1.0, y: 0.01}
+    system.units = {k: "N/m"}
+    system.duration = 2.0
     return system

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from symdyn.model.bodies import position
 from symdyn.model.joints import Prismatic, Revolute, Spherical, Universal
+from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
 

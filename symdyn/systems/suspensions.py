@@ -6,9 +6,9 @@ import math
 
 import sympy as sp
 
-from symdyn.model.bodies import position
 from symdyn.model.closures import Rod
 from symdyn.model.joints import Revolute, Spherical
+from symdyn.model.points import position
 from symdyn.model.symbols import coordinates, inputs, parameters
 from symdyn.model.system import System
 

@@ -10,9 +10,10 @@ import sympy as sp
 from symdyn.flexible.beam import Beam
 from symdyn.flexible.shape import Shape
 from symdyn.model import shapes
-from symdyn.model.bodies import Body, acceleration, position, velocity
+from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed, Free, Joint, Revolute
 from symdyn.model.orientation import EulerAngles, EulerParameters
+from symdyn.model.points import acceleration, position, velocity
 from symdyn.model.symbols import coordinates, parameters, speeds, time
 from symdyn.model.system import System
 from symdyn.systems import nrel_5mw as nrel

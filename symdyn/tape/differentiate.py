@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.shown import shown
 from symdyn.tape.node import Node, is_zero
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
@@ -114,5 +115,5 @@ def jacobian(recorder: Recorder, entries: Sequence[Any], by: Sequence[Node], mod
         for i, entry in enumerate(entries):
             matrix[i, :] = reverse(recorder, entry, by)
     else:
-        raise ValueError(f"mode {mode!r} asked for; there are 'forward', 'reverse' and 'auto'")
+        raise ValueError(f"mode {shown(mode)} asked for; there are 'forward', 'reverse' and 'auto'")
     return matrix

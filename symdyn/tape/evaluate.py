@@ -17,10 +17,12 @@ from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape, reachable
 
 
-def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[str, np.ndarray]:
+def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30,
+             constants: Callable[[Fraction], Fraction] | None = None) -> dict[str, np.ndarray]:
     """All outputs of the tape at `digits` decimal digits, as arrays of mpmath numbers.
 
-    values   leaf name -> number (floats are taken as the exact binary numbers they are)
+    values      leaf name -> number (floats are taken as the exact binary numbers they are)
+    constants   what to take in place of a fraction that stands on the tape; default: itself
     Raises KeyError naming the inputs that have no value.
     """
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
@@ -34,7 +36,10 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
             return done[value]
         if isinstance(value, bool):
             return value
-        return context.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else context.mpf(value)
+        if not isinstance(value, Fraction):
+            return context.mpf(value)
+        taken = value if constants is None else constants(value)
+        return context.mpf(taken.numerator) / taken.denominator
 
     for node in tape.steps:
         if node.op == "leaf":
@@ -56,13 +61,23 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30) -> dict[st
     return result
 
 
+def double(value: Any) -> float:
+    """The nearest float of a number. Raises UnsupportedExpression for one beyond the range of doubles."""
+    try:
+        return float(value)
+    except OverflowError:
+        raise UnsupportedExpression("numbers of the model multiply to more than the range of double precision, 1.8e308; give "
+                                    "them "
+                                    "in other units") from None
+
+
 def constant(value: Any) -> float:
     """The nearest float of a number or of a node without inputs, such as cos(1) or pi/6.
 
-    Raises UnsupportedExpression if it is complex, as acos(3) is.
+    Raises UnsupportedExpression if it is complex, as acos(3) is, and if it is beyond the range of doubles.
     """
     if not isinstance(value, Node):
-        return float(value)
+        return double(value)
     context, functions = _arithmetic(40)
     done: dict[Node, Any] = {}
     for node in reachable([value]):

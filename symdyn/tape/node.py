@@ -6,6 +6,8 @@ from fractions import Fraction
 from numbers import Number
 from typing import TYPE_CHECKING, Any
 
+from symdyn.shown import shown
+
 if TYPE_CHECKING:
     from symdyn.tape.recorder import Recorder
 
@@ -92,7 +94,7 @@ def exact(value: Any) -> int | Fraction:
     try:
         fraction = Fraction(value.item() if hasattr(value, "item") else value)
     except (OverflowError, ValueError) as error:
-        raise ValueError(f"a constant of the equations must be a finite real number, found {value!r}") from error
+        raise ValueError(f"a constant of the equations must be a finite real number, found {shown(value)}") from error
     return fraction.numerator if fraction.denominator == 1 else fraction
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.shown import shown
 from symdyn.tape.kernels import Kernel
 from symdyn.tape.node import Node, exact
 from symdyn.tape.ops import OPERATIONS
@@ -254,7 +255,7 @@ class Recorder:
                 if isinstance(a, bool):
                     return b if a == (op == "and") else a
         if op not in OPERATIONS:
-            raise ValueError(f"unknown operation {op!r}; known: {', '.join(OPERATIONS)}")
+            raise ValueError(f"unknown operation {shown(op)}; known: {', '.join(OPERATIONS)}")
         return self._record(op, *args)
 
     def call(self, kernel: Kernel, values: Sequence[Any]) -> list[Any]:

@@ -133,7 +133,7 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
 def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node, sp.Expr] | None = None) -> Any:
     """The output as explicit SymPy: a scalar expression, or a matrix (column for a vector).
 
-    symbols   leaf -> the user's symbol
+    symbols   leaf -> the user's symbol; leaves without one, such as the directions of derivatives, keep their names
     named     nodes to leave as they are, under these symbols
     """
     done: dict[Node, Any] = dict(named or {})
@@ -141,7 +141,7 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
         if node in done:
             continue
         if node.op == "leaf":
-            done[node] = symbols[node]
+            done[node] = symbols[node] if node in symbols else sp.Symbol(node.args[1])
         elif node.op == "call" and isinstance(node.args[0], UserFunction):
             function, *arguments = node.args
             done[node] = function.applied([done[a] if isinstance(a, Node) else number(a) for a in arguments])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from symdyn.urdf.robot import Robot, UrdfJoint
-from symdyn.urdf.values import FileFaults, nearest
+from symdyn.urdf.values import LARGEST, FileFaults, nearest
 
 
 def outwards(robot: Robot, faults: FileFaults) -> tuple[str, list[UrdfJoint]]:
@@ -70,7 +70,11 @@ def mimicked(robot: Robot, held: frozenset[str], faults: FileFaults) -> dict[str
                 break
             source = following
             passed.append(source.name)
-        if joint.mimic is not None and joint.name not in held:
+        if joint.mimic is not None and joint.name not in held and not max(abs(multiplier), abs(offset)) <= LARGEST:
+            faults.at(joint.mimic.line, f"joint {joint.name!r} mimics along {' -> '.join(map(repr, passed[1:]))}; multiplier "
+                      f"{multiplier:.4g} and offset {offset:.4g} of all of them together are more than {LARGEST:.0e}; give "
+                      "smaller ones")
+        elif joint.mimic is not None and joint.name not in held:
             idle = source.kind == "fixed" or source.name in held or multiplier == 0
             found[joint.name] = ("" if idle else source.name, multiplier, offset)
     return found

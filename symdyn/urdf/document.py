@@ -9,6 +9,10 @@ from typing import Any
 from xml.etree.ElementTree import ParseError
 
 from symdyn.errors import ArgumentError, MissingExtra, ModelError
+from symdyn.shown import shown
+
+# Characters of the longest path of any system.
+LONGEST = 4096
 
 
 @dataclass(frozen=True)
@@ -65,8 +69,8 @@ class _Builder:
 
 def as_path(path: Any) -> Path:
     """A path given as text or Path. Raises ArgumentError for anything else."""
-    if not isinstance(path, (str, Path)) or "\0" in str(path):
-        raise ArgumentError(f"the path is {path!r}; pass that of a URDF file, as text or a Path")
+    if not isinstance(path, (str, Path)) or "\0" in str(path) or len(str(path)) > LONGEST:
+        raise ArgumentError(f"the path is {shown(path)}; pass that of a URDF file, as text or a Path")
     return Path(path)
 
 
@@ -113,7 +117,7 @@ def _no_xml(reason: str, text: bytes, line: int) -> str:
     if reason == "unbound prefix":
         lines = text.decode("utf-8", "replace").splitlines()
         tag = lines[line - 1].strip() if line <= len(lines) else ""
-        return (f"a tag has a prefix that the file does not declare, in {tag[:100]!r}; if it belongs to xacro, run the file "
+        return (f"a tag has a prefix that the file does not declare, in {shown(tag[:100])}; if it belongs to xacro, run the file "
                 "through xacro first")
     return f"the file is no XML there ({reason}); pass a URDF file"
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symdyn.shown import shown
 from symdyn.urdf.angles import rotation
 from symdyn.urdf.robot import TYPES, Inertial, Origin, Robot, UrdfJoint
 from symdyn.urdf.values import FileFaults
@@ -44,9 +45,10 @@ def demand_inertia(robot: Robot, order: list[UrdfJoint], moving: dict[str, str],
         if moving.get(joint.name) == joint.name and joint.name not in further and not borne.get(joint.name, 0.0) > 0:
             child = robot.links[joint.child]
             kept = "has no <inertial>" if child.inertial is None else "has no inertia along it"
-            faults.at(joint.line, f"joint {joint.name!r} moves link {child.name!r} (line {child.line}), which {kept}, and "
+            faults.at(joint.line, f"joint {shown(joint.name)} moves link {shown(child.name)} (line {child.line}), which "
+                                  f"{kept}, and "
                                   "nothing else; give the link mass and inertia, or hold the joint: type=\"fixed\", or "
-                                  f"fixed=[{joint.name!r}]")
+                                  f"fixed=[{shown(joint.name)}]")
 
 
 def _demand_definite(robot: Robot, faults: FileFaults) -> None:
@@ -56,7 +58,8 @@ def _demand_definite(robot: Robot, faults: FileFaults) -> None:
             values = np.linalg.eigvalsh(tensor(link.inertial))
             if values[0] < -_NONE * np.abs(values).max():
                 listed = ", ".join(f"{v:.4g}" for v in values)
-                faults.at(link.inertial.line, f"link {link.name!r}: its inertia has the principal moments [{listed}] kg m^2, one "
+                faults.at(link.inertial.line, f"link {shown(link.name)}: its inertia has the principal moments [{listed}] kg "
+                                              "m^2, one "
                                               "is negative; give the inertia about the centre of mass")
 
 

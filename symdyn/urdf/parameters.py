@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from symdyn.model.symbols import parameters
+from symdyn.shown import shown
 from symdyn.urdf.values import nearest
 
 _ODD = re.compile(r"[^\w .,:+*/^'(){}\[\]%#-]")
@@ -73,7 +74,7 @@ class Parameters:
 
     def faults(self) -> list[str]:
         """Patterns that fit nothing."""
-        return [f"symbolic has {p!r}, which fits no parameter, link or joint{nearest(p, self.seen)} (parameters: m_LINK, "
+        return [f"symbolic has {shown(p)}, which fits no parameter, link or joint{nearest(p, self.seen)} (parameters: m_LINK, "
                 "c_x_LINK, I_xx_LINK, p_x_JOINT and so on, and g)" for p in self.patterns if p not in self.used]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
+from symdyn.shown import shown
 from symdyn.urdf.document import Element
 from symdyn.urdf.robot import INERTIA, TYPES, ZERO, Inertial, Link, Mimic, Origin, Robot, UrdfJoint
 from symdyn.urdf.values import FileFaults, Triple
@@ -46,7 +47,8 @@ def _add(known: dict[str, Named], found: Named, what: str, faults: FileFaults) -
     if not found.name:
         return False
     if found.name in known:
-        faults.at(found.line, f"the {what} {found.name!r} is there already, in line {known[found.name].line}; give each a name "
+        faults.at(found.line, f"the {what} {shown(found.name)} is there already, in line {known[found.name].line}; give each a "
+                              "name "
                               "of its own")
         return False
     known[found.name] = found
@@ -67,9 +69,9 @@ def _origin(element: Element, what: str, faults: FileFaults) -> Origin:
 
 def _link(element: Element, faults: FileFaults) -> Link:
     name = faults.name(element, "name", "a link")
-    _demand_once(element, f"link {name!r}", faults)
+    _demand_once(element, f"link {shown(name)}", faults)
     inertial = element.find("inertial")
-    return Link(name, None if inertial is None else _inertial(inertial, f"link {name!r}", faults), element.line)
+    return Link(name, None if inertial is None else _inertial(inertial, f"link {shown(name)}", faults), element.line)
 
 
 def _inertial(element: Element, what: str, faults: FileFaults) -> Inertial:
@@ -87,11 +89,11 @@ def _inertial(element: Element, what: str, faults: FileFaults) -> Inertial:
 
 def _joint(element: Element, faults: FileFaults) -> UrdfJoint:
     name = faults.name(element, "name", "a joint")
-    what = f"joint {name!r}"
+    what = f"joint {shown(name)}"
     _demand_once(element, what, faults)
     kind = faults.name(element, "type", what)
     if kind and kind not in TYPES:
-        faults.at(element.line, f"{what} has the type {kind!r}; there are {', '.join(TYPES)}")
+        faults.at(element.line, f"{what} has the type {shown(kind)}; there are {', '.join(TYPES)}")
     ends = []
     for end in ("parent", "child"):
         found = element.find(end)

@@ -14,11 +14,13 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ArgumentError, ModelError
+from symdyn.kinds import flag
 from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed, Free, Joint, Planar, Prismatic, Revolute
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.symbols import Coordinate, coordinates
 from symdyn.model.system import System
+from symdyn.shown import shown
 from symdyn.urdf.angles import rotation
 from symdyn.urdf.checks import mimicked, outwards
 from symdyn.urdf.document import as_path, read_document
@@ -53,14 +55,15 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     names that are none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
     """
     patterns, held = _patterns(symbolic, "symbolic"), _patterns(fixed, "fixed")
-    if root not in ROOTS:
-        raise ArgumentError(f"root is {root!r}; pass 'fixed' or 'floating'")
+    flag(damping, "damping")
+    if not isinstance(root, str) or root not in ROOTS:
+        raise ArgumentError(f"root is {shown(root)}; pass 'fixed' or 'floating'")
     path = as_path(path)
     document = read_document(path)
     faults = FileFaults(path)
     robot = parse(document, faults)
     still = frozenset(j for j in robot.joints if any(fnmatchcase(j, p) for p in held))
-    faults += [f"{path}: fixed has {p!r}, which fits no joint of the file{nearest(p, robot.joints)}" for p in held
+    faults += [f"{path}: fixed has {shown(p)}, which fits no joint of the file{nearest(p, robot.joints)}" for p in held
                if not any(fnmatchcase(j, p) for j in robot.joints)]
     base, order = outwards(robot, faults)
     following = mimicked(robot, still, faults)
@@ -84,9 +87,9 @@ def _raise(faults: FileFaults, name: str) -> None:
 
 
 def _patterns(given: Any, what: str) -> list[str]:
-    listed = [given] if isinstance(given, str) else list(given) if isinstance(given, Iterable) else [given]
+    listed = [given] if isinstance(given, str) else list(given) if isinstance(given, (list, tuple, set)) else [given]
     if not all(isinstance(p, str) for p in listed):
-        raise ArgumentError(f"{what} is {given!r}; pass names as text, such as [\"m_*\"]")
+        raise ArgumentError(f"{what} is {shown(given)}; pass names as text, such as [\"m_*\"]")
     return listed
 
 

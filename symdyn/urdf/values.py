@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from symdyn.shown import shown
 from symdyn.urdf.document import Element
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -58,11 +59,11 @@ class FileFaults(list[str]):
             return values
         about = "; it looks like xacro, so run the file through xacro first" if "${" in text or "$(" in text else ""
         how = ", finite and written out" if len(values) < len(words) or len(words) != n else f" of {LARGEST:.0e} at most"
-        self.at(element.line, f"{what}: {attribute} of <{element.tag}> is {text[:100]!r}; give {wanted}{how}{about}")
+        self.at(element.line, f"{what}: {attribute} of <{element.tag}> is {shown(text[:100])}; give {wanted}{how}{about}")
         return list(default or [0.0] * n)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint at the name that may have been meant, or ""."""
     near = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    return f"; did you mean {shown(near[0])}?" if near else ""

@@ -16,7 +16,8 @@ from symdyn.model.bodies import Body
 from symdyn.model.joints import Fixed, Joint, Prismatic, Revolute
 from symdyn.model.loads import JointForce
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Coordinate, Input
+from symdyn.model.symbols import Coordinate, Input, symbols_of
+from symdyn.shown import shown
 from symdyn.urdf.angles import angles
 from symdyn.urdf.document import as_path
 from symdyn.urdf.parameters import Names
@@ -97,7 +98,7 @@ class _Writer:
                 faults.append(f"it has {what} ({', '.join(given)}); a URDF is a tree of links and joints alone")
         for joint in model.joints:
             if not isinstance(joint, (Fixed, Revolute, Prismatic)):
-                faults.append(f"joint {joint.name!r} is {joint.kind}; what is written is fixed, revolute or prismatic")
+                faults.append(f"joint {shown(joint.name)} is {joint.kind}; what is written is fixed, revolute or prismatic")
             elif not isinstance(joint, Fixed) and joint.coordinates[0] not in self.owners:
                 self._follow(joint)
         for load in model.loads:
@@ -109,10 +110,11 @@ class _Writer:
     def _follow(self, joint: Joint) -> None:
         """Note the joint whose coordinate a joint's is a multiple of, the multiplier and the offset."""
         q = joint.coordinates[0].doit().xreplace(self.numbers)
-        sources = sorted(q.free_symbols, key=str)
+        sources = sorted(symbols_of(q), key=str)
         slope = q.diff(sources[0]) if len(sources) == 1 else sp.nan
         if not slope.is_number or sources[0] not in self.owners or slope is sp.nan:
-            self.faults.append(f"joint {joint.name!r} has the coordinate {joint.coordinates[0]}; what is written is a coordinate "
+            self.faults.append(f"joint {shown(joint.name)} has the coordinate {joint.coordinates[0]}; what is written is a "
+                               "coordinate "
                                "of its own, or a multiple of another joint's plus a number")
             return
         self.following[joint.name] = self.owners[sources[0]].name, float(slope), float(q.xreplace({sources[0]: sp.S.Zero}))
@@ -124,9 +126,10 @@ class _Writer:
         value = sp.expand(load.values[0].xreplace(self.numbers)) if len(load.values) == 1 else sp.nan
         d = sp.S.Zero if rate is None else -value.diff(rate)
         rest = value if rate is None else sp.expand(value + d * rate)
-        drives = rest == 0 or (rest.free_symbols and all(isinstance(a, Input) for a in rest.free_symbols))
+        drives = rest == 0 or (symbols_of(rest) and all(isinstance(a, Input) for a in symbols_of(rest)))
         if value is sp.nan or not d.is_number or d < 0 or not drives:
-            self.faults.append(f"{load.label} on joint {joint.name!r} is {', '.join(map(str, load.values))}; a URDF holds no "
+            self.faults.append(f"{load.label} on joint {shown(joint.name)} is {', '.join(map(str, load.values))}; a URDF holds "
+                               "no "
                                "loads but viscous damping: leave it out")
             return
         self.damping[joint.name] = self.damping.get(joint.name, 0.0) + float(d)

@@ -11,7 +11,6 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.model.symbols import time
 from symdyn.tape.differentiate import forward
-from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Tape
 from symdyn.verification.sample import Sample, difference, relative
 
@@ -51,8 +50,18 @@ def equations_hold(s: Sample) -> float | None:
 
 
 def inverse_of_forward(s: Sample) -> float | None:
+    """inverse_dynamics(u_dot) = -C_r^T lam; at other accelerations M_tilde u_dot + k_tilde - F_tilde, if there are these."""
     forced = s.constraint_force()
-    return relative(s.with_accelerations["inverse_dynamics"] - forced, np.concatenate([s["F_tilde"], s["k_tilde"], forced]))
+    size = np.concatenate([s["F_tilde"], s["k_tilde"], forced])
+    residual = relative(s.with_accelerations["inverse_dynamics"] - forced, size)
+    if not s.has("M_tilde", "k_tilde", "F_tilde"):
+        return residual
+    given = np.array([mpmath.sin(3 * k + 1) for k in range(s.n_u)], dtype=object)
+    names = [f"{u.name}_dot" for u in s.equations.symbols.speeds]
+    found = s.at(dict(zip(names, given, strict=True)))["inverse_dynamics"]
+    inertial = s["M_tilde"] @ given
+    other = relative(found - (inertial + s["k_tilde"] - s["F_tilde"]), np.concatenate([inertial, s["k_tilde"], s["F_tilde"]]))
+    return max(residual, other)
 
 
 def energy_balance(s: Sample) -> float | None:
@@ -64,7 +73,7 @@ def energy_balance(s: Sample) -> float | None:
     seeds[eq.leaves[time]] = 1
     rates = forward(eq.recorder, eq.quantity("energy").ravel().tolist(), seeds)
     tape = Tape.of(eq.recorder, rates=rates, power=eq.quantity("power"))
-    found = evaluate(tape, s.values, s.digits)
+    found = s.evaluate(tape)
     power = found["power"].ravel()[0]
     return relative(np.array([sum(found["rates"]) - power]), np.array([*found["rates"], power, *s["energy"]]))
 
@@ -111,7 +120,7 @@ def coriolis_is_skew_with_mass_rate(s: Sample) -> float | None:
     M = eq.quantity("M_tilde")
     seeds = dict(zip([eq.leaves[q] for q in eq.symbols.coordinates], eq.quantity("rates"), strict=True))
     rate = np.array(forward(eq.recorder, M.ravel().tolist(), seeds), dtype=object).reshape(M.shape)
-    found = evaluate(Tape.of(eq.recorder, rate=rate, C=eq.quantity("coriolis")), s.values, s.digits)
+    found = s.evaluate(Tape.of(eq.recorder, rate=rate, C=eq.quantity("coriolis")))
     return relative(found["rate"] - found["C"] - found["C"].T, found["C"])
 
 
@@ -219,7 +228,7 @@ def whole_system(s: Sample) -> float | None:
     ud = found[:s.n_u]
     forced = -(s["C_r"][s.independent].T @ found[s.n_u:]) if s.independent else np.zeros(s.n_u, dtype=object)
     residuals = []
-    ways = [s] if s.equations.otherwise is None else [s, Sample(s.equations.otherwise, s.values, s.digits, s.numbers)]
+    ways = [s] if s.equations.otherwise is None else [s, s.of(s.equations.otherwise)]
     for way in ways:
         residuals += [relative(way["accelerations"] - ud, ud),
                       relative(-(way["C_r"].T @ way["lam"]) - forced, np.concatenate([forced, s["F_tilde"], s["k_tilde"]]))]

@@ -9,13 +9,15 @@ import mpmath
 import numpy as np
 
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.locking import places
+from symdyn.formulation.reactions import own_rows
 from symdyn.model.closures import Gear
 from symdyn.model.elements import AddedMass
 from symdyn.model.joints import Modal
 from symdyn.model.loads import JointForce
 from symdyn.model.symbols import Coordinate
 from symdyn.spatial.vectors import cross
-from symdyn.tape.evaluate import evaluate
+from symdyn.tape.node import is_zero
 from symdyn.tape.tape import Tape
 from symdyn.verification.identities import angular_velocities
 from symdyn.verification.sample import Sample, difference, moved, relative
@@ -50,26 +52,52 @@ def move_every_body(s: Sample) -> float | None:
 
 
 def do_no_work(s: Sample) -> float | None:
-    """The power of every joint's reaction between its two bodies, at speeds that the constraints allow."""
+    """The power of every joint's reaction between its two bodies, at speeds that the constraints allow.
+
+    Joints that move together, because the coordinates of some are expressions of those of others, have no power in sum: what
+    holds a dependent coordinate is a reaction, and works against the joint that drives it. Joints that follow the time are left
+    out, and those of a speed that no joint has for its own, where constraints by expression have a force along it.
+    """
     owner = _owner(s.equations)
     if owner is None or owner.model.ground_motion is not None:
         return None
+    together = _moving_together(owner)
     bodies = _bodies(s.equations, s)
     v, omega = _twists(s, {})
     G = s["positions"]
-    powers = []
+    powers: dict[int, Any] = {}
     terms = [force * s.u for force in (s["F_tilde"], s["k_tilde"], s.constraint_force())]
-    for joint, parent, child, point, wrench in _joints(s, owner, bodies):
-        if not all(isinstance(q, Coordinate) for q in joint.coordinates) or isinstance(joint, Modal):
+    for k, (joint, parent, child, point, wrench) in enumerate(_joints(s, owner, bodies)):
+        group = together.get(joint.name, -1 - k)
+        loose = joint.name not in together and not all(isinstance(q, Coordinate) for q in joint.coordinates)
+        if group is None or loose:
             continue
         relative_twist = np.zeros(6, dtype=object)
         for body, sign in ((child, 1), (parent, -1)):
             if body != -1:
                 relative_twist += sign * np.concatenate([v[body] + cross(omega[body], point - G[body]), omega[body]])
         products = wrench * relative_twist
-        powers.append(sum(products[[0, 1, 5]] if s.equations.planar else products))
+        powers[group] = powers.get(group, 0) + sum(products[[0, 1, 5]] if s.equations.planar else products)
         terms.append(products)
-    return relative(np.array(powers), np.concatenate(terms)) if powers else None
+    return relative(np.array([*powers.values()]), np.concatenate(terms)) if powers else None
+
+
+def _moving_together(owner: Any) -> dict[str, int | None]:
+    """Joint of the tree -> number of the group that shares speeds with it; None for those that nothing is known of."""
+    tree = owner.tree
+    owned = own_rows(tree)
+    forced = bool(owner.model.constraints) or any(isinstance(loop, Gear) for loop in owner.model.loops)
+    groups: list[tuple[set[str], set[int], bool]] = []
+    for link in tree.links:
+        speeds: set[int] = set().union(*[places(row) for row in tree.D[link.speeds]])
+        unknown = isinstance(link.joint, Modal) or any(not is_zero(e) for e in tree.w_t[link.speeds])
+        unknown |= forced and not speeds <= set(owned)
+        names = {link.joint.name}
+        for other in [group for group in groups if group[1] & speeds]:
+            groups.remove(other)
+            names, speeds, unknown = names | other[0], speeds | other[1], unknown or other[2]
+        groups.append((names, speeds, unknown))
+    return {name: None if unknown else k for k, (names, _, unknown) in enumerate(groups) for name in names}
 
 
 def _rigid(model: Any) -> list[int]:
@@ -123,7 +151,7 @@ def _bodies(equations: Equations, s: Sample) -> dict[str, np.ndarray]:
                    loads=np.array(loads, dtype=object), gravity=algebra.constants(model.gravity),
                    points=np.array(points, dtype=object).reshape(-1, 3),
                    wrenches=np.array([found[joint.name] for joint, _, _ in joints], dtype=object).reshape(-1, 6))
-    return evaluate(tape, s.values, s.digits)
+    return s.evaluate(tape)
 
 
 def _momentum_rates(s: Sample, bodies: Mapping[str, np.ndarray]) -> np.ndarray:

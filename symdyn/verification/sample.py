@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cached_property
+import random
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import cache, cached_property
 from typing import Any
 
 import mpmath
@@ -11,6 +13,13 @@ import numpy as np
 
 from symdyn.formulation.equations import Equations
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.tape import Tape
+
+# Half a unit of the last place of doubles, relative; fractions of a denominator up to SHORT were given exactly.
+ROUNDING = Fraction(1, 2**53)
+SHORT = 10**6
+# By how much rounding is enlarged to measure what it does: far above the residual that it has left, far below nonlinear effects.
+ENLARGED = 1024
 
 
 class Sample:
@@ -18,16 +27,43 @@ class Sample:
 
     numbers       whether all parameters have numbers that were given
     independent   places of constraint rows that imply the others
+    constants     what stands in place of the constants of the tape (see symdyn.tape.evaluate); default: themselves
     """
 
     def __init__(self, equations: Equations, values: Mapping[str, Any], digits: int, numbers: bool,
-                 independent: tuple[int, ...] = ()) -> None:
+                 independent: Sequence[int] = (), constants: Callable[[Fraction], Fraction] | None = None) -> None:
         self.equations = equations
         self.values = dict(values)
         self.digits = digits
         self.numbers = numbers
         self.independent = list(independent)
+        self.constants = constants
         self.n_u = len(equations.symbols.speeds)
+
+    def of(self, equations: Equations) -> Sample:
+        """The same state of other equations."""
+        return Sample(equations, self.values, self.digits, self.numbers, (), self.constants)
+
+    def sharper(self, more: int) -> Sample:
+        """The same state with so many digits more."""
+        return Sample(self.equations, self.values, self.digits + more, self.numbers, self.independent, self.constants)
+
+    def rounded(self, seed: int) -> Sample:
+        """The same state with constants of the tape that are no short fractions changed as by rounding to doubles, but more.
+
+        Every constant changes for itself, by a random part of up to 2^-53 of it, times ENLARGED; the same for the same seed.
+        """
+        @cache
+        def changed(value: Fraction) -> Fraction:
+            if value.denominator <= SHORT:
+                return value
+            return value * (1 + Fraction(random.Random(f"{seed} {value}").uniform(-1, 1)) * ROUNDING * ENLARGED)
+
+        return Sample(self.equations, self.values, self.digits, self.numbers, self.independent, changed)
+
+    def evaluate(self, tape: Tape, values: Mapping[str, Any] | None = None) -> dict[str, np.ndarray]:
+        """Outputs of a tape at the state, or at other values."""
+        return evaluate(tape, self.values if values is None else values, self.digits, self.constants)
 
     def has(self, *names: str) -> bool:
         return all(n in self.equations.quantities for n in names)
@@ -69,7 +105,7 @@ class Values:
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._known:
-            self._known[name] = evaluate(self.sample.equations.tape(name), self.values, self.sample.digits)[name]
+            self._known[name] = self.sample.evaluate(self.sample.equations.tape(name), self.values)[name]
         return self._known[name]
 
 

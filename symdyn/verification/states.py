@@ -14,6 +14,7 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.consistent_states import ConstraintStates
 from symdyn.formulation.equations import Equations
 from symdyn.runtime.arguments import some
+from symdyn.shown import name_of
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Tape
@@ -31,7 +32,7 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
     """Samples at random states. Raises SymdynError where too few states are defined, or consistent."""
     stream = random.Random(seed)
     symbols = equations.symbols
-    given = {str(getattr(k, "name", k)): float(v) for k, v in symbols.defaults.items()}
+    given = {name_of(k): float(v) for k, v in symbols.defaults.items()}
     given |= some(params, [p.name for p in symbols.parameters], "parameters", equations.name)
     numbers = all(p.name in given for p in symbols.parameters)
     parameters = {p.name: given.get(p.name, stream.uniform(0.5, 1.5)) for p in symbols.parameters}
@@ -42,7 +43,9 @@ def samples(equations: Equations, states: int, digits: int, params: Mapping[Any,
             return found
         values = {"t": stream.uniform(0, 1), **parameters}
         for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
-            values.update({s.name: symbols.reach.get(s, 1) * stream.uniform(-1, 1) for s in group})
+            # Elastic coordinates stay as small together as one of them may be: beyond, a kinetic energy to second order is none.
+            values.update({s.name: symbols.reach.get(s, 1) / (len(symbols.reach) if s in symbols.reach else 1)
+                           * stream.uniform(-1, 1) for s in group})
         values.update({f"{u.name}_dot": 0.0 for u in symbols.speeds})
         independent: tuple[int, ...] = ()
         if manifold is None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.formulation.equations import Equations
-from symdyn.tape.evaluate import evaluate
 from symdyn.tape.external import UserFunction
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape
@@ -64,7 +63,7 @@ def _derivatives_agree(precise: bool) -> Callable[[Sample], float | None]:
         for node in _calls(s.equations):
             f, *arguments = node.args
             tape = Tape.of(s.equations.recorder, at=np.array([*arguments], dtype=object))
-            at = list(evaluate(tape, s.values, s.digits)["at"])
+            at = list(s.evaluate(tape)["at"])
             while f is not None and f.derivative is not None:
                 if _is_precise(f) == precise:
                     residuals.append(_residual(f, at, mpmath.mpf(10) ** (-s.digits // 3) if precise else mpmath.mpf(2) ** -17))

@@ -57,7 +57,7 @@ def test_all_routes_agree(routes: Routes) -> None:
     x = rng.uniform(-1.5, 1.5, (STATES, len(s.coordinates) + len(s.speeds) + len(s.states)))
     t, inputs = rng.uniform(0, 3, STATES), rng.uniform(-1, 1, (STATES, len(s.inputs)))
     ud = rng.uniform(-2, 2, (STATES, len(s.speeds)))
-    for f in routes.functions:
+    for f in (f for f in routes.functions if f != "switches"):  # what chatters is looked for in modules only
         many = {backend: evaluators[backend, f].many(t, x, inputs, ud) for backend in routes.units}
         for k in range(STATES):
             wanted = _exact(routes.equations, f, t[k], x[k], inputs[k], ud[k], p)

@@ -51,7 +51,7 @@ def test_every_function_compiles_and_agrees(name: str, derived: Callable[..., An
     equations = derived(name)
     functions = [f for f in everything(equations) if f != "jacobian_inputs" or equations.symbols.inputs]
     text = check(write(equations, "c", functions), name)
-    assert text.endswith("all results agree\n") and text.count(" ok ") == 2 * len(functions)
+    assert text.endswith("all results agree\n") and text.count(" ok ") >= 2 * len(functions)
 
 
 def test_results_without_entries(derived: Callable[..., Any], write: Callable[..., Path]) -> None:

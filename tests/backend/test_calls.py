@@ -220,7 +220,7 @@ def test_written_numpy_checks_itself(name: str, write: Callable[..., Path]) -> N
     path = write(equations(name), "numpy", functions) / f"{name}.py"
     done = subprocess.run([sys.executable, path.name, "--selftest"], cwd=path.parent, capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.endswith("all results agree\n"), done.stdout + done.stderr
-    assert len(re.findall(r" ok ", done.stdout)) == 2 * len(functions)
+    assert len(re.findall(r" ok ", done.stdout)) >= 2 * len(functions)
 
 
 # -- dialects

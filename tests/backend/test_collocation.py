@@ -68,3 +68,29 @@ def test_tail_makes_the_polynomial_right_for_one_power_more(method: Collocation)
     tail = np.polynomial.Polynomial(method.tail)(theta)
     np.testing.assert_allclose(through + tail * estimate, theta**(s + 1), rtol=0, atol=1e-13)
     assert np.abs(theta**(s + 1) - through).max() > 1e-3
+
+
+def test_extra_place_is_where_the_polynomial_is_farthest_from_stiff_motion(method: Collocation) -> None:
+    """Stiff motion t^(s+1) goes through start and stages: what the polynomial lacks is largest at the extra place."""
+    through = np.array([0.0, *method.nodes])
+    lacking = np.poly1d(through, r=True)
+    theta = np.linspace(0, 1, 2001)
+    assert abs(lacking(method.extra)) >= np.abs(lacking(theta)).max() * (1 - 1e-12)
+    assert method.gap_factor * lacking(method.extra) == pytest.approx(1, abs=1e-13)
+
+
+def test_slope_at_the_extra_place(method: Collocation) -> None:
+    """Of polynomials of degree s that begin at 0, and of the tail."""
+    c, s = np.array(method.nodes), len(method.nodes)
+    for k in range(1, s + 1):
+        assert method.extra_slope[:s] @ c**k == pytest.approx(k * method.extra**(k - 1), abs=1e-12)
+    assert method.extra_slope[s] == pytest.approx(np.polynomial.Polynomial(method.tail).deriv()(method.extra), abs=1e-12)
+
+
+def test_start_off_the_slow_motion_is_taken_from_the_gap(method: Collocation) -> None:
+    """x' = -lam x from 1 with infinite h lam: stages are 0, the estimate is -1, the gap is what the polynomial has there."""
+    at_start = np.prod([(c - method.extra) / c for c in method.nodes])
+    tail = np.polynomial.Polynomial(method.tail)(method.extra)
+    estimate = -1.0
+    gap = -(at_start + tail * estimate)
+    assert gap + method.tail_off * estimate == pytest.approx(0, abs=1e-13)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -57,7 +58,9 @@ def test_selftest_alone(name: str, derived: Callable[..., Any], write: Callable[
     functions = [f for f in FUNCTIONS if has_function(equations, f)]
     done = run_alone(write(equations, "numpy", functions) / f"{equations.name}.py", "--selftest")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("all results agree\n") and done.stdout.count(" ok ") == 2 * len(functions)
+    assert done.stdout.endswith("all results agree\n") and done.stdout.count(" ok ") >= 2 * len(functions)
+    visited, exercised, statements = map(int, re.search(r"(\d+) states visited, (\d+) of (\d+) statements", done.stdout).groups())
+    assert visited >= 2 and 0.8 * statements < exercised <= statements
 
 
 def test_selftest_notices_a_wrong_number(derived: Callable[..., Any], write: Callable[..., Path]) -> None:
@@ -180,4 +183,5 @@ def test_reference_states_avoid_what_is_undefined(tmp_path: Path) -> None:
     system.add_output("never", sp.acosh(sp.sin(q) / 2) + sp.log(-(q**2)))
     (path,) = write_source(emit(system.embedding(), "numpy"), tmp_path)
     text = run_alone(path, "--selftest").stdout
-    assert text.endswith("all results agree\n") and text.count("rhs ") == 2 and "outputs" not in text
+    assert text.endswith("all results agree\n") and text.count("rhs ") == 2 and "\noutputs" not in text
+    assert "not exercised: 6 of outputs" in text

@@ -172,7 +172,7 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(*given):
         raise OSError(28, "no space left")
 
-    monkeypatch.setattr("symdyn.bench.kept.os.replace", full)
+    monkeypatch.setattr("symdyn.runtime.stored.os.replace", full)
     with pytest.raises(OSError, match="no space left"):
         kept.put(path, "c", {})
     assert path.read_text() == before and [p.name for p in path.parent.iterdir()] == ["references.json"]

@@ -13,32 +13,17 @@ from symdyn.bench.work.record import Reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
 from symdyn.bench.work.subject import Subject
 from symdyn.errors import SymdynError
+from tests.mechanisms import four_bar_linkage
 
 SMALL = {"methods": ["dop853"], "tolerances": [1e-6, 1e-9], "repeats": 1, "end": 1.0}
 
 
-def linkage():
-    """A four-bar linkage that begins about where its loop is closed."""
-    q1, q2, q3 = sd.coordinates("q1:4")
-    g, m, l1, l2, l3, d = sd.parameters("g m l1 l2 l3 d", positive=True)
-    found = sd.System("linkage", gravity=[0, -g])
-    parent, at = found.ground, [0, 0]
-    for hinge, q, l in zip("ABC", (q1, q2, q3), (l1, l2, l3), strict=True):
-        bar = found.add_body(f"bar {hinge}", mass=m, inertia=m * l**2 / 12, com=[l / 2, 0])
-        found.add_joint(sd.Revolute(hinge, parent, bar, q, parent_point=at))
-        parent, at = bar, [l, 0]
-    found.close_loop(sd.Revolute("D", found.ground, bar, parent_point=[d, 0], child_point=at))
-    found.defaults = {g: 9.81, m: 1, l1: 0.8, l2: 1.8, l3: 1.6, d: 2}
-    found.initial = {q1: 1, "q2": -0.5, q3: -2}
-    return found
-
-
 def test_all_formulations_begin_at_the_nearest_state_on_the_constraints(tmp_path):
-    system = linkage()
+    system = four_bar_linkage()
     before = dict(system.initial)
     result = sd.bench(system, folder=tmp_path, **SMALL)
     assert system.initial == before  # the user's stays as it is
-    module = linkage().augmented().compile()
+    module = four_bar_linkage().augmented().compile()
     q, u = module.consistent()
     exact = module.simulate((0, 1.0), q, u, rtol=1e-12)
     np.testing.assert_allclose(result.reference.x[-1], exact.x[-1], rtol=0, atol=1e-9)
@@ -54,10 +39,10 @@ def test_all_formulations_begin_at_the_nearest_state_on_the_constraints(tmp_path
 
 
 def test_equations_begin_there_too_and_a_start_that_fits_stays():
-    equations = linkage().augmented()
+    equations = four_bar_linkage().augmented()
     result = sd.bench(equations, **SMALL)
     assert "q1 from 1 to" in result.notes[0] and all(r.error < 1e3 * r.tolerance for r in result.rows)
-    assert equations.symbols.initial == linkage().augmented().symbols.initial
+    assert equations.symbols.initial == four_bar_linkage().augmented().symbols.initial
     for about in (of_system(sd.systems.get("four_bar")), of_equations(sd.systems.get("four_bar").augmented())):
         moved, told = on_constraints(about, about.first())
         assert moved is about and told == ""
@@ -67,7 +52,7 @@ def test_equations_begin_there_too_and_a_start_that_fits_stays():
 
 
 def test_other_orientations_than_the_first_would_begin_elsewhere():
-    about = Subject("linkage", {"angles": linkage(), "parameters": linkage()}, 1.0)
+    about = Subject("linkage", {"angles": four_bar_linkage(), "parameters": four_bar_linkage()}, 1.0)
     moved, told = on_constraints(about, about.first())
     assert told and list(moved.variants) == ["angles"]
     from symdyn.bench.work.asked import checked

@@ -5,8 +5,9 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison.equality import decide
-from symdyn.comparison.points import Expressions, points
+from symdyn.comparison.points import Expressions, points, wide_points
 from symdyn.comparison.verdict import Verdict
+from symdyn.model.symbols import symbols_of
 
 x, y = sp.symbols("x y", real=True)
 a = sp.Symbol("a", positive=True)
@@ -28,7 +29,7 @@ def test_equal_formulas_are_found_equal_the_cheapest_way(printed, derived, way):
 def test_different_formulas_come_with_a_point_where_they_differ(printed, derived):
     (decision,) = decide([printed], [derived])
     assert decision.equal is False
-    where = {s: decision.point[s.name] for s in printed.free_symbols | derived.free_symbols}
+    where = {s: decision.point[s.name] for s in symbols_of(printed) | symbols_of(derived)}
     assert float(printed.subs(where)) == pytest.approx(decision.values[0], rel=1e-14)
     assert decision.values[0] != decision.values[1]
 
@@ -76,6 +77,59 @@ def test_printed_decimals_are_compared_as_rounded():
 def test_decimal_fractions_are_as_exact_as_floats():
     assert decide([sp.Float(9.81) * x], [sp.Rational(981, 100) * x])[0].equal is True
     assert decide([sp.Float(9.81) * x], [sp.Rational(9810001, 1000000) * x])[0].equal is False
+
+
+@pytest.mark.parametrize("printed, derived", [
+    (1.0 * x, 1.0 * x + 1e-14), (2.5 * a, 2.5 * a + 1e-17 * a**4), (0.5 * sp.sin(x), 0.5 * sp.sin(x) + 1e-20 * x**5)])
+def test_floats_that_agree_at_ordinary_sizes_are_compared_at_tiny_and_huge_ones(printed, derived):
+    (decision,) = decide([printed], [derived])
+    assert decision.equal is False and "the same to 13 digits at" in decision.how
+    (size,) = map(abs, decision.point.values())
+    assert not 0.2 <= size <= 7 and decision.values[0] != decision.values[1]
+
+
+@pytest.mark.parametrize("printed, derived", [
+    (sp.sin(9.81 * x), sp.sin(sp.Rational(981, 100) * x)), (a**1.4, a ** sp.Rational(7, 5)),
+    (sp.exp(-0.1 * a), sp.exp(-a / 10)), (0.1 * x + 0.2 * x, 0.3 * x)])
+def test_rounding_of_a_float_is_followed_through_the_expression_at_every_size(printed, derived):
+    (decision,) = decide([printed], [derived])
+    assert decision.equal is True and "24 random points" in decision.how and decision.how.endswith("13 digits")
+
+
+def test_numbers_too_near_for_rounding_and_for_another_number_are_not_decided():
+    (decision,) = decide([9.81 * x], [9.81000000001 * x])
+    assert decision.equal is None and "differ by up to 5e-13 of what the floats in them make up" in decision.how
+
+
+@pytest.mark.parametrize("condition", [
+    x < -10**8, sp.Eq(x, 3), sp.Eq(2 * x, y), (x > 3) & (x < sp.Rational(3001, 1000)), (x > 30) & (y**3 < -3 * 10**9),
+    sp.Abs(x) < sp.Rational(1, 10**15)])
+def test_points_are_made_in_branches_that_no_random_point_visits(condition):
+    (decision,) = decide([sp.Piecewise((2 * x + 1, condition), (x, True))], [x])
+    assert decision.equal is False and condition.subs({s: sp.Rational(decision.point[s.name])
+                                                         for s in condition.free_symbols})
+    assert "the same to 50 digits at 24 random points" in decision.how
+
+
+def test_branches_that_no_point_visits_are_named():
+    (one,) = decide([sp.Piecewise((1, sp.sin(x) > 2), (x, True))], [x])
+    assert one.equal is None and one.how.endswith("none of which lies in the branch sin(x) > 2")
+    (two,) = decide([sp.Piecewise((1, sp.sin(x) > 2), (2, x * y < -x**2 - y**2), (x, True))], [x])
+    assert two.equal is None and two.how.endswith("none of which lies in the branches sin(x) > 2; x*y < -x**2 - y**2")
+
+
+def test_branches_whose_conditions_contradict_each_other_are_not_missed():
+    spread = sp.atan2(sp.sin(x) * a, sp.cos(x) * a)
+    shown = sp.Piecewise((spread, x < 1), (1, x < -1), (spread, True), evaluate=False)
+    (decision,) = decide([shown], [sp.atan2(sp.sin(x), sp.cos(x))])
+    assert decision.equal is True
+
+
+def test_wide_points_cover_tiny_huge_and_special_values():
+    drawn = list(wide_points([x, a]))
+    assert drawn == list(wide_points([a, x])) and all(p["a"] > 0 for p in drawn)
+    sizes = [abs(p["x"]) for p in drawn]
+    assert min(sizes) < 1e-8 and max(sizes) > 1e5 and any(0 < abs(size - sp.pi.evalf(50) / 2) < 1e-5 for size in sizes)
 
 
 def test_points_are_the_same_in_every_run_and_come_near_and_far_with_both_signs():

@@ -11,6 +11,7 @@ from symdyn.comparison.reports import ERRATA_PAGE, FILES, PAGE, report, write_re
 from symdyn.comparison.result import Comparisons
 from symdyn.comparison.typeset import Lines, formula_latex, mathml, width
 from symdyn.comparison.verdict import Verdict
+from symdyn.model.symbols import symbols_of
 from symdyn.report.latex import letters
 from tests.helpers import browser
 
@@ -144,7 +145,7 @@ def test_lines_have_the_width_of_the_page_and_lose_nothing(value, room):
     assert len(lines) > 1 and max(map(letters, (line for line in lines if "matrix" not in line))) <= room + 3
     text = "".join(lines)
     sides = value if isinstance(value, tuple) else (value,)
-    assert all(str(sp.latex(s)) in text for side in sides for s in side.free_symbols)
+    assert all(str(sp.latex(s)) in text for side in sides for s in symbols_of(side))
 
 
 def test_names_of_wide_entries_are_explained_once():

@@ -11,6 +11,7 @@ import time
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
+import mpmath
 import numpy as np
 import pytest
 from scipy import stats
@@ -18,6 +19,7 @@ from scipy import stats
 import symdyn as sd
 from symdyn.ensembles import chunk, portable, run, store
 from symdyn.ensembles.archive import thinned
+from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
@@ -216,7 +218,6 @@ def test_motions_that_stop_early_and_functions_that_raise_are_failures(module):
     ({"q1": [1, 2]}, {"outcomes": ["q1 at 0.3"], "t": np.linspace(0, 1, 3)}, "at 0.3 s, which t does not have"),
     ({"q1": [1, 2]}, {"t": (1, 1)}, "t must be"),
     ({"q1": [1, 2]}, {"t": "long"}, "t must be"),
-    ({"q1": [1, 2]}, {"rtoll": 1}, "no option rtoll"),
     ({"q1": [1, 2]}, {"rtol": -1}, "none of 2 samples that were tried can be simulated; the first: .*tolerances"),
     ({"q1": [1, 2]}, {"chunk": 0}, "chunk must be a whole number from 1 on"),
     ({"q1": [1, 2]}, {"executor": 3}, "an executor must be"),
@@ -225,6 +226,11 @@ def test_motions_that_stop_early_and_functions_that_raise_are_failures(module):
 def test_what_does_not_fit_is_told_at_once(module, samples, options, message):
     with pytest.raises(ArgumentError, match=message):
         sd.ensemble(module, samples, **{"t": T, **options})
+
+
+def test_an_unknown_option_is_an_error(module):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'rtoll'"):
+        sd.ensemble(module, {"q1": [1, 2]}, T, rtoll=1)
 
 
 def test_what_is_no_mechanism_is_refused():
@@ -577,3 +583,46 @@ def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeyp
     ("double_pendulum", {"rtol": 1e-6}, True), ("double_pendulum", {"max_steps": 5}, False), ("four_bar", {}, False)])
 def test_vectors_serve_where_they_take_the_same_steps(name, options, expected):
     assert chunk.vectors_serve(recall(name, {}), False, options) is expected
+
+
+# -- far tails and larger counts
+
+
+@pytest.mark.parametrize("low, high", [
+    (9, 12), (-12, -9), (-1, 2), (-1, 40), (30, 31), (-31, -30), (30, 30.01), (-40, 40), (38, 1e6)])
+def test_truncated_normal_is_exact_in_every_tail(low, high):
+    """Mean, variance and distribution function against 40 digits; the standard deviation is 0.5, the mean 2."""
+    own = mpmath.mp.clone()
+    own.dps = 40
+    ends = {"from": 2 + low / 2, "to": 2 + high / 2}
+    n = 400
+    axis = read_axis({"distribution": "truncated_normal", "mean": 2, "std": 0.5, **ends}, "x", [])
+    values = axis.quantile((np.arange(n) + 0.5) / n)
+    a, b = ((own.mpf(ends[end]) - 2) * 2 for end in ("from", "to"))
+    mirrored = a > 0
+
+    def below(z):
+        return own.erfc(z / own.sqrt(2)) / -2 if mirrored else own.erfc(-z / own.sqrt(2)) / 2
+
+    whole = below(b) - below(a)
+    distances = [abs(float((below((own.mpf(float(v)) - 2) * 2) - below(a)) / whole - own.mpf(2 * k + 1) / (2 * n)))
+                 for k, v in enumerate(values)]
+    assert max(distances) < 5e-12
+    mean = float(2 + (own.npdf(a) - own.npdf(b)) / whole / 2)
+    assert values.mean() == pytest.approx(mean, abs=2e-3 * float(values.max() - values.min()))
+    assert ends["from"] <= values.min() < values.max() <= ends["to"] and len(set(values)) == n
+
+
+def test_the_upper_tail_has_the_published_mean():
+    """phi(9)/(1 - Phi(9)) = 9.10852..., from 9 to 12 the same to 1e-13."""
+    drawn = sd.Samples({"x": {"distribution": "truncated_normal", "mean": 0, "std": 1, "from": 9, "to": 12}}, count=4000, seed=3)
+    x = drawn.block(0, 4000)[:, 0]
+    assert x.mean() == pytest.approx(9.1085231, abs=4 * 0.1068 / np.sqrt(4000)) and (x < 12).all()
+
+
+@pytest.mark.parametrize("sampling, same", [("random", True), ("sobol", True), ("latin_hypercube", False)])
+def test_which_samples_stay_with_a_larger_count(sampling, same):
+    few, many = (sd.Samples({"x": {"from": 0, "to": 1}, "y": {"from": 2, "to": 3}}, sampling, count=count, seed=4).block(0, 16)
+                 for count in (16, 64))
+    assert np.array_equal(few, many) is same
+    assert "Latin hypercube depends on" in " ".join(sd.Samples.__doc__.split())

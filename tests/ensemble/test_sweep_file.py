@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from types import SimpleNamespace
 
@@ -70,6 +71,71 @@ def test_the_system_of_a_python_file(tmp_path, capsys):
                  "--no-picture", "--backend", "numpy", "--jobs", "1"]) == 0
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["backend"] == "numpy"
     assert "pendulum: 2 samples of q1" in capsys.readouterr().out
+
+
+EVIL = """import pathlib
+pathlib.Path(__file__).with_name("executed").touch()
+import symdyn as sd
+def system():
+    return sd.systems.pendulum()
+"""
+
+
+@pytest.mark.parametrize("name", ["evil.py", "./evil.py", "{folder}/evil.py", "evil", "{folder}/evil", "double_pendulum.py"])
+@pytest.mark.parametrize("sub", ["", "deeper"])
+def test_a_sweep_file_runs_no_program(tmp_path, capsys, monkeypatch, name, sub):
+    monkeypatch.chdir(tmp_path)
+    for program in ("evil.py", "evil", "double_pendulum.py"):
+        write(tmp_path, EVIL, program)
+    (tmp_path / sub).mkdir(exist_ok=True)
+    text = f'system = "{name.format(folder=tmp_path.as_posix())}"\nt = [0, 0.1]\n[initial]\nq1 = [0.1, 0.2]\n'
+    assert main(["sweep", write(tmp_path / sub, text), "--no-picture"]) == 2
+    told = capsys.readouterr().err
+    assert not list(tmp_path.rglob("executed")) and not (tmp_path / "generated").exists()
+    for part in ("system: must be a system of the catalogue", f"found '{name.format(folder=tmp_path.as_posix())}'"[:80],
+                 "runs no program", "--system ", "symdyn.ensemble(system, "):
+        assert part in told, (part, told)
+
+
+def test_the_command_that_the_message_names_runs_the_program(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, EVIL, "evil.py")
+    path = write(tmp_path, 'system = "evil.py"\nt = [0, 0.1]\n[initial]\nq1 = [0.1, 0.2]\n')
+    assert main(["sweep", path]) == 2
+    command = capsys.readouterr().err.split("symdyn sweep ")[1].split(";")[0]
+    assert main(["sweep", *shlex.split(command), "--no-picture", "--backend", "numpy", "--jobs", "1"]) == 0
+    assert (tmp_path / "executed").exists() and "pendulum: 2 samples of q1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("output", ["..", "../..", "../out", "a/../../out", "{folder}/out", "{folder}", ".", "", "./", "link",
+                                    "link/out", "loop/out", "a\\u0000b", "C:/out", "C:out", "//host/share/out", "..\\\\out",
+                                    "~/../out"])
+def test_a_sweep_file_writes_nowhere_but_below_its_folder(tmp_path, capsys, monkeypatch, output):
+    home = tmp_path / "home"
+    home.mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (home / "link").symlink_to(tmp_path / "elsewhere")
+    (home / "loop").symlink_to(home / "loop")
+    monkeypatch.chdir(tmp_path)
+    output = output.format(folder=(tmp_path / "elsewhere").as_posix())
+    text = f'system = "pendulum"\nt = [0, 0.1]\noutput = "{output}"\n[initial]\nq1 = [0.1, 0.2]\n'
+    path = write(home, text)
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["sweep", path, "--no-picture", "--backend", "numpy", "--jobs", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "output: must be" in told and (not output or ("a folder below" in told and "--output DIR" in told)), told
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_results_of_a_sweep_file_lie_below_its_folder(tmp_path, monkeypatch):
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.chdir(tmp_path)
+    path = write(home, 'system = "pendulum"\nt = [0, 0.1]\noutput = "a/b"\n[initial]\nq1 = [0.1, 0.2]\n')
+    assert main(["sweep", path, "--no-picture", "--backend", "numpy", "--jobs", "1"]) == 0
+    assert (home / "a" / "b" / "ensemble.npz").is_file() and not (tmp_path / "a").exists()
+    assert main(["sweep", path, "--no-picture", "--backend", "numpy", "--jobs", "1", "--output", "../elsewhere"]) == 0
+    assert (tmp_path.parent / "elsewhere" / "ensemble.npz").is_file()
 
 
 @pytest.mark.parametrize("backend, jobs, expected", [

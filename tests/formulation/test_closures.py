@@ -14,6 +14,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.formulation.constraints import Gathered
 from symdyn.formulation.tree_equations import tree_of
+from symdyn.model.symbols import symbols_of
 from symdyn.tape import Tape
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
@@ -87,7 +88,7 @@ class Rows:
 
 def rows_of(system: sd.System, seed: int = 1, given: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: {}) -> Rows:
     """given: values of some symbols for those of the others."""
-    system.set_defaults({s: v for s, v in NUMBERS.items() if any(s in e.free_symbols for e in _expressions(system))})
+    system.set_defaults({s: v for s, v in NUMBERS.items() if any(s in symbols_of(e) for e in _expressions(system))})
     model = system.check()
     tree = tree_of(model, "body")
     gathered = Gathered(tree)

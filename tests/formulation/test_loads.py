@@ -13,6 +13,7 @@ import sympy as sp
 from sympy.physics import mechanics as me
 
 import symdyn as sd
+from symdyn.model.symbols import symbols_of
 from tests import helpers
 from tests.oracles.kane import Scene
 
@@ -108,7 +109,7 @@ def by_kane(loads: Callable[[Arm], list], values: dict[str, Any]) -> np.ndarray:
 
 def solve(mass: sp.Matrix, right: sp.Matrix, names: dict[Any, str], values: dict[str, Any]) -> np.ndarray:
     """mass^-1 right at 40 digits; names: what stands in the matrices -> name among the values."""
-    rest = sorted((mass.free_symbols | right.free_symbols) - set(names), key=str)
+    rest = sorted((symbols_of(mass) | symbols_of(right)) - set(names), key=str)
     names = {**names, **{s: s.name for s in rest}}
     evaluate = sp.lambdify(list(names), [mass, right], modules="mpmath", cse=True)
     with mpmath.workdps(40):

@@ -85,12 +85,14 @@ def test_the_first_of_three_angles_may_lock(sequence: str, kind: type) -> None:
         assert found(top(sequence, kind, arms)) == found(top(sequence, kind, arms), solid=True) == [first]
 
 
-EULER = {"double_wishbone", "rolling_disc", "floating_wind_turbine", "floating_crane"}
+# The rate of the first Euler angle of a body that may turn any way.
+EULER = {"stewart_platform": "a_dot", **dict.fromkeys(
+    ("double_wishbone", "rolling_disc", "bicycle", "floating_wind_turbine", "floating_crane"), "psi_dot")}
 
 
 @pytest.mark.parametrize("name", names())
 def test_mechanisms_of_the_catalogue(name: str) -> None:
-    solid = ["psi_dot"] if name in EULER else []
+    solid = [EULER[name]] if name in EULER else []
     assert found(get(name), solid=True) == solid
     # The cargo is a point, and its rope has a pole where it lies along the first axis of its joint.
     assert found(get(name)) == solid + ["alpha_dot"] * (name == "floating_crane")
@@ -363,3 +365,55 @@ def test_in_floats_and_with_many_digits(make: Callable[[], sd.System]) -> None:
     exactly = numeric.at(q, u, digits=50)
     found = forward_dynamics(exactly.tree, exactly.applied.joint, exactly.applied.wrenches).u_dot
     np.testing.assert_allclose([float(v) for v in found], exact(equations, np.concatenate([q, u])), rtol=1e-12)
+
+
+# -- what only several links together hold
+
+
+def points_and_plate(turns: Any, constraint: bool) -> sd.System:
+    """A cart, a massless fork, a point mass off the axes of a custom joint of two angles, and a plate that slides on it."""
+    x, r, a, b, p1, p2, p3 = sd.coordinates("x r a b p1 p2 p3")
+    s = sd.System("plate", gravity=[0, 0, -9.81])
+    cart = s.add_body("cart", mass=2, inertia=[0.1, 0.2, 0.3])
+    fork = s.add_body("fork")
+    point = s.add_body("point", mass=1.5, com=[0.2, 0.3, 0.1])
+    plate = s.add_body("plate", mass=1, inertia=[0.1, 0.2, 0.3], com=[0.1, 0, 0])
+    s.add_joint(sd.Prismatic("rail", s.ground, cart, x, axis=X))
+    s.add_joint(sd.Revolute("fork", cart, fork, r, axis=Y, parent_point=[0.1, 0.2, 0.3]))
+    s.add_joint(sd.Custom("turns", fork, point, [a, b], rotation=turns(a, b)))
+    s.add_joint(sd.Planar("slide", point, plate, [p1, p2, p3]))
+    if constraint:
+        s.add_constraint(x - p1 - p3)
+    return s
+
+
+@pytest.mark.parametrize("turns", [lambda a, b: sp.rot_ccw_axis3(a) * sp.rot_ccw_axis1(b),
+                                   lambda a, b: sp.rot_ccw_axis1(a) * sp.rot_ccw_axis2(b)], ids=["zx", "xy"])
+def test_accelerations_where_several_links_together_hold_a_speed(turns: Any) -> None:
+    """Against the saddle-point system of the tree's own M_tilde, k_tilde, F_tilde without the constraint."""
+    free = points_and_plate(turns, False).embedding()
+    equations = points_and_plate(turns, True).augmented()
+    assert "r_dot" in found(points_and_plate(turns, True))
+    C = np.array([1.0, 0, 0, 0, -1, 0, -1])
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        q, u = rng.uniform(-0.5, 0.5, 7), rng.uniform(-1, 1, 7)
+        q[0], u[0] = q[4] + q[6], u[4] + u[6]
+        M, k, F = (free.lambdify(name)(q, u, []) for name in ("M_tilde", "k_tilde", "F_tilde"))
+        whole = np.block([[M, C[:, None]], [C[None], np.zeros((1, 1))]])
+        wanted = np.linalg.solve(whole, [*(F - k), 0.0])[:7]
+        got = equations.lambdify("accelerations")(q, u, [])
+        np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9 * abs(wanted).max())
+
+
+@pytest.mark.parametrize("form", ["embedding", "recursive", "augmented"])
+def test_a_coordinate_that_moves_no_mass_is_rejected_by_every_formulation(form: str) -> None:
+    """A load on it would move it by an infinite acceleration."""
+    q, p = sd.coordinates("q p")
+    s = sd.System("idle", gravity=[0, -9.81, 0])
+    arm, pointer = s.add_body("arm", mass=1, inertia=[1, 1, 1]), s.add_body("pointer")
+    s.add_joint(sd.Revolute("shoulder", s.ground, arm, q))
+    s.add_joint(sd.Revolute("axle", arm, pointer, p, parent_point=[1, 0, 0]))
+    s.add_joint_force("axle", sd.inputs("tau"))
+    with pytest.raises(sd.ModelError, match="joint 'axle': what it moves has no mass or inertia along p_dot; give body 'poi"):
+        getattr(s, form)()

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import symdyn as sd
 from symdyn.comparison import Verdict
 from symdyn.lecture import chapter_3_virtual_displacement as slope
+from symdyn.model.symbols import symbols_of
 
 LENGTH, G = 1.3, 9.81
 
@@ -25,7 +26,7 @@ def largest_stretch(right: bool) -> float:
 
     def rhs(_t: float, state: np.ndarray) -> np.ndarray:
         x, y, vx, vy = state
-        value = float(last.subs({s: dict(zip(names, (vx, vy)))[s.name] for s in last.free_symbols}))
+        value = float(last.subs({s: dict(zip(names, (vx, vy)))[s.name] for s in symbols_of(last)}))
         matrix = np.array([[1, 0, 2 * x], [0, 1, 2 * y], [2 * x, 2 * y, 0]])
         acceleration = np.linalg.solve(matrix, [0, -G, value])[:2]
         return np.array([vx, vy, *acceleration])
@@ -72,7 +73,7 @@ def test_the_reaction_of_a_slope_in_motion_works_in_the_actual_displacement_only
     values = {"q1": 2.0, "q1_dot": 0.3, "t": 0.0, "m": 1.5, "g": 9.81}
 
     def number(expression: sp.Expr) -> float:
-        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+        return float(expression.subs({s: values[s.name] for s in symbols_of(expression)}))
 
     # In the frame of the slope the Coriolis force lightens the push; against it the place under the mass sinks at q1 times 0.7.
     push = 1.5 * (9.81 * np.cos(0.4) - 2 * 0.3 * 0.7)

@@ -11,6 +11,7 @@ from compared import compared
 from symdyn.comparison import Verdict
 from symdyn.lecture import cases
 from symdyn.lecture.arm_in_space import block, cross, typeset
+from symdyn.model.symbols import symbols_of
 
 # Every line with something wrong, repetitions too.
 WRONG = {
@@ -39,10 +40,10 @@ def test_the_plane_hides_errors() -> None:
     of_case = next(case for case in cases() if case.name == "spatial-angular-acceleration")
     typed = next(f for f in of_case.taken() if f.name == wrong.name)
     letters = {str(letter): value for letter, value in typed.renamed.items()}
-    printed = [e.printed.xreplace({s: letters[s.name] for s in e.printed.free_symbols if s.name in letters})
+    printed = [e.printed.xreplace({s: letters[s.name] for s in symbols_of(e.printed) if s.name in letters})
                for e in wrong.entries]
     differences = sp.Matrix([a - e.right for a, e in zip(printed, wrong.entries)])
-    turning = [s for s in differences.free_symbols if s.name in ("q_a_dot", "q_a_ddot")]
+    turning = [s for s in symbols_of(differences) if s.name in ("q_a_dot", "q_a_ddot")]
     assert len(turning) == 2
     assert differences.subs(dict.fromkeys(turning, 0)).applyfunc(sp.simplify).is_zero_matrix
     assert not differences.subs(dict.fromkeys(turning, 1)).applyfunc(sp.simplify).is_zero_matrix

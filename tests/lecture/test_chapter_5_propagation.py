@@ -12,6 +12,7 @@ from symdyn.lecture import chapter_5_propagation_summary as summary
 from symdyn.lecture.propagation_arms import Arm
 from symdyn.lecture.propagation_letters import both_sides, evaluated, typeset
 from symdyn.lecture.propagation_newton import Newton
+from symdyn.model.symbols import symbols_of
 
 CASES = [case for module in (chapter_5_propagation, chapter_5_propagation_leaf, chapter_5_propagation_first, summary)
          for case in module.CASES]
@@ -91,7 +92,7 @@ def test_an_arm_has_no_other_letters() -> None:
 
 def test_one_joint_has_an_S_that_moves() -> None:
     found = next(f for f in chapter_5_propagation.CASES[0].taken() if f.name == "acceleration of b2 where S moves")
-    q = {str(s): s for s in found.derived.free_symbols}
+    q = {str(s): s for s in symbols_of(found.derived)}
     # The axis q2 turns about x of link 1, which q3 tilts in b2 at the rate q3_dot.
     assert sp.diff(found.derived[0], q["q2_dot"], q["q3_dot"]) == -sp.sin(q["q3"])
     assert sp.diff(found.derived[2], q["q2_dot"], q["q3_dot"]) == sp.cos(q["q3"])

@@ -11,50 +11,31 @@ import mpmath
 import numpy as np
 import sympy as sp
 
+from symdyn.lab.draft import Numbers
 from symdyn.model.joints import Joint
+from symdyn.model.symbols import symbols_of
 
 DIGITS = 50
 TOLERANCE = mpmath.mpf(10) ** -18
 
 
-class Numbers:
-    """The algebra that joints are written for, on mpmath's numbers; `values` for the symbols of expressions."""
-
-    def __init__(self, values: Mapping[sp.Basic, Any]) -> None:
-        self.values = dict(values)
-        self.sin, self.cos, self.sqrt = mpmath.sin, mpmath.cos, mpmath.sqrt
-
-    def within(self, values: Mapping[sp.Basic, Any]) -> Numbers:
-        return Numbers({**self.values, **values})
-
-    def divisor(self, value: Any, least: Any, reason: str) -> Any:
-        assert value > float(least), reason
-        return value
-
-    def expression(self, e: sp.Expr) -> Any:
-        symbols, function = _function(e)
-        return function(*[self.values[s] for s in symbols])
-
-    def constants(self, values: Any) -> np.ndarray:
-        result = np.empty(len(values), dtype=object)
-        result[:] = [self.expression(e) for e in values]
-        return result
-
-    def matrix(self, values: sp.MatrixBase) -> np.ndarray:
-        return self.constants(list(values)).reshape(values.shape)
+def with_many_digits(e: sp.Expr, values: Mapping[sp.Basic, Any]) -> Any:
+    """An expression as one of mpmath's numbers."""
+    symbols, function = _function(e)
+    return function(*[values[s] for s in symbols])
 
 
 @lru_cache(maxsize=4096)
 def _function(e: sp.Expr) -> tuple[list[sp.Symbol], Any]:
-    symbols = list(e.free_symbols)
+    symbols = list(symbols_of(e))
     return symbols, sp.lambdify(symbols, e, "mpmath") if symbols else partial(mpmath.mpmathify, sp.N(e, 4 * DIGITS))
 
 
 def drawn(joint: Joint, seed: int) -> tuple[Numbers, list[Any], list[Any]]:
     """An algebra with numbers for the parameters, coordinates (a unit vector of Euler parameters) and speeds."""
     rng = random.Random(seed)
-    parameters = sorted({s for e in joint.constants for s in e.free_symbols}, key=str)
-    algebra = Numbers({s: mpmath.mpf(rng.uniform(0.5, 1.5)) for s in parameters})
+    parameters = sorted({s for e in joint.constants for s in symbols_of(e)}, key=str)
+    algebra = Numbers({s: mpmath.mpf(rng.uniform(0.5, 1.5)) for s in parameters}, with_many_digits, mpmath)
     s = [mpmath.mpf(rng.uniform(0.2, 1.2)) for _ in joint.coordinates]
     if len(joint.coordinates) != joint.n_speeds:
         norm = mpmath.norm(s[-4:])

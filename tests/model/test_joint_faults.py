@@ -49,7 +49,7 @@ CASES: dict[str, tuple[Callable[..., Any], str]] = {
     "pitch infinite": (lambda *n: sd.Helical(*n, a, pitch=sp.oo), "pitch (m/rad) is oo; pass a finite number"),
     "pitch moving": (lambda *n: sd.Helical(*n, a, pitch=q1), "joint 'wrist' depends on q1|must be constant|use parameters"),
     "pitch an input": (lambda *n: sd.Helical(*n, a, pitch=tau), "joint 'wrist' depends on tau|must be constant"),
-    "screw axis": (lambda *n: sd.Helical(*n, a, axis=[1, 1, 0], pitch=h), "axis [1, 1, 0] has length 1.41421"),
+    "screw axis": (lambda *n: sd.Helical(*n, a, axis=[h, 1, 0], pitch=h), "axis [h, 1, 0] has length"),
     "velocity": (lambda *n: sd.Free(*n, velocity="child"), "joint 'wrist': velocity is 'child'; pass 'parent'|or 'body'"),
     "prescribed angular velocity": (
         lambda *n: sd.Spherical(*n, [a, b, sp.sin(sd.t)], sd.EulerAngles("XYZ", "body")),

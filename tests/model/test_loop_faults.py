@@ -87,7 +87,7 @@ CHECKED: dict[str, Case] = {
     "twice": (lambda s: [s.close_loop(rod) for rod in 2 * [sd.Rod("rod", s.ground, "lower", 1)]], "2 joints are named 'rod'"),
     "name of the ground's motion": (lambda s: [s.move_ground([sd.t, 0, 0]), s.close_loop(
         sd.Rod("ground_motion", s.ground, "lower", 1))], "2 joints are named 'ground_motion'"),
-    "axis": (lambda s: loop(s, sd.Revolute, axis=[1, 1, 0]), "joint 'loop': axis [1, 1, 0] has length 1.41421"),
+    "axis": (lambda s: loop(s, sd.Revolute, axis=[0, 0, 0]), "joint 'loop': axis [0, 0, 0] has length 0, not 1"),
     "point moving": (lambda s: loop(s, sd.Fixed, parent_point=[q1, 0, 0]), "joint 'loop' depends on q1|must be constant"),
     "symbol not declared": (lambda s: [setattr(s, "declared", (m,)), loop(s, sd.Fixed, parent_point=[l, 0, 0])],
                             "joint 'loop' uses the symbol l, not declared in the model; declared: m"),

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+import re
 from typing import Any
 
 import pytest
 import sympy as sp
+from sympy.physics import mechanics
 from sympy.physics.mechanics import dynamicsymbols, mlatex
 from sympy.physics.vector.printing import vlatex
 
@@ -14,7 +16,8 @@ import symdyn as sd
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, as_coordinate, as_expression, take_over
 from tests import helpers
 
-q1, theta = sd.coordinates("q1 theta")
+q1, q2, theta = sd.coordinates("q1 q2 theta")
+c = sd.parameters("c")
 t = sd.t
 
 
@@ -60,7 +63,49 @@ def test_the_derivative_of_a_positive_coordinate_may_be_negative() -> None:
 def test_derivatives_by_symbols() -> None:
     expression = q1.dot**2 * sp.sin(q1)
     assert expression.diff(q1) == q1.dot**2 * sp.cos(q1) and expression.diff(q1.dot) == 2 * q1.dot * sp.sin(q1)
-    assert expression.diff(t) == 0
+
+
+def test_sympys_derivatives_by_time_are_total_ones() -> None:
+    tau, k = sd.inputs("tau"), sp.Symbol("k")
+    assert q1.diff(t) == q1.diff() == sp.diff(q1, t) == sp.diff(q1) == q1.dot and q1.diff(t, 2) == q1.dot.diff(t) == q1.ddot
+    assert sp.sin(q1).diff(t) == sp.cos(q1) * q1.dot and (k * q1 * t**2).diff(t) == 2 * k * q1 * t + k * q1.dot * t**2
+    assert sp.Derivative(sp.sin(q1), t).doit() == sp.sin(q1).diff(t) and sp.Derivative(q1, t, evaluate=True) == q1.dot
+    assert sp.Matrix([[q1, k], [t, q1.dot]]).diff(t) == sp.Matrix([[q1.dot, 0], [1, q1.ddot]])
+    assert sd.speeds("w").diff(t) == sd.speeds("w").dot and q1.diff(q1) == 1 and q1.diff(q2) == q1.dot.diff(q1) == 0
+    energy = k * q1.dot**2 * q1 / 2
+    assert energy.diff(q1.dot).diff(t) - energy.diff(q1) == k * q1 * q1.ddot + k * q1.dot**2 / 2
+    with pytest.raises(ValueError, match=r"variable\(s\) of differentiation must be supplied"):
+        sp.sin(q1).diff()
+    for unknown in (tau.diff(t), q1.ddot.diff(t), q1.diff(t, 3)):
+        assert isinstance(unknown, sp.Derivative) and unknown != 0
+        with pytest.raises(sd.ModelError, match=r"which has no value.*a coordinate and its \.dot"):
+            as_expression(k * unknown, "the torque")
+
+
+def test_partial_derivatives_by_time_hold_what_moves() -> None:
+    tau, k = sd.inputs("tau"), sp.Symbol("k")
+    expression = k * t**2 * sp.sin(q1 + t) + q1.dot * t + tau
+    held = sp.Symbol("x")
+    assert sd.partial_rate(expression) == (k * t**2 * sp.sin(held + t)).diff(t).subs(held, q1) + q1.dot
+    assert sd.partial_rate(sp.Matrix([[q1, t * q1]])) == sp.Matrix([[0, q1]]) and sd.partial_rate(q1.ddot) == 0
+    with pytest.raises(sd.ModelError, match="partial_rate was given 3 of type int; pass an expression or a matrix"):
+        sd.partial_rate(3)
+
+
+def test_a_damper_written_as_a_derivative_damps() -> None:
+    taken = [as_expression(-c * rate, "damper") for rate in (q1.diff(t), q1.diff(), sp.Derivative(q1, t), q1.dot)]
+    assert taken == [-c * q1.dot] * 4
+    assert as_expression(sp.Derivative(sp.sin(q1), t), "value") == sp.cos(q1) * q1.dot
+    f = mechanics.dynamicsymbols("q1")
+    assert as_expression(sp.Derivative(f * sp.sin(f), t), "value") == (q1 * sp.sin(q1)).diff(t)
+
+
+def test_sympys_frames_turn_with_the_rates_of_coordinates() -> None:
+    n = mechanics.ReferenceFrame("n")
+    a = n.orientnew("a", "Axis", [q1, n.z])
+    b = a.orientnew("b", "Body", [q2, 0, 0], "XYZ")
+    assert a.ang_vel_in(n) == q1.dot * n.z and b.ang_vel_in(n) == q1.dot * n.z + q2.dot * b.x
+    assert (q1 * a.x).dt(n) == q1.dot * a.x + q1 * q1.dot * a.y
 
 
 # -- printing
@@ -148,6 +193,38 @@ def test_plain_symbols_as_coordinates() -> None:
     s = sd.System("slide")
     s.add_joint(sd.Prismatic("rail", s.ground, s.add_body("cart", mass=2), q))
     assert s.check().coordinates == (sd.coordinates("q"),)
+
+
+def test_dynamicsymbols_and_coordinates_of_one_name_are_one() -> None:
+    ours = sd.coordinates("q")
+    theirs = dynamicsymbols("q")
+    assert as_expression(theirs * ours.dot + theirs.diff(t), "value") == ours * ours.dot + ours.dot
+    assert _pendulum(ours, theirs.diff(t)).embedding().F_tilde == _pendulum(ours, ours.dot).embedding().F_tilde
+    real = sd.coordinates("q", real=True)
+    assert as_coordinate(dynamicsymbols("q", real=True)) == real
+    assert _pendulum(real, dynamicsymbols("q", real=True).diff(t)).check().coordinates == (real,)
+
+
+@pytest.mark.parametrize(("made", "used"), [(sd.coordinates("q", real=True), dynamicsymbols("q")),
+                                            (dynamicsymbols("q"), sd.coordinates("q", real=True))])
+def test_symbols_of_one_name_with_other_assumptions_are_named(made: Any, used: Any) -> None:
+    one, other = ("real=True", "out assumptions") if isinstance(made, Coordinate) else ("out assumptions", "real=True")
+    with pytest.raises(sd.ModelError) as caught:
+        _pendulum(made, used.diff(t)).check()
+    assert re.search(f"torque_1 uses q_dot, the derivative of a coordinate or speed with ?{other}, but q_dot of the system is "
+                     rf"the derivative of a coordinate or speed with ?{one}; use the same symbol in both .SymPy's q\(t\)",
+                     str(caught.value))
+    with pytest.raises(sd.ModelError, match=f"uses q, a coordinate with ?{other}, but q among the coordinates is a coordinate "
+                                            f"with ?{one}; use the same symbol"):
+        sd.embedding([made], [sp.cos(made) * sp.sin(used), sp.sin(made)], [1, 1])
+
+
+def test_a_speed_and_a_dynamicsymbol_of_one_name_are_named() -> None:
+    with pytest.raises(sd.ModelError, match="uses u, a coordinate without assumptions, but u of the system is a speed without"):
+        _pendulum(q1, dynamicsymbols("u"), speed=sd.speeds("u")).check()
+    with pytest.raises(sd.ModelError, match=r"2 different symbols are named .q1. .*, a coordinate without assumptions and a "
+                                            "parameter without assumptions; make each symbol once"):
+        _pendulum(q1, sp.Symbol("q1")).check()
 
 
 # -- order

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.rotation.determination import to_euler
+from symdyn.rotation.euler import from_euler
 from tests.rotation.orientations import difference, uniform
 
 rotation = sd.rotation
@@ -199,3 +203,24 @@ def test_numbers_in_arrays_out_and_expressions_in_matrices_out() -> None:
                    rotation.euler_rates("ZYX", np.array([one, 1, 1], dtype=object)), rotation.vee(sp.ImmutableMatrix.zeros(3)),
                    rotation.parameters_rate([1, 0, 0, 0], [sp.Symbol("x"), 0, 0]), rotation.vee(sp.MatrixSymbol("S", 3, 3))]
     assert all(isinstance(value, sp.Matrix) for value in expressions)
+
+
+# -- both solutions as a sequence
+
+
+def test_solutions_are_indexed_counted_and_unpacked():
+    found = to_euler(from_euler("ZYX", [0.3, -0.4, 0.9]), "ZYX")
+    first, second = found
+    assert isinstance(found, Sequence) and len(found) == 2
+    assert found[0] is found.angles is first and found[1] is found[-1] is found.other is second
+    assert [len(solution) for solution in found] == [3, 3] and found[:1] == (found.angles,)
+    with pytest.raises(IndexError):
+        found[2]
+
+
+def test_solutions_of_symbols_and_of_many_rotations_are_sequences_too():
+    q = sp.Symbol("q", real=True)
+    R = sp.Matrix([[sp.cos(q), -sp.sin(q), 0], [sp.sin(q), sp.cos(q), 0], [0, 0, 1]])
+    assert len(to_euler(R, "ZYX")) == 2 and to_euler(R, "ZYX")[1].shape == (3, 1)
+    many = to_euler(np.stack([np.eye(3)] * 4), "ZYX")
+    assert len(many) == 2 and many[0].shape == (4, 3)

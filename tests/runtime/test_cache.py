@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import importlib.util
 import math
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from symdyn.errors import CompileError
+from symdyn.errors import CacheError, CacheWarning, CompileError
 from symdyn.runtime import cache as subject
+from symdyn.runtime import cache_folder
 from symdyn.runtime import compiler as compilers
 from symdyn.runtime.cache import SUFFIX, build, cache_dir, load
 from symdyn.runtime.compiler import Compiler, find_compiler
+from symdyn.runtime.recall import recall
+from symdyn.runtime.unit import PythonUnit
 
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="the compilers of these tests are shell scripts"
@@ -39,7 +47,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache of its own for each test."""
     for cached in (
         subject._cpu,
-        subject._private,
+        cache_folder._private,
+        cache_folder._report,
         compilers._search,
         compilers.probe,
         compilers._accepts_native,
@@ -81,7 +90,7 @@ def builds(tmp_path: Path) -> int:
 
 
 def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir() if path.name != "zig")
+    return sorted(path.name for path in folder.iterdir() if path.name != "zig" and path.suffix != ".sha256")
 
 
 def value(library: ctypes.CDLL) -> float:
@@ -204,8 +213,23 @@ def test_killed_half_way(
     assert [name for name in names(folder) if name.startswith("build-")] == ["build-in-use"]
 
 
+def flipped(whole: bytes) -> bytes:
+    """One bit in the middle, where the code is."""
+    k = len(whole) // 2
+    return whole[:k] + bytes([whole[k] ^ 16]) + whole[k + 1 :]
+
+
 @pytest.mark.parametrize(
-    "damage", [lambda whole: b"", lambda whole: whole[: len(whole) // 2], lambda whole: b"no" * 999]
+    "damage",
+    [
+        lambda whole: b"",
+        lambda whole: whole[: len(whole) // 2],
+        lambda whole: b"no" * 999,
+        flipped,
+        lambda whole: whole[: len(whole) // 2] + bytes(len(whole) - len(whole) // 2),
+        lambda whole: whole[:64] + bytes(len(whole) - 64),
+        lambda whole: whole + b"\0",
+    ],
 )
 def test_damaged_file_is_built_again(
     damage: Callable[[bytes], bytes], fake: Callable[[str], Compiler], real: Compiler, tmp_path: Path
@@ -213,8 +237,196 @@ def test_damaged_file_is_built_again(
     compiler = fake(f'exec {real.command[0]} {" ".join(real.command[1:])} "$@"')
     path = build(KERNEL, "m", compiler)
     path.write_bytes(damage(path.read_bytes()))
+    assert not subject.is_built(KERNEL, "m", compiler)
     assert value(load(KERNEL, "m", compiler)) == EXPECTED
-    assert builds(tmp_path) == 2
+    assert builds(tmp_path) == 2 and subject.is_built(KERNEL, "m", compiler)
+
+
+FOREIGN = """
+#include <stdio.h>
+#include <stdlib.h>
+__attribute__((constructor)) static void executed(void) { exit(99); }
+double kernel(double x) { return x; }
+"""
+
+
+def test_a_foreign_library_is_not_loaded(real: Compiler, folder: Path, tmp_path: Path) -> None:
+    path, foreign = build(KERNEL, "m", real), build(FOREIGN, "foreign", real)
+    seal = foreign.with_name(foreign.name + ".sha256")
+    # With its own digest too, which holds under its own name only; a loaded one would end this process with code 99.
+    for digest in (None, seal.read_text()):
+        path.unlink()  # what is loaded must not change under the loader
+        path.write_bytes(foreign.read_bytes())
+        if digest is not None:
+            path.with_name(path.name + ".sha256").write_text(digest)
+        assert value(load(KERNEL, "m", real)) == EXPECTED
+    path.with_name(path.name + ".sha256").unlink()
+    assert value(load(KERNEL, "m", real)) == EXPECTED
+
+
+def test_a_library_that_others_may_write_is_built_again(fake: Callable[[str], Compiler], tmp_path: Path) -> None:
+    compiler = fake('cp "$3" "$2"')
+    path = build("a", "m", compiler)
+    assert path.stat().st_mode & 0o777 == 0o700
+    path.chmod(0o666)
+    assert build("a", "m", compiler) == path and builds(tmp_path) == 2
+    assert not path.stat().st_mode & 0o022
+
+
+def test_a_folder_in_the_place_of_a_library(fake: Callable[[str], Compiler], folder: Path) -> None:
+    compiler = fake('cp "$3" "$2"')
+    path = subject._target("a", "m", compiler)
+    path.mkdir()
+    (path / "something").touch()
+    with pytest.raises(CacheError) as caught:
+        load("a", "m", compiler)
+    message = f"{path.name} cannot be put into the cache folder {folder}: there is a folder of that name; remove it"
+    assert message in str(caught.value)
+    assert names(folder) == [path.name]
+
+
+def test_a_full_disk_is_an_error_of_its_own(
+    fake: Callable[[str], Compiler], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*arguments: object, **options: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    compiler = fake('cp "$3" "$2"')
+    for broken in ((Path, "write_text"), (os, "replace"), (os, "fsync"), (tempfile, "TemporaryDirectory")):
+        with monkeypatch.context() as patch:
+            patch.setattr(*broken, full)
+            with pytest.raises(CacheError, match=r"No space left on device\. Free some space.*SYMDYN_CACHE_DIR"):
+                build("a", "m", compiler)
+    assert names(folder) == []
+    for broken in ((os, "open"), (os, "replace")):
+        with monkeypatch.context() as patch:
+            patch.setattr(*broken, full)
+            with pytest.raises(CacheError, match=r"line-.* No space left on device\. Free some space"):
+                PythonUnit.from_source("METADATA = {}\n", "line")
+    assert names(folder) == []
+    with monkeypatch.context() as patch:
+        folder.rmdir()
+        folder.touch()
+        patch.setattr(os, "mkdir", full)
+        with pytest.raises(CacheError, match="no folder can be made for generated code: No space left"):
+            cache_dir()
+
+
+def test_long_names_fit_into_names_of_files(fake: Callable[[str], Compiler], folder: Path) -> None:
+    assert build("a", "m" * 300, fake('cp "$3" "$2"')).parent == folder
+    assert PythonUnit.from_source("METADATA = {}\n", "m" * 300).metadata == {}
+
+
+# -- NumPy modules
+
+
+SOURCE = "METADATA = {{'name': 'line'}}\n{}\nSLOPE = 2.5\n".format("#" * 100)
+
+
+def test_threads_that_write_the_same_module(folder: Path) -> None:
+    """All at once, over and over: each has a scratch file of its own, and none sees a half."""
+    for k in range(20):
+        text, start = SOURCE + f"K = {k}\n" + "A = 1\n" * 2000, threading.Barrier(8)
+
+        def make(text: str = text, start: threading.Barrier = start) -> int:
+            start.wait()
+            return int(PythonUnit.from_source(text, "line").module.K)
+
+        with ThreadPoolExecutor(8) as threads:
+            assert {job.result() for job in [threads.submit(make) for _ in range(8)]} == {k}
+    assert not [name for name in names(folder) if name.endswith(".tmp")]
+
+
+def test_damaged_modules_are_written_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.setattr(sys, "pycache_prefix", None)
+    for _ in range(2):  # the second time from byte code
+        assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5
+    (source,), (code,) = folder.glob("*.py"), folder.rglob("*.pyc")
+    assert not (source.stat().st_mode | code.stat().st_mode) & 0o077
+    stamp = source.stat()
+    source.write_text(SOURCE.replace("2.5", "3.5"))
+    os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+    assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5 and source.read_text() == SOURCE
+    whole = code.read_bytes()
+    number = struct.pack("<d", 2.5)
+    assert whole.count(number) == 1
+    for damaged in (whole.replace(number, struct.pack("<d", 3.5)), whole[:-9] + bytes(9), whole[:70], b"", flipped(whole)):
+        code.write_bytes(damaged)
+        os.utime(source, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+        assert PythonUnit.from_source(SOURCE, "line").module.SLOPE == 2.5
+    source.unlink()
+    source.mkdir()
+    with pytest.raises(CacheError, match="there is a folder of that name; remove it"):
+        PythonUnit.from_source(SOURCE, "line")
+
+
+def test_a_damaged_record_is_derived_again(folder: Path) -> None:
+    expected = recall("pendulum", {}, "numpy").rhs(0.0, [0.3, 0.0])
+    (record,) = folder.glob("pendulum-*.json")
+    text = record.read_text()
+    number = "9.81"
+    assert number in text and not record.stat().st_mode & 0o077
+    for damaged in (text.replace(number, "9.91"), text[65:], text[:-20], "", text[:64] + "\nnull"):
+        record.write_text(damaged)
+        assert (recall("pendulum", {}, "numpy").rhs(0.0, [0.3, 0.0]) == expected).all()
+        assert record.read_text() == text
+
+
+# -- a folder that others may write to
+
+
+posix = pytest.mark.skipif(os.name != "posix", reason="mode bits of POSIX")
+
+
+@posix
+@pytest.mark.parametrize("mode, who", [(0o777, "its group and everyone"), (0o1777, "its group and everyone"),
+                                       (0o775, "its group"), (0o757, "everyone")])
+def test_a_folder_open_to_others_is_reported_and_not_used(
+    mode: int, who: str, fake: Callable[[str], Compiler], folder: Path, tmp_path: Path
+) -> None:
+    compiler = fake('cp "$3" "$2"')
+    planted = build("a", "m", compiler)
+    folder.chmod(mode)
+    private = tmp_path / f"symdyn-{os.getuid()}"
+    with pytest.warns(CacheWarning) as caught:
+        assert build("a", "m", compiler) == private / planted.name
+    (message,) = [str(w.message) for w in caught]
+    for part in (f"the cache folder {folder} is not used: its mode {mode:04o} lets {who} write to it",
+                 f"{private} takes its place", "chmod go-w", "SYMDYN_CACHE_DIR"):
+        assert part in message, message
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # said once
+        assert cache_dir() == private
+    folder.chmod(0o755)
+    assert cache_dir() == folder
+
+
+@posix
+def test_a_folder_that_everyone_may_replace_is_not_used(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    above = tmp_path / "above"
+    above.mkdir()
+    above.chmod(0o777)
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", str(above / "cache"))
+    with pytest.warns(CacheWarning, match=f"the mode 0777 of {above} lets everyone put another folder in its place"):
+        assert cache_dir() == tmp_path / f"symdyn-{os.getuid()}"
+    above.chmod(0o1777)
+    assert cache_dir() == above / "cache" and (above / "cache").stat().st_mode & 0o777 == 0o700
+
+
+@posix
+@pytest.mark.skipif(os.name == "posix" and os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_folder_of_another_user_is_not_used(folder: Path, tmp_path: Path) -> None:
+    folder.mkdir()
+    os.chown(folder, 12345, -1)
+    with pytest.warns(CacheWarning, match="it belongs to the user with the number 12345"):
+        assert cache_dir() == tmp_path / f"symdyn-{os.getuid()}"
+
+
+def test_the_home_of_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", "~nobody-is-called-this/x")
+    with pytest.raises(CacheError, match="'~nobody-is-called-this/x' names the home folder of a user that is not known here"):
+        cache_dir()
 
 
 def test_library_that_never_loads(fake: Callable[[str], Compiler], tmp_path: Path) -> None:

@@ -182,7 +182,6 @@ def test_picture(tmp_path: Any) -> None:
     ({"blades": [("a", "b", "c")]}, "blades: there is no 'c'"),
     ({"blades": 3}, "blades must be a list of sets of coordinates, found 3"),
     ({"azimuths": "x"}, "azimuths must be a whole number, found 'x'"),
-    ({"foo": 3}, "options: there is no 'foo'; there are free, fixed, start"),
     ({"speed": None}, "speed must be one name or symbol, found None"),
     ({"max_iterations": 0}, "max_iterations must be a whole number of at least 1, found 0"),
 ])
@@ -202,7 +201,7 @@ def test_sets_hold_the_same_coordinate_of_every_blade() -> None:
 
 
 def test_picture_of_many_modes() -> None:
-    """One colour for each part, a name at every right end; what lies far above is left out and told; rpm above."""
+    """One colour for each part, a name at every right end; what lies far above is left out and reported; rpm above."""
     pytest.importorskip("matplotlib")
     from symdyn.runtime.pictures.campbell import part
 

@@ -105,7 +105,7 @@ def test_reactions() -> None:
     np.testing.assert_array_equal(solution.reaction("hinge2", "bar1"), solution.reaction("hinge2", "parent"))
     with pytest.raises(ArgumentError, match=r"no reaction of a joint .hinge. is known; did you mean hinge[1-4] or"):
         solution.reaction("hinge")
-    with pytest.raises(ArgumentError, match="no frame 'bar7'; there are ground, parent, child, bar1"):
+    with pytest.raises(ArgumentError, match="no frame 'bar7'; there are inertial, ground, parent, child, bar1"):
         solution.reaction("hinge1", "bar7")
 
 

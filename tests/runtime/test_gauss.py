@@ -15,6 +15,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.lab import kinks
 from tests.helpers import GRAVITY, swing
 from tests.runtime.constrained import module as constrained
 from tests.user_functions import BOUNDED
@@ -185,18 +186,33 @@ def pushed() -> Any:
     return system.embedding().compile("c")
 
 
-def test_inputs_by_a_table_are_refused_by_a_function_taken() -> None:
+def test_inputs_by_a_table_are_rejected_by_a_smooth_function_taken() -> None:
     """F = sin(2 t): x = (2 sin t - sin 2t)/3."""
     module = pushed()
     times = np.linspace(0, 5, 51)
     rows = np.sin(2 * times)
     for table in ({"F": (times, rows)}, (times, rows[:, None])):
         with pytest.raises(ArgumentError, match=r"pushed: method 'gauss' does not fit: inputs by a table have a kink at each of "
-                                                r"its times, .*use method='dop853', a smooth function of t and x, or expr"):
+                                                r"its times, .*use method='dop853', a smooth function of t and x, sd.Smooth"):
             module.simulate([0.0, 5.0], inputs=table, **GAUSS)
-    for smooth in ({"F": lambda t, x: np.sin(2 * t)}, lambda t, x: [np.sin(2 * t)]):
+    for smooth in ({"F": sd.Smooth(lambda t, x: np.sin(2 * t))}, sd.Smooth(lambda t, x: [np.sin(2 * t)])):
         found = module.simulate(times[::10], inputs=smooth, rtol=1e-11, **GAUSS)
         np.testing.assert_allclose(found.q[:, 0], ((2 * np.sin(times) - rows) / 3)[::10], rtol=0, atol=1e-9)
+
+
+def test_functions_are_taken_where_they_are_declared_smooth_alone() -> None:
+    """Most jumps and many kinks leave no sign in the steps of one length; the other methods get shorter there."""
+    module = pushed()
+    jump = lambda t, x: [float(t > 3.21)]
+    for given in (jump, {"F": lambda t, x: float(t > 3.21)}):
+        with pytest.raises(ArgumentError, match=r"pushed: method 'gauss' does not fit: an input by a function may jump or have "
+                                                r"kinks, .*use method='dop853', 'bs54', 'radau' or 'radau5', .*sd\.Smooth\(fun"):
+            module.simulate((0, 20), inputs=given, **GAUSS)
+    for method in ("dop853", "bs54", "radau", "radau5"):
+        end = module.simulate(np.array([0.0, 20.0]), inputs=jump, rtol=1e-8, method=method).q[-1, 0]
+        assert abs(end - (1 - np.cos(20 - 3.21))) < 1e-6
+    with pytest.raises(ArgumentError, match=r"sd.Smooth declares that a function of \(t, x\) is smooth, found 3"):
+        sd.Smooth(3)
 
 
 def test_right_hand_sides_that_switch_are_refused() -> None:
@@ -229,7 +245,7 @@ def test_kinks_that_the_equations_do_not_tell_are_warned_of() -> None:
         for given in ({"rtol": 1e-8}, {"first_step": 0.1}):
             with pytest.warns(SimulationWarning, match=r"pushed: method 'gauss' went across kinks or jumps .*latest of them just "
                                                        r"before t = [\d.]* s: .*[1-9]\d* differ .*; use method='dop853'"):
-                found = module.simulate(np.array([0.0, 20.0]), [0.6], inputs=force, **GAUSS, **given)
+                found = module.simulate(np.array([0.0, 20.0]), [0.6], inputs=sd.Smooth(force), **GAUSS, **given)
             assert found.success and found.n_steps < 260
 
 
@@ -239,7 +255,7 @@ def test_smooth_inputs_are_not_warned_of(force: Any) -> None:
     for given in ({"rtol": 1e-8}, {"rtol": 1e-13}, {"first_step": 0.1}):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            module.simulate(np.array([0.0, 20.0]), [0.6], inputs=lambda t, x: [force(t)], **GAUSS, **given)
+            module.simulate(np.array([0.0, 20.0]), [0.6], inputs=sd.Smooth(lambda t, x: [force(t)]), **GAUSS, **given)
 
 
 def test_chaotic_motion_is_not_warned_of(double: Any) -> None:
@@ -249,3 +265,12 @@ def test_chaotic_motion_is_not_warned_of(double: Any) -> None:
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", f".*{DIVIDED}")
             assert double.simulate(np.array([0.0, 20.0]), **GAUSS, **given).success
+
+
+def test_command_counts_what_comes_without_a_word(capsys: pytest.CaptureFixture[str]) -> None:
+    """Random jumps and kinks: "gauss" takes none of them, the falsely declared ones stay wrong, others find them."""
+    assert kinks.main(["--methods", "gauss", "dop853", "gauss as smooth", "radau", "--count", "4"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    rows = {tuple(line.replace("gauss as smooth", "declared").split()[:2]): line.split()[-4:] for line in lines[1:]}
+    assert rows["gauss", "jump"][:3] == ["0", "4", "0"] and rows["gauss", "kink"][:3] == ["0", "4", "0"]
+    assert rows["dop853", "jump"][2] == rows["radau", "kink"][2] == "0" and int(rows["declared", "jump"][0]) > 1

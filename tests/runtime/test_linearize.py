@@ -22,7 +22,7 @@ from tests.mechanisms import kitchen_sink
 
 @functools.cache
 def chain() -> Any:
-    """Two masses between walls on springs and dampers, pushed at the second; its place and its acceleration are told."""
+    """Two masses between walls on springs and dampers, pushed at the second; its position and its acceleration are outputs."""
     q1, q2 = sd.coordinates("q1 q2")
     m, k, d = sd.parameters("m k d", positive=True)
     F = sd.inputs("F")
@@ -158,7 +158,7 @@ def test_along_a_motion_under_constraints() -> None:
                          (field(q[0], u[0] + h) - field(q[0], u[0] - h)) / (2 * h)])
     assert np.allclose(lin.A, A, rtol=1e-6, atol=1e-6) and np.abs(A).max() > 5
     assert np.allclose(module.evaluate("C_r", 0.0, lin.x) @ lin.ud, module.evaluate("F_d", 0.0, lin.x), atol=1e-11)
-    held = module.linearize((q, u), free=["q1", "q3"])  # with q2 held nothing moves, and its name is told
+    held = module.linearize((q, u), free=["q1", "q3"])  # with q2 held nothing moves, and its name is listed
     assert held.A.shape == (0, 0) and held.held == ("q2",) and "held: q2" in repr(held)
 
 

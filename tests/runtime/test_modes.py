@@ -221,7 +221,7 @@ def test_derivatives_of_damped_gyroscopic_modes_with_a_parameter_that_is_solved_
     counterweight = loaded().equilibrium(free=["m"], fixed={"theta": -0.7})
     lin = loaded().linearize(counterweight, hold=["theta"])  # its condition is fulfilled without a force, and it is free else
     assert lin.eigenvalues.shape == (0,) and loaded().linearize(counterweight).eigenvalues.shape == (2,)
-    with pytest.raises(ArgumentError, match="mode 0 asked for; there are 0"):
+    with pytest.raises(ArgumentError, match="mode 0 requested; there are 0"):
         lin.derivative(0, "k")
 
 
@@ -260,7 +260,7 @@ def test_double_eigenvalues_have_no_derivative() -> None:
 
 
 @pytest.mark.parametrize(("mode", "parameter", "message"), [
-    (9, "k", "mode 9 asked for; there are 5, numbered from 0"),
+    (9, "k", "mode 9 requested; there are 5, numbered from 0"),
     ("q9", "k", "0 modes are named 'q9'; there are 0: q3, q2, q4 (1); 1: "),
     (0, "w", "parameter: there is no 'w'; there are m, k"),
     (0, None, "parameter must be one name or symbol, found None"),

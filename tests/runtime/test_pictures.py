@@ -408,8 +408,8 @@ def test_films_that_cannot_be_are_refused(tmp_path: Path) -> None:
     solution = motion("pendulum")
     with pytest.raises(ArgumentError, match=r"film\.mp4: the ending must be \.gif"):
         animate(solution, tmp_path / "film.mp4")
-    with pytest.raises(ArgumentError, match=r"10001 pictures; raise speed above 3\.33"):
-        animate(solution, fps=10_000)
+    with pytest.raises(ArgumentError, match=r"1e\+04 pictures; raise speed above 0\.333"):
+        animate(solution, fps=1000, speed=0.1)
     with pytest.raises(ArgumentError, match="must be positive"):
         animate(solution, speed=0)
     assert not list(tmp_path.iterdir())

@@ -149,7 +149,7 @@ FORMS = {
     "by symbol": {sp.Symbol("G"): -0.25, "F": 0.5},
     "function": lambda t, x: [0.5, -0.25],
     "table": ([0.0, 10.0], [[0.5, -0.25]] * 2),
-    "mixed": {"F": lambda t, x: 0.5, "G": ([0.0, 1.0], [-0.25, -0.25])},
+    "mixed": {"F": lambda t, x: 0.5, "G": ([0.0, 4.0], [-0.25, -0.25])},
 }
 
 
@@ -179,7 +179,7 @@ def test_inputs_over_time(oscillator: Any) -> None:
 
 
 def test_ends_of_a_table_are_held(oscillator: Any) -> None:
-    solution = oscillator.simulate((-1, 3), inputs=([0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]]), rtol=1e-10, max_step=0.05)
+    solution = oscillator.simulate((-1, 3), inputs=([0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]]), extend="hold", rtol=1e-10)
     np.testing.assert_allclose(solution.inputs[:, 0], np.clip(solution.t, 0, 1), atol=1e-12)
     # z_dot = F - z from z(-1) = 0.5: decays to t = 0, follows the ramp to t = 1, then its end
     z0 = 0.5 * np.exp(-1.0)
@@ -218,7 +218,7 @@ def test_input_function_sees_the_state_and_may_keep_it(oscillator: Any) -> None:
     (([0.0, 1.0], [[1.0, 2.0]] * 3), r"times of shape \(2,\) and values of shape \(3, 2\)"),
     (([0.0, 0.0], [[1.0, 2.0]] * 2), "the times of a table of inputs must increase"),
     (([0.0, 1.0], [[1.0, 2.0], [1.0, float("nan")]]), "all of it be finite"),
-    ({"F": ([0.0, 1.0], [1.0, 2.0, 3.0])}, r"give one row of 1 values for each time"),
+    ({"F": ([0.0, 1.0], [1.0, 2.0, 3.0])}, r"values of shape \(3,\); give one row of values for each time"),
 ])
 def test_inputs_that_do_not_fit(oscillator: Any, inputs: Any, message: str) -> None:
     for method in (None, "Radau"):
@@ -247,7 +247,8 @@ def test_what_an_input_function_raises_ends_the_motion(oscillator: Any, error: t
         return [0.0, 0.0]
 
     line = steer.__code__.co_firstlineno + 2
-    solution = stopped(lambda: oscillator.simulate((0, 1), inputs=steer, method=method))
+    given = sd.Smooth(steer) if method == "gauss" else steer
+    solution = stopped(lambda: oscillator.simulate((0, 1), inputs=given, method=method))
     assert re.fullmatch(rf"driven_oscillator: stopped at t = 0\.\d+: the input function \(steer\) raised {error.__name__}: mine, "
                         rf"in line {line} of test_simulate\.py; the state there: q = \S+, q_dot = \S+, z = \S+", solution.message)
     assert float(re.search(r"t = ([\d.]+)", solution.message).group(1)) > 0.5  # type: ignore[union-attr]
@@ -579,6 +580,20 @@ def test_progress(oscillator: Any, capsys: pytest.CaptureFixture[str]) -> None:
         assert solution.success and "driven_oscillator: 100%" in shown and "5/5 s" in shown
     oscillator.simulate((5, 0), progress=True)
     assert "100%" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_progress_reports_what_is_made_at_the_first_use_of_a_method(backend: str, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("tqdm")
+    module = sd.systems.four_bar().augmented().compile(backend=backend)
+    method = "radau" if backend == "c" else "Radau"
+    module.simulate((0, 0.05), method=method, progress=True)
+    shown = capsys.readouterr().err
+    made = ["rhs", "rhs with the method radau" if backend == "c" else "jacobian_x"]
+    assert all(f"four_bar: first use of {name}, which is derived and compiled" in shown for name in made)
+    assert shown.rstrip().rpartition("\r")[2].startswith("four_bar: 100%")
+    module.simulate((0, 0.05), method=method, progress=True)
+    assert "first use" not in capsys.readouterr().err
 
 
 def test_progress_without_tqdm(oscillator: Any, monkeypatch: pytest.MonkeyPatch) -> None:

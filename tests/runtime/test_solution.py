@@ -54,7 +54,7 @@ def test_about_the_run(solution: Any) -> None:
     assert solution.n_steps > 3 and solution.nfev > 11 * solution.n_steps and solution.seconds > 0
     assert solution.status == 0 and solution.backend == solution.module.backend
     text = repr(solution)
-    assert text.startswith("<Solution of kitchen_sink: 21 times to t = 0.2, ") and "reached the end" in text
+    assert text.startswith("<Solution of kitchen_sink: 21 times to t = 0.2 s, ") and "reached the end" in text
 
 
 def test_round_trip_npz(solution: Any, tmp_path: Path) -> None:

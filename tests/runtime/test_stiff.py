@@ -101,6 +101,33 @@ def test_order_at_the_ends_of_steps_and_between(method: str, at_ends: int, betwe
         assert order - 0.3 < np.log2(errors[0] / errors[-1]) / 2 < order + 1.2
 
 
+@pytest.fixture(scope="module")
+def slow() -> Any:
+    """z' = -lam (z - cos t), lam = 1e5, from its slow motion: steps that end on it may be as long as they like."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler here")
+    q, z = sd.coordinates("q"), sd.coordinates("z")
+    system = sd.System("slow_motion", planar=True)
+    system.add_joint(sd.Prismatic("slider", system.ground, system.add_body("body", mass=1), q, axis=[1, 0]))
+    system.add_state(z, -100000 * (z - sp.cos(sd.t)))
+    return system.embedding().compile(backend="c")
+
+
+def slow_exact(t: np.ndarray) -> np.ndarray:
+    return (1e10 * np.cos(t) + 1e5 * np.sin(t) + np.exp(-1e5 * t)) / (1e10 + 1)
+
+
+@pytest.mark.parametrize(("method", "most_steps"), [("radau", (10, 20, 50, 120)), ("radau5", (15, 60, 270, 1300)),
+                                                    ("Radau", (15, 60, 270))])
+def test_tolerance_holds_between_long_stiff_steps(method: str, most_steps: tuple[int, ...], slow: Any) -> None:
+    """The collocation polynomial is off by up to a million tolerances there, while the ends of steps are exact."""
+    times = np.sort(np.random.default_rng(1).uniform(0, 10, 1000))
+    for rtol, most in zip((1e-3, 1e-6, 1e-9, 1e-12), most_steps, strict=False):
+        found = radau(slow, np.array([0, *times, 10]), z=[1], rtol=rtol, method=method)
+        assert np.abs(found["z"] - slow_exact(found.t)).max() < 5 * rtol
+        assert found.n_steps <= most
+
+
 def test_infinite_slopes(mass: Any) -> None:
     """z' = 1 - sqrt z from 0, where the Jacobian is infinite: t = -2 (sqrt z + log(1 - sqrt z))."""
     found = radau(mass, (0, 3), z=[0], rtol=1e-9)

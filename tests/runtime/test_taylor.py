@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,10 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning, UnsupportedExpression
 from symdyn.pipeline import emit
+from symdyn.runtime.compiled import run_compiled
+from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.outcome import Request
+from symdyn.runtime.stabilization import Stabilization
 from tests.helpers import GRAVITY, swing
 from tests.oracles.random_trees import random_tree
 from tests.runtime.constrained import module as constrained
@@ -264,3 +269,43 @@ def test_right_hand_sides_that_switch(derived: Callable[..., Any]) -> None:
     if module.backend == "c":
         with pytest.raises(ArgumentError, match=r"does not fit: the right-hand side switches \(abs\)"):
             module.simulate((0, 1), **TAYLOR)
+
+
+# -- where there are no series
+
+
+@pytest.mark.parametrize("rtol", [1e-11, 1e-12, 1e-13, 1e-15])
+def test_turning_points_without_series_are_passed_by_the_default_method(rtol: float) -> None:
+    """Bricard's loop, where the pivots of the dependent speeds change four times in 10 s: against dop853, forward and back."""
+    loop = constrained("bricard")
+    times = np.linspace(0, 10, 101)
+    exact = loop.simulate(times, rtol=1e-13).x
+    found = loop.simulate(times, rtol=rtol, **TAYLOR)
+    assert found.success and np.abs(found.x - exact).max() < 1e-10
+    np.testing.assert_array_equal(found.t, times)
+    assert "no Taylor series (the dependent speeds do not follow from P6_z and P6_y here), " in found.message
+    assert re.search(r" \d+ steps in [1-9] stretch(es)? are of dop853$", found.message)
+    back = loop.simulate(times[::-1], q=found.q[-1], u=found.u[-1], rtol=rtol, **TAYLOR)
+    assert back.success and np.abs(back.x[::-1] - exact).max() < 1e-9
+    np.testing.assert_array_equal(found([3.3, 6.3, 9.0])[2], found(9.0))
+
+
+def test_steps_and_limits_where_stretches_meet() -> None:
+    """Every step once, as many as counted; a limit of steps is kept by both methods together."""
+    loop = constrained("bricard")
+    every = loop.simulate((0, 10), rtol=1e-13, steps=True, **TAYLOR)
+    assert (np.diff(every.t) > 0).all() and len(every.t) == every.n_steps + 1 and every.t[-1] == 10
+    for most in (every.n_steps // 2, 40, 37):
+        with pytest.warns(SimulationWarning):
+            short = loop.simulate((0, 10), rtol=1e-13, steps=True, max_steps=most, **TAYLOR)
+        assert short.n_steps == most == len(short.t) - 1
+        np.testing.assert_array_equal(short.t[:30], every.t[:30])
+
+
+def test_a_run_without_another_method_names_it() -> None:
+    loop = constrained("bricard")
+    request = Request((0.0, 10.0), None, np.zeros(10), loop.parameters(None), Inputs(np.zeros(0)), 1e-13, np.full(10, 1e-13), 0.0,
+                      0.0, None, 10, Stabilization("projection"))
+    alone = run_compiled(loop, request, "taylor")
+    assert not alone.success and alone.no_series == "the dependent speeds do not follow from P6_z and P6_y here"
+    assert f"the right-hand side has no Taylor series: {alone.no_series}; use method='dop853'" in alone.message

@@ -104,7 +104,7 @@ def test_a_rotor_on_a_free_joint_has_the_frequencies_of_the_fixed_frame(attitude
 
 @pytest.mark.parametrize("attitude", ["parameters", "angles", "rates", "first"])
 def test_the_campbell_diagram_of_a_free_rotor_is_of_the_fixed_frame(attitude: str) -> None:
-    """At positive and negative speeds; asked otherwise, position and tilt are seen from the turning axes, at |w - W|."""
+    """At positive and negative speeds; with frame="rotating", position and tilt are seen from the turning axes, at |w - W|."""
     speeds = np.array([-60.0, -7.0, 7.0, 60.0])
     diagram = free_rotor(attitude).campbell(SPEED[attitude], speeds)
     for W, modes in zip(speeds, diagram.modes, strict=True):

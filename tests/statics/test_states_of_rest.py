@@ -1,4 +1,4 @@
-"""What is a state of rest and of the mechanism, what is rounding, what is held, and which words say so: minimal cases."""
+"""What is a state of rest and of the mechanism, what is rounding, what is held, and which words name it: minimal cases."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium
+from tests.mechanisms import four_bar_linkage
 from tests.runtime.test_modes import richardson
 
 PRINTED_OR_RAISED = (ArgumentError, EquilibriumNotUnique, NoEquilibrium)
@@ -56,19 +57,7 @@ def pendulum() -> Any:
 
 @functools.cache
 def linkage() -> Any:
-    """The four-bar linkage of the README as it is described there: 0.125 m open at its initial angles."""
-    q1, q2, q3 = sd.coordinates("q1:4")
-    g, m, l1, l2, l3, d = sd.parameters("g m l1 l2 l3 d", positive=True)
-    s = sd.System("linkage", gravity=[0, -g])
-    parent, at = s.ground, [0, 0]
-    for hinge, q, l in zip("ABC", (q1, q2, q3), (l1, l2, l3), strict=True):
-        bar = s.add_body(f"bar {hinge}", mass=m, inertia=m * l**2 / 12, com=[l / 2, 0])
-        s.add_joint(sd.Revolute(hinge, parent, bar, q, parent_point=at))
-        parent, at = bar, [l, 0]
-    s.close_loop(sd.Revolute("D", s.ground, bar, parent_point=[d, 0], child_point=at))
-    s.defaults = {g: 9.81, m: 1, l1: 0.8, l2: 1.8, l3: 1.6, d: 2}
-    s.initial = {q1: 1, q2: -0.5, q3: -2}
-    return s.augmented().compile(backend="numpy")
+    return four_bar_linkage().augmented().compile(backend="numpy")
 
 
 def test_a_linkage_that_is_open_is_not_linearized() -> None:
@@ -257,7 +246,7 @@ def test_a_flat_parallelogram_is_a_singular_configuration() -> None:
     assert np.isclose(mode.omega**2, 2 * 9.81 / (2 / 3 + 1), rtol=1e-9) and hanging.verdict == "neutral"
 
 
-def test_a_slow_growth_beside_a_strong_damper_is_no_zero() -> None:
+def test_a_slow_growth_next_to_a_strong_damper_is_no_zero() -> None:
     """m q_ddot + d q_dot - k q = 0: lambda = 2 k / (d + sqrt(d^2 + 4 k m)), 9e-3 per s next to -1e6."""
     m, k, d = sd.parameters("m k d", positive=True)
     module = slider(k * Q - d * Q.dot, m, "capsizing", m=1.0, k=9e3, d=1e6)
@@ -270,7 +259,7 @@ def test_a_slow_growth_beside_a_strong_damper_is_no_zero() -> None:
     assert held_back.equilibrium().verdict == "stable"
 
 
-def test_damping_of_a_light_mass_beside_a_heavy_one_counts() -> None:
+def test_damping_of_a_light_mass_next_to_a_heavy_one_counts() -> None:
     """1e-6 kg on 1e-4 N/m next to 1e6 kg on 1e10 N/m: lambda = 5e-3 +- 10 i, from a damper of -1e-8 N s/m."""
     heavy, light = sd.coordinates("heavy light")
     d = sd.parameters("d")
@@ -312,7 +301,7 @@ FLUTTER = 3.5 - math.sqrt(2)
 
 @pytest.mark.parametrize("rod", [0.0, 1e6, 1e12])
 @pytest.mark.parametrize("P", [1.0, 2.05, 2.12, 3.0, 4.8, 5.0])
-def test_zieglers_column_flutters_whatever_stands_beside_it(rod: float, P: float) -> None:
+def test_zieglers_column_flutters_whatever_stands_next_to_it(rod: float, P: float) -> None:
     """2 lambda^4 + (7 - 2 P) lambda^2 + 1 = 0: flutter above 7/2 - sqrt 2 = 2.086, divergence above 7/2 + sqrt 2 = 4.914.
 
     Source: Ziegler, Die Stabilitaetskriterien der Elastomechanik, Ingenieur-Archiv 20, 1952.
@@ -536,7 +525,7 @@ def test_a_mass_in_a_turning_slot(t: float, r: float, rate: float) -> None:
     assert lin.outputs[:4] == ("seen[0]", "seen[1]", "seen[2]", "seen[3]") and lin.outputs[4:6] == ("felt[0]", "felt[1]")
 
 
-def test_a_state_beside_a_turning_slot_is_none() -> None:
+def test_a_state_next_to_a_turning_slot_is_none() -> None:
     """At r = 0.8 it moves with the slot: a mass that stands still there is off the constraint's rate."""
     for at, t in (({"x": 0.8}, 0.0), ({"x": 0.8, "y_dot": 1.7 * 0.8}, 0.3), ({"y": 0.8}, 0.0)):
         with pytest.raises(ArgumentError, match=r"module\.consistent"):

@@ -21,18 +21,12 @@ WEAVE, CAPSIZE = 4.29238253634111, 6.02426201538837
 
 @functools.cache
 def sleigh() -> Any:
-    """Chaplygin's sleigh whose centre of mass, a ahead of the knife edge, is drawn to the line y = 0 by a force along y."""
-    x, y, theta = sd.coordinates("x y theta")
-    m, I, a, k = sd.parameters("m I a k", positive=True)
-    s = sd.System("sleigh", planar=True)
-    body = s.add_body("sleigh", mass=m, inertia=I, com=[a, 0])
-    s.add_joint(sd.Planar("plane", s.ground, body, [x, y, theta]))
-    s.add_constraint(-x.dot * sp.sin(theta) + y.dot * sp.cos(theta), name="edge")
-    s.add_force(body, [0, -k * (y + a * sp.sin(theta))], point=[a, 0])
-    s.add_output("track", y)
-    s.add_output("centre", y + a * sp.sin(theta))
-    s.defaults = {m: 1.0, I: 0.02, a: 0.1, k: 50.0}
-    return s.augmented().compile(backend="numpy")
+    return systems.sleigh().augmented().compile(backend="numpy")
+
+
+def sliding(v: float) -> dict[str, float]:
+    """Along the line at v, on it."""
+    return {**dict.fromkeys(sleigh().metadata["x"], 0.0), "x_dot": v}
 
 
 def sleigh_polynomial(v: float = 1.0) -> list[float]:
@@ -79,70 +73,16 @@ def wheelset() -> Any:
 # -- the benchmark bicycle
 
 
-def bicycle_system() -> sd.System:
-    """Whipple's bicycle with the benchmark's numbers: rear frame with rider, front frame, two thin wheels.
-
-    x forward, y to the right, z down; x, y, z is the hub of the rear wheel; psi, lean, pitch are the angles ZXY of the rear
-    frame; steer turns the front frame about the steering axis. A wheel touches the ground at the lowest point of its rim, one
-    condition of the position; that it does not slip there are two of the velocity.
-    Source of the numbers: Meijaard et al. 2007, table 1 (shared data, bicycle.json).
-    """
-    q = x, y, z, psi, lean, pitch, steer, rear, front = sd.coordinates("x y z psi lean pitch steer rear front")
-    w, c, tilt, r_R, r_F, g = 1.02, 0.08, math.pi / 10, 0.3, 0.35, 9.81
-    s = sd.System("bicycle", gravity=[0, 0, g])
-
-    def inertia(xx: float, yy: float, zz: float, xz: float) -> sp.Matrix:
-        return sp.Matrix([[xx, 0, xz], [0, yy, 0], [xz, 0, zz]])
-
-    # Bodies have the axes of the n-frame where the bicycle stands straight; origins: rear hub, point of the steering axis on
-    # the ground, hubs.
-    frame = s.add_body("frame", mass=85, inertia=inertia(9.2, 11, 2.8, 2.4), com=[0.3, 0, -0.9 + r_R])
-    fork = s.add_body("fork", mass=4, inertia=inertia(0.05892, 0.06, 0.00708, -0.00756), com=[0.9 - w - c, 0, -0.7])
-    back = s.add_body("rear_wheel", mass=2, inertia=[0.0603, 0.12, 0.0603])
-    ahead = s.add_body("front_wheel", mass=3, inertia=[0.1405, 0.28, 0.1405])
-    axis = [math.sin(tilt), 0, math.cos(tilt)]
-    foot, hub = sp.Matrix([w + c, 0, r_R]), sp.Matrix([-c, 0, -r_F])
-    s.add_joint(sd.Free("rider", s.ground, frame, [x, y, z, psi, lean, pitch], sd.EulerAngles("ZXY")))
-    s.add_joint(sd.Revolute("head", frame, fork, steer, axis=axis, parent_point=list(foot)))
-    s.add_joint(sd.Revolute("rear_hub", frame, back, rear, axis=[0, 1, 0]))
-    s.add_joint(sd.Revolute("front_hub", fork, ahead, front, axis=[0, 1, 0], parent_point=list(hub)))
-
-    R = turned("z", psi) * turned("x", lean) * turned("y", pitch)
-    R_fork = R * turned("y", sp.Float(tilt)) * turned("z", steer) * turned("y", -sp.Float(tilt))
-    centre = sp.Matrix([x, y, z])
-    for name, at, attitude, spin, radius in (("rear", centre, R, rear, r_R),
-                                             ("front", centre + R * foot + R_fork * hub, R_fork, front, r_F)):
-        axle = attitude * sp.Matrix([0, 1, 0])
-        slope = sp.sqrt(1 - axle[2]**2)
-        down = radius * (sp.Matrix([0, 0, 1]) - axle[2] * axle) / slope  # from the hub to the lowest point
-        turning = by_time(attitude, q) * attitude.T * down + spin.dot * axle.cross(down)
-        slip = by_time(at, q) + turning
-        s.add_constraint(at[2] + radius * slope, name=f"{name} wheel touches")
-        s.add_constraint(slip[0], name=f"{name} wheel along x")
-        s.add_constraint(slip[1], name=f"{name} wheel along y")
-    s.initial = {z: -r_R}
-    return s
-
-
-def turned(axis: str, angle: Any) -> sp.Matrix:
-    """Rotation about a coordinate axis, components of the turned frame to those of the frame before."""
-    c, s = sp.cos(angle), sp.sin(angle)
-    return {"x": sp.Matrix([[1, 0, 0], [0, c, -s], [0, s, c]]), "y": sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
-            "z": sp.Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])}[axis]
-
-
-def by_time(value: sp.Matrix, q: Any) -> sp.Matrix:
-    return sum((value.diff(e) * e.dot for e in q), sp.zeros(*value.shape))
-
-
 @functools.cache
 def bicycle() -> Any:
-    return bicycle_system().augmented().compile(backend="numpy")
+    """With numbers in place of parameters: a verdict counts the last digit of every parameter as unknown."""
+    system = systems.bicycle()
+    return system.augmented().compile(backend="numpy", specialize=system.defaults)
 
 
 def riding(v: float) -> dict[str, float]:
     """Upright, straight on along x at v."""
-    return {"z": -0.3, "x_dot": v, "rear_dot": -v / 0.3, "front_dot": -v / 0.35}
+    return {**dict.fromkeys(bicycle().metadata["x"], 0.0), "z": -0.3, "x_dot": v, "rear_dot": -v / 0.3, "front_dot": -v / 0.35}
 
 
 def published(v: float) -> np.ndarray:
@@ -183,7 +123,7 @@ def assert_vanishes(A: np.ndarray, factors: list[np.ndarray]) -> None:
 
 def test_the_sleigh_is_unstable_as_its_characteristic_polynomial_says() -> None:
     """-5.63, 1.149 +- 5.318i; besides x and the speed, which nothing holds: two zeros."""
-    lin = sleigh().linearize({"x_dot": 1.0})
+    lin = sleigh().linearize(sliding(1.0))
     assert lin.A.shape == (5, 5) and lin.M.shape == (2, 2) and lin.K.shape == (2, 3) and lin.Z.shape == (3, 3)
     assert set(lin.states) == {"x", "y", "theta", "x_dot", "theta_dot"} and lin.coordinates == ("x", "y", "theta")
     roots = np.roots(sleigh_polynomial())
@@ -193,12 +133,12 @@ def test_the_sleigh_is_unstable_as_its_characteristic_polynomial_says() -> None:
     assert lin.verdict == "unstable"
     (pair,) = [m for m in lin.modes() if m.eigenvalue.imag]
     assert pair.kind == "unstable" and abs(pair.eigenvalue - roots[roots.imag > 0][0]) < 1e-9
-    assert sleigh().stability({"x_dot": 1.0}).verdict == "unstable"
+    assert sleigh().stability(sliding(1.0)).verdict == "unstable"
 
 
 def test_the_sleighs_matrix_entry_by_entry() -> None:
     """y' = v theta, v' = 0, (I + m a^2) theta'' = -m a v theta' - k a (y + a theta): written down by hand."""
-    lin = sleigh().linearize({"x_dot": 1.0})
+    lin = sleigh().linearize(sliding(1.0))
     order = [lin.states.index(n) for n in ("x", "y", "theta", "x_dot", "theta_dot")]
     J = 0.02 + 0.01
     expected = np.array([[0, 0, 0, 1, 0], [0, 0, 1, 0, 0], [0, 0, 0, 0, 1], [0, 0, 0, 0, 0],
@@ -208,7 +148,7 @@ def test_the_sleighs_matrix_entry_by_entry() -> None:
 
 def test_outputs_of_the_sleigh_see_the_displacement_across_the_edge() -> None:
     """The edge binds the speed across it, not the displacement: rows of C_out are (0, 1, 0, ...) and (0, 1, a, ...)."""
-    lin = sleigh().linearize({"x_dot": 1.0})
+    lin = sleigh().linearize(sliding(1.0))
     order = [lin.states.index(n) for n in ("x", "y", "theta", "x_dot", "theta_dot")]
     assert lin.outputs == ("track", "centre")
     assert np.allclose(lin.C_out[:, order], [[0, 1, 0, 0, 0], [0, 1, 0.1, 0, 0]], atol=1e-14)
@@ -217,14 +157,14 @@ def test_outputs_of_the_sleigh_see_the_displacement_across_the_edge() -> None:
 @pytest.mark.parametrize("v", [-3.0, -0.5, 0.3, 2.0, 7.0])
 def test_a_sleigh_at_other_speeds(v: float) -> None:
     """Hurwitz: m a v k a^2 is less than (I + m a^2) k a v where v > 0, and where v < 0 coefficients are negative: unstable."""
-    lin = sleigh().linearize({"x_dot": v})
+    lin = sleigh().linearize(sliding(v))
     assert_alike(nonzero(lin.eigenvalues), np.roots(sleigh_polynomial(v)))
     assert lin.verdict == "unstable"
 
 
 def test_a_sleigh_without_a_force_neither_returns_nor_is_it_stable() -> None:
     """Forward lambda = -m a v / (I + m a^2) and zeros; y' = v theta alone would drift. Backward it turns round: unstable."""
-    ahead, back = (sleigh().linearize({"x_dot": v}, params={"k": 0.0}) for v in (1.0, -1.0))
+    ahead, back = (sleigh().linearize(sliding(v), params={"k": 0.0}) for v in (1.0, -1.0))
     assert_alike(nonzero(ahead.eigenvalues), [-0.1 / 0.03])
     assert_alike(nonzero(back.eigenvalues), [0.1 / 0.03])
     assert ahead.verdict == "drifts" and back.verdict == "unstable"
@@ -232,7 +172,7 @@ def test_a_sleigh_without_a_force_neither_returns_nor_is_it_stable() -> None:
 
 def test_the_sleighs_motion_is_that_of_its_linear_equations() -> None:
     """From a disturbance of 1e-6 the simulation follows exp(A t) over 2 s, in which it grows fivefold."""
-    lin = sleigh().linearize({"x_dot": 1.0})
+    lin = sleigh().linearize(sliding(1.0))
     T, start = lin.tangent(), np.zeros(5)
     start[lin.states.index("y")] = 1e-6
     at = lin.x + T @ start
@@ -283,7 +223,7 @@ def test_a_disc_that_rolls_in_a_circle(turn: float) -> None:
     squared = circling(theta, turn, omega_3)
     period = 2 * math.pi / turn
     found = disc().stability(circular_state(theta, turn, omega_3), params=DISC, period=period)
-    if found.motion is not None:  # the motion that was asked about, not one near it that closes in phi, too
+    if found.motion is not None:  # the motion in question, not one near it that closes in phi, too
         assert np.isclose(found.motion[1][0][disc().metadata["x"].index("theta")], theta, rtol=1e-9)
     expected = np.exp(np.sqrt(complex(squared)) * period)
     assert squared < 0 and np.abs(np.exp(np.asarray(found.exponents) * period) - expected).min() < 1e-9

@@ -231,6 +231,41 @@ def test_bound_numbers_that_hold_nothing_are_told() -> None:
         specialize(tape, dict(zip(names, given.for_saddle.tolist(), strict=True)))
 
 
+def singular(seed: int) -> Problem:
+    """Four speeds, a direction of which, aligned with none of them, moves no mass and no constraint."""
+    rng = np.random.default_rng(seed)
+    free = rng.normal(size=4)
+    others = np.linalg.svd(free[None, :])[2][1:]
+    L = others.T @ rng.normal(size=(3, 3)) * 10.0 ** rng.uniform(-2, 2)
+    C = rng.normal(size=(2, 3)) @ others
+    return Problem(L @ L.T, C, rng.uniform(0.5, 2, 2), np.ones(4), rng.normal(size=4), rng.normal(size=2))
+
+
+def test_singular_numbers_are_rejected_alike_when_folded_and_in_generated_code() -> None:
+    """300 random ones, and 300 regular ones, which all routes solve."""
+    groups = ([singular(seed) for seed in range(300)], True), ([problem(4, 2, seed=seed) for seed in range(300)], False)
+    for cases, rejected in groups:
+        values = np.array([case.for_saddle for case in cases])
+        kernel = Saddle(cases[0].sizes, "nothing holds a speed")
+        found = []
+        for row in values:
+            try:
+                found.append([float(v) for v in Recorder().call(kernel, row.tolist())])
+            except ZeroDivisionError as error:
+                assert str(error) == "nothing holds a speed"
+                found.append([np.nan] * 4)
+        assert (np.isnan(found).all(axis=1) == rejected).all()
+        for backend in ["numpy", *(["c"] if find_compiler() else [])]:
+            evaluator = unit_of(*taped(kernel, values.shape[1]), backend).evaluator("solve")
+            evaluator.set_params(np.zeros(0))
+            for row, one in zip(values, found, strict=True):
+                if rejected:
+                    with pytest.raises(EvaluationError, match="nothing holds a speed"):
+                        evaluator.one(0.0, np.zeros(0), row)
+                else:
+                    assert close(np.array(evaluator.one(0.0, np.zeros(0), row)), np.array(one), 1e-9)
+
+
 # -- folding and parameters
 
 

@@ -226,6 +226,18 @@ def test_faulty_joints(tmp_path: Path, more: str, told: str) -> None:
     assert faults(tmp_path, pendulum(link("hand"), joint("arm", "revolute", "bar", "hand", more))) == [told]
 
 
+def test_multipliers_of_mimics_along_a_row_are_within_the_range_of_numbers(tmp_path: Path) -> None:
+    names = "abcdefgh"
+    for largest, offset in (("1e60", "0"), ("1e60", "1e80"), ("-1e100", "1")):
+        lines = [link(name) for name in names] + [joint("j0", "revolute", "a", "b")]
+        lines += [joint(f"j{k}", "revolute", names[k], names[k + 1],
+                        f'<mimic joint="j{k - 1}" multiplier="{largest}" offset="{offset}"/>') for k in range(1, 7)]
+        with pytest.raises(ModelError) as caught:
+            sd.read_urdf(saved(tmp_path, robot(*lines)))
+        assert any(":12: joint 'j2' mimics along 'j1' -> 'j0'; multiplier 1e+" in fault and
+                   "are more than 1e+100; give smaller ones" in fault for fault in caught.value.faults), caught.value.faults
+
+
 def test_mimics_of_what_has_several_coordinates(tmp_path: Path) -> None:
     lines = [link("a"), link("b"), joint("p", "planar", "base", "a"),
              joint("q", "revolute", "a", "b", '<mimic joint="p"/>')]

@@ -27,7 +27,7 @@
 //     13  l3  [m]  default 1.6
 //   constants c (9): what the prologue computes from the parameters
 // Skipped: turning between links: the frames of 3 links stay parallel to those before them.
-// Skipped: accelerations by elimination of the dependent speeds q1_dot, q3_dot: 161 operations (Schur complement of the mass matrix, 197; the numeric algorithm, which takes over where a pivot vanishes, 426).
+// Skipped: accelerations by elimination of the dependent speeds q1_dot, q3_dot: 161 operations (Schur complement of the mass matrix, 197; the numeric algorithm, which takes over where a pivot vanishes, 444).
 // Skipped: time: nothing depends on t, so no function takes it.
 // Skipped: inputs: there are none.
 // Skipped: multipliers: accelerations do without them; they are computed where lam or reactions are asked for.
@@ -162,6 +162,25 @@ static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
     return 0;
 }
 
+// Whether a pivot of the symmetric A, which is used up, is next to nothing of its entry: nothing holds some direction then.
+// The pivot that is the largest part of its entry goes first, so that rounding stays small.
+static int symdyn_loose(int n, double A[3][3]) {
+    double entries[3];
+    int gone[3] = { 0 };
+    for (int i = 0; i < n; i++) entries[i] = A[i][i];
+    for (int step = 0; step < n; step++) {
+        int p = -1;
+        for (int i = 0; i < n; i++)
+            if (!gone[i] && (p < 0 || A[i][i]*entries[p] > A[p][p]*entries[i])) p = i;
+        if (A[p][p] <= 1e-14*entries[p] || A[p][p] <= 0.0) return 1;
+        gone[p] = 1;
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n && !gone[i]; j++)
+                if (!gone[j]) A[i][j] -= A[i][p]*A[p][j]/A[p][p];
+    }
+    return 0;
+}
+
 // x (n) of M x + C^T lam = f, C x = d; M (n x n) symmetric, perhaps singular; the m rows of C perhaps dependent.
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
@@ -169,7 +188,7 @@ static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
 static int symdyn_saddle(int n, int m, const double *in, double *x) {
     const double *const m_in = in + 1, *const c_in = m_in + n*(n + 1)/2, *const s = c_in + m*n, *const w = s + m;
     const double *const f = w + n, *const d = f + n;
-    double M[3][3], A[3][3], C[2][3], rows[2] = { 0.0 }, columns[3], lighter[3];
+    double M[3][3], A[3][3], B[3][3], C[2][3], rows[2] = { 0.0 }, columns[3], lighter[3];
     double r[3], lam[2] = { 0.0 }, largest = 0.0;
     // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
     for (int i = 0; i < n; i++) {
@@ -194,9 +213,9 @@ static int symdyn_saddle(int n, int m, const double *in, double *x) {
             double sum = 0.0;
             M[i][j] = M[j][i] = columns[i]*columns[j]*m_in[i*(i + 1)/2 + j];
             for (int k = 0; k < m; k++) sum += C[k][i]*C[k][j];
-            A[i][j] = M[i][j] + a*sum;
+            A[i][j] = B[i][j] = B[j][i] = M[i][j] + a*sum;
         }
-    if (symdyn_factorize(n, 3, A[0], 1e-14)) return 1;
+    if (symdyn_loose(n, B) || symdyn_factorize(n, 3, A[0], 0.0)) return 1;
     for (int round = 0; round < 5; round++) {
         for (int i = 0; i < n; i++) r[i] = symdyn_less(columns[i]*f[i], n, M[i], 1, x);
         for (int k = 0; k < m; k++) {
@@ -373,7 +392,7 @@ static int four_bar_rhs_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// rhs where one does, or nearly so: 425 operations (39 add, 339 kernel, 41 mul, 6 trig); longest chain 12.
+// rhs where one does, or nearly so: 443 operations (39 add, 357 kernel, 41 mul, 6 trig); longest chain 12.
 static int four_bar_rhs_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -723,7 +742,7 @@ static int four_bar_lam_regular(const double *q, const double *u, const double *
     return 0;
 }
 
-// lam where one does, or nearly so: 709 operations (48 add, 605 kernel, 50 mul, 6 trig); longest chain 17.
+// lam where one does, or nearly so: 727 operations (48 add, 623 kernel, 50 mul, 6 trig); longest chain 17.
 static int four_bar_lam_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -1026,7 +1045,7 @@ static int four_bar_reactions_regular(const double *q, const double *u, const do
     return 0;
 }
 
-// reactions where one does, or nearly so: 805 operations (92 add, 605 kernel, 102 mul, 6 trig); longest chain 24.
+// reactions where one does, or nearly so: 823 operations (92 add, 623 kernel, 102 mul, 6 trig); longest chain 24.
 static int four_bar_reactions_singular(const double *q, const double *u, const double *p, const double *c, double *out) {
     const double q1 = q[0];
     const double q2 = q[1];
@@ -1298,11 +1317,13 @@ SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame) {
 // Integration of x_dot = four_bar_rhs without leaving this file.
 
 // What the right-hand side needs besides t and x. Inputs come from the first of these that is there: a function
-// (returns 0, or not to stop the run), a table over time (rows of inputs, linear between rows, its ends held), constants.
+// (returns 0, or not to stop the run), a table over time (piecewise cubic, its ends held), constants.
 typedef struct {
     const double *p, *c, *inputs;
-    long n_table;
-    const double *table_t, *table;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
     int (*function)(double t, const double *x, double *inputs);
     int project;    // whether states are kept on what holds for them after every step
     double length;  // that residuals are measured by, m
@@ -1363,6 +1384,7 @@ typedef struct {
     int n_crossing, crossing, crossed;
     double k[16][6];  // stages of the latest step; k[12] at its end
     double dense[7][6];  // polynomial of the latest step, if dense_ready
+    int rough;                   // whether it is not good enough
 } four_bar_dop853;
 
 static const double four_bar_dop853_eps = 2.220446049250313e-16, four_bar_dop853_huge = 1.7976931348623157e308;
@@ -1472,10 +1494,40 @@ static int four_bar_dop853_try(four_bar_dop853 *run, double h, double t_new, dou
     return 0;
 }
 
+// The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
+static int four_bar_dop853_by_a_step(four_bar_dop853 *run, int from_end, double s, double *x_out, double *err) {
+    four_bar_dop853 again = *run;
+    double xd[6];
+    again.t = from_end ? run->t : run->t_old;
+    for (int i = 0; i < 6; i++) again.x[i] = from_end ? run->x[i] : run->x_old[i];
+    int failure = four_bar_dop853_eval(&again, again.t, again.x, again.xd);
+    if (!failure) failure = four_bar_dop853_try(&again, s - again.t, s, x_out, xd, err);
+    run->n_evaluations = again.n_evaluations;
+    return failure ? four_bar_dop853_fail(run, failure, again.reason, again.bad_index, again.t_fail, again.x_fail) : 0;
+}
+
+// Whether the polynomial of the latest step is off by some ten tolerances, by its defect a quarter into it. Where stability limits
+// steps it swings: what is left of stiff motion, which the end damps, grows within the step.
+static int four_bar_dop853_is_rough(four_bar_dop853 *run) {
+    const double theta = 0.25, t = run->t_old + theta*run->h_old;
+    double y[6], f[6], slope[6];
+    for (int i = 0; i < 6; i++) {
+        double value = run->dense[6][i], rate = 0.0;
+        for (int j = 5; j >= 0; j--) {  // by theta, or by 1 - theta, and the polynomials of higher order
+            const double factor = j % 2 ? theta : 1.0 - theta;
+            rate = factor*rate + (j % 2 ? value : -value), value = run->dense[j][i] + factor*value;
+        }
+        y[i] = run->x_old[i] + theta*value, slope[i] = (value + theta*rate)/run->h_old;
+    }
+    if (four_bar_dop853_eval(run, t, y, f)) return 1;
+    for (int i = 0; i < 6; i++) f[i] = 0.25*run->h_old*(f[i] - slope[i]);
+    return four_bar_dop853_square(run, f, run->x_old) > 100.0;
+}
+
 // The state at s within the latest step.
 static int four_bar_dop853_between(four_bar_dop853 *run, double s, double *x_out) {
     const double t = run->t_old, h = run->h_old, theta = (s - t)/h, rest = 1.0 - theta, *restrict const x = run->x_old;
-    double (*restrict const k)[6] = run->k, (*restrict const d)[6] = run->dense;
+    double err, (*restrict const k)[6] = run->k, (*restrict const d)[6] = run->dense;
     if (!run->dense_ready) {
         double y[6];
         int failure;
@@ -1515,8 +1567,9 @@ static int four_bar_dop853_between(four_bar_dop853 *run, double s, double *x_out
             + 104.0996495089623*k[10][i] + 29.8402934266605*k[11][i] - 43.53345659001114*k[12][i]
             + 96.32455395918828*k[13][i] - 39.17726167561544*k[14][i] - 149.72683625798564*k[15][i]);
         }
-        run->dense_ready = 1;
+        run->dense_ready = 1, run->rough = four_bar_dop853_is_rough(run);
     }
+    if (run->rough) return four_bar_dop853_by_a_step(run, 0, s, x_out, &err);
     for (int i = 0; i < 6; i++)
         x_out[i] = x[i] + theta*(d[0][i] + rest*(d[1][i] + theta*(d[2][i] + rest*(d[3][i] + theta*(d[4][i] + rest*(d[5][i] + theta*d[6][i]))))));
     return 0;
@@ -1578,13 +1631,14 @@ SYMDYN_EXPORT int four_bar_simulation_start(four_bar_dop853 *run, const four_bar
 
 // The step to be tried next.
 static void four_bar_dop853_propose(four_bar_dop853 *run) {
-    const double rest = fabs((run->t_end - run->t) - run->t_low), least = 16.0*four_bar_dop853_eps*fabs(run->t);
+    const double bound = run->t_end;
+    const double rest = fabs((bound - run->t) - run->t_low), least = 16.0*four_bar_dop853_eps*fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;
     h = h > run->h_min ? h : run->h_min;
     const int last = 1.01*h >= rest;
     run->h_try = run->direction*(last ? rest : 2.0*h > rest ? 0.5*rest : h);  // two equal steps, not a whole one and a bit
-    run->t_new = run->t_end, run->t_new_low = 0.0, run->crossing = 0;
+    run->t_new = bound, run->t_new_low = 0.0, run->crossing = 0;
     if (last) return;
     const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
     run->t_new = run->t + way;

@@ -27,7 +27,7 @@
 //     13  l3  [m]  default 1.6
 //   constants c (9): what the prologue computes from the parameters
 // Skipped: turning between links: the frames of 3 links stay parallel to those before them.
-// Skipped: accelerations by elimination of the dependent speeds q1_dot, q3_dot: 161 operations (Schur complement of the mass matrix, 197; the numeric algorithm, which takes over where a pivot vanishes, 426).
+// Skipped: accelerations by elimination of the dependent speeds q1_dot, q3_dot: 161 operations (Schur complement of the mass matrix, 197; the numeric algorithm, which takes over where a pivot vanishes, 444).
 // Skipped: time: nothing depends on t, so no function takes it.
 // Skipped: inputs: there are none.
 // Skipped: multipliers: accelerations do without them; they are computed where lam or reactions are asked for.

@@ -313,11 +313,13 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
 // Integration of x_dot = pendulum_rhs without leaving this file.
 
 // What the right-hand side needs besides t and x. Inputs come from the first of these that is there: a function
-// (returns 0, or not to stop the run), a table over time (rows of inputs, linear between rows, its ends held), constants.
+// (returns 0, or not to stop the run), a table over time (piecewise cubic, its ends held), constants.
 typedef struct {
     const double *p, *c, *inputs;
-    long n_table;
-    const double *table_t, *table;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
     int (*function)(double t, const double *x, double *inputs);
     int project;    // whether states are kept on what holds for them after every step
     double length;  // that residuals are measured by, m
@@ -378,6 +380,7 @@ typedef struct {
     int n_crossing, crossing, crossed;
     double k[16][2];  // stages of the latest step; k[12] at its end
     double dense[7][2];  // polynomial of the latest step, if dense_ready
+    int rough;                   // whether it is not good enough
 } pendulum_dop853;
 
 static const double pendulum_dop853_eps = 2.220446049250313e-16, pendulum_dop853_huge = 1.7976931348623157e308;
@@ -487,10 +490,40 @@ static int pendulum_dop853_try(pendulum_dop853 *run, double h, double t_new, dou
     return 0;
 }
 
+// The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
+static int pendulum_dop853_by_a_step(pendulum_dop853 *run, int from_end, double s, double *x_out, double *err) {
+    pendulum_dop853 again = *run;
+    double xd[2];
+    again.t = from_end ? run->t : run->t_old;
+    for (int i = 0; i < 2; i++) again.x[i] = from_end ? run->x[i] : run->x_old[i];
+    int failure = pendulum_dop853_eval(&again, again.t, again.x, again.xd);
+    if (!failure) failure = pendulum_dop853_try(&again, s - again.t, s, x_out, xd, err);
+    run->n_evaluations = again.n_evaluations;
+    return failure ? pendulum_dop853_fail(run, failure, again.reason, again.bad_index, again.t_fail, again.x_fail) : 0;
+}
+
+// Whether the polynomial of the latest step is off by some ten tolerances, by its defect a quarter into it. Where stability limits
+// steps it swings: what is left of stiff motion, which the end damps, grows within the step.
+static int pendulum_dop853_is_rough(pendulum_dop853 *run) {
+    const double theta = 0.25, t = run->t_old + theta*run->h_old;
+    double y[2], f[2], slope[2];
+    for (int i = 0; i < 2; i++) {
+        double value = run->dense[6][i], rate = 0.0;
+        for (int j = 5; j >= 0; j--) {  // by theta, or by 1 - theta, and the polynomials of higher order
+            const double factor = j % 2 ? theta : 1.0 - theta;
+            rate = factor*rate + (j % 2 ? value : -value), value = run->dense[j][i] + factor*value;
+        }
+        y[i] = run->x_old[i] + theta*value, slope[i] = (value + theta*rate)/run->h_old;
+    }
+    if (pendulum_dop853_eval(run, t, y, f)) return 1;
+    for (int i = 0; i < 2; i++) f[i] = 0.25*run->h_old*(f[i] - slope[i]);
+    return pendulum_dop853_square(run, f, run->x_old) > 100.0;
+}
+
 // The state at s within the latest step.
 static int pendulum_dop853_between(pendulum_dop853 *run, double s, double *x_out) {
     const double t = run->t_old, h = run->h_old, theta = (s - t)/h, rest = 1.0 - theta, *restrict const x = run->x_old;
-    double (*restrict const k)[2] = run->k, (*restrict const d)[2] = run->dense;
+    double err, (*restrict const k)[2] = run->k, (*restrict const d)[2] = run->dense;
     if (!run->dense_ready) {
         double y[2];
         int failure;
@@ -530,8 +563,9 @@ static int pendulum_dop853_between(pendulum_dop853 *run, double s, double *x_out
             + 104.0996495089623*k[10][i] + 29.8402934266605*k[11][i] - 43.53345659001114*k[12][i]
             + 96.32455395918828*k[13][i] - 39.17726167561544*k[14][i] - 149.72683625798564*k[15][i]);
         }
-        run->dense_ready = 1;
+        run->dense_ready = 1, run->rough = pendulum_dop853_is_rough(run);
     }
+    if (run->rough) return pendulum_dop853_by_a_step(run, 0, s, x_out, &err);
     for (int i = 0; i < 2; i++)
         x_out[i] = x[i] + theta*(d[0][i] + rest*(d[1][i] + theta*(d[2][i] + rest*(d[3][i] + theta*(d[4][i] + rest*(d[5][i] + theta*d[6][i]))))));
     return 0;
@@ -593,13 +627,14 @@ SYMDYN_EXPORT int pendulum_simulation_start(pendulum_dop853 *run, const pendulum
 
 // The step to be tried next.
 static void pendulum_dop853_propose(pendulum_dop853 *run) {
-    const double rest = fabs((run->t_end - run->t) - run->t_low), least = 16.0*pendulum_dop853_eps*fabs(run->t);
+    const double bound = run->t_end;
+    const double rest = fabs((bound - run->t) - run->t_low), least = 16.0*pendulum_dop853_eps*fabs(run->t);
     double h = run->h < run->h_max ? run->h : run->h_max;
     run->h_min = least > run->h_floor ? least : run->h_floor;
     h = h > run->h_min ? h : run->h_min;
     const int last = 1.01*h >= rest;
     run->h_try = run->direction*(last ? rest : 2.0*h > rest ? 0.5*rest : h);  // two equal steps, not a whole one and a bit
-    run->t_new = run->t_end, run->t_new_low = 0.0, run->crossing = 0;
+    run->t_new = bound, run->t_new_low = 0.0, run->crossing = 0;
     if (last) return;
     const double way = run->h_try + run->t_low;  // two-sum: the rounding error of t does not build up
     run->t_new = run->t + way;

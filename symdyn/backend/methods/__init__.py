@@ -7,6 +7,7 @@ from symdyn.backend.methods.radau import RADAU, RADAU5
 from symdyn.backend.methods.record import Method, Tableau
 from symdyn.backend.methods.taylor import TAYLOR
 from symdyn.errors import SymdynError
+from symdyn.shown import shown
 
 METHODS = {method.name: method for method in (DOP853, BS54, RADAU, RADAU5, GAUSS, TAYLOR)}
 
@@ -15,6 +16,6 @@ __all__ = ["METHODS", "Method", "Tableau", "method_of"]
 
 def method_of(name: str) -> Method:
     """The method of this name; raises SymdynError for one that there is not."""
-    if name not in METHODS:
-        raise SymdynError(f"there is no compiled method {name!r}; there are {', '.join(METHODS)}")
+    if not isinstance(name, str) or name not in METHODS:
+        raise SymdynError(f"there is no compiled method {shown(name)}; there are {', '.join(METHODS)}")
     return METHODS[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 
 from symdyn.backend.methods.record import Method
 
@@ -21,6 +22,8 @@ class Collocation:
                of degree s
     tail       a polynomial w of the place in the step, lowest power first: the polynomial of the stages and w times the estimate
                are right for polynomials of degree s + 1. 0 at 0 and 1
+    extra      a place in the step, where c (c - c_1) ... (c - c_s) is largest: there the polynomial is farthest from stiff
+               motion, which goes through its start and its stages
     """
 
     nodes: Vector
@@ -30,6 +33,27 @@ class Collocation:
     part: tuple[Vector, ...]
     estimate: Vector
     tail: Vector
+    extra: float
+
+    @property
+    def gap_factor(self) -> float:
+        """The factor that makes c (c - c_1) ... (c - c_s) 1 at the extra place."""
+        return 1.0 / (self.extra * prod(self.extra - c for c in self.nodes))
+
+    @property
+    def tail_off(self) -> float:
+        """Value at the extra place of the tail, less that of the polynomial which is 1 at the start and 0 at all stages."""
+        return sum(w * self.extra**k for k, w in enumerate(self.tail)) - prod((c - self.extra) / c for c in self.nodes)
+
+    @property
+    def extra_slope(self) -> Vector:
+        """Weights of the stages less x, and of the estimate, in the derivative of the polynomial at the extra place."""
+        at, weights = self.extra, []
+        for c in self.nodes:
+            others = [d for d in (0.0, *self.nodes) if d != c]
+            value = prod((at - d) / (c - d) for d in others)
+            weights.append(value * sum(1.0 / (at - d) for d in others))
+        return (*weights, sum(k * w * at**(k - 1) for k, w in enumerate(self.tail) if k))
 
 
 FIVE_STAGES = Collocation(
@@ -53,7 +77,8 @@ FIVE_STAGES = Collocation(
           (3.748059807439805, -3.984965736343885, -1.0444156416080188, 1.1840985681379486, -0.44991777015678036)),
     estimate=(-27.78093394406464, 3.641478498049213, -1.2525477211691187, 0.5920031671845428, -0.2),
     tail=(0.0, 6.2867047517292765, -78.58380939661596, 314.33523758646385, -550.0866657763117, 440.06933262104934,
-          -132.0207997863148))
+          -132.0207997863148),
+    extra=0.7339604782881639)
 
 THREE_STAGES = Collocation(
     nodes=(0.1550510257216822, 0.6449489742783178, 1.0),
@@ -66,7 +91,8 @@ THREE_STAGES = Collocation(
           (-4.178718591551905, -0.32768282076106237, 0.47662355450055044),
           (-0.5028726349457868, 2.571926949855605, -0.5960392048282249)),
     estimate=(-10.048809399827416, 1.382142733160749, -0.3333333333333333),
-    tail=(0.0, 3.637834252744496, -16.37025413735023, 21.827005516466976, -9.09458563186124))
+    tail=(0.0, 3.637834252744496, -16.37025413735023, 21.827005516466976, -9.09458563186124),
+    extra=0.8611601583007704)
 
 SOURCE = (
     "E. Hairer, G. Wanner, Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems, 2nd ed.,",

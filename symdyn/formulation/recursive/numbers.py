@@ -12,9 +12,10 @@ import mpmath
 import numpy as np
 import sympy as sp
 
-from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.errors import ArgumentError, EvaluationError, ModelError
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.loads import Applied, Loads
+from symdyn.formulation.measured import Measured
 from symdyn.formulation.recursive.doubles import Doubles
 from symdyn.formulation.recursive.rates import Rates, apparent_rates
 from symdyn.formulation.recursive.scalars import on_scalars
@@ -22,6 +23,7 @@ from symdyn.formulation.recursive.values import taken
 from symdyn.formulation.tree import Tree, build
 from symdyn.model.record import Model
 from symdyn.model.symbols import time
+from symdyn.shown import name_of
 from symdyn.spatial.vectors import vector
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import Node
@@ -52,7 +54,13 @@ class NumericTree:
         recorder = Recorder()
         self.algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
         self.tree = build(model, self.algebra, aligned)
-        self.applied = Loads(self.tree).applied()
+        self.algebra.measured = Measured(self.tree)
+        loads = Loads(self.tree)
+        if loads.implicit:
+            listed = ", ".join(map(str, loads.implicit))
+            raise ModelError([f"{listed}: loads that depend on accelerations or reactions, which numbers of a tree at one state "
+                              "do not have; use the equations"], model.name)
+        self.applied = loads.applied()
         self.rates = apparent_rates(self.tree)
         found: dict[Any, None] = {}
         on_scalars(self._records, found.setdefault)
@@ -157,7 +165,7 @@ def numeric_tree(model: Model, values: Mapping[Any, Any], digits: int | None = N
 
     For several states, and for the loads, make a NumericTree. Raises as NumericTree.at.
     """
-    rest = {str(getattr(key, "name", key)): value for key, value in values.items()}
+    rest = {name_of(key): value for key, value in values.items()}
     groups: dict[str, Any] = {}
     for what, symbols in (("q", model.coordinates), ("u", model.speeds), ("params", model.parameters),
                           ("inputs", model.inputs), ("states", [z.symbol for z in model.states])):

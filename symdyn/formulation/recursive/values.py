@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.errors import ArgumentError, no_value
+from symdyn.shown import name_of, shown
 
 
 def taken(given: Any, names: Sequence[str], what: str, known: Mapping[str, Any], owner: str) -> dict[str, Any]:
@@ -19,8 +20,8 @@ def taken(given: Any, names: Sequence[str], what: str, known: Mapping[str, Any],
     Raises ArgumentError naming what is missing, unknown, no number or not finite, and for a wrong length.
     """
     if given is None or isinstance(given, Mapping):
-        values = {str(getattr(key, "name", key)): value for key, value in (given or {}).items()}
-        faults = [f"there is no {n!r}; there are {', '.join(names) or 'none'}" for n in values if n not in names]
+        values = {name_of(key): value for key, value in (given or {}).items()}
+        faults = [f"there is no {shown(n)}; there are {', '.join(names) or 'none'}" for n in values if n not in names]
         missing = [n for n in names if n not in values and n not in known]
         if missing:
             faults.append(no_value(missing))
@@ -30,7 +31,7 @@ def taken(given: Any, names: Sequence[str], what: str, known: Mapping[str, Any],
         if len(listed) != len(names):
             raise ArgumentError(f"{owner}: {what} has {len(listed)} values, needed are {len(names)}: {', '.join(names)}")
         faults, values = [], dict(zip(names, listed, strict=True))
-    bad = [f"{n} = {v!r}" for n, v in values.items() if not _finite(v)]
+    bad = [f"{n} = {shown(v)}" for n, v in values.items() if not _finite(v)]
     if bad:
         faults.append(f"values must be finite numbers, found {', '.join(bad)}")
     if faults:

@@ -14,6 +14,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.cube import Cube
 from symdyn.tape.node import is_zero
@@ -119,14 +120,14 @@ class Buoyancy(Element):
         if isinstance(given, Box):
             given = [given]
         if not isinstance(given, Sequence) or isinstance(given, str):
-            self.faults.append(f"{self.where}: {what} is {given!r}; pass a list of sd.Box(size, center)")
+            self.faults.append(f"{self.where}: {what} is {shown(given)}; pass a list of sd.Box(size, center)")
             return ()
         taken = []
         for k, box in enumerate(given):
             where = f"{self.where}: {what}[{k}]"
             if not isinstance(box, Box):
                 if not hasattr(box, "__len__") or isinstance(box, str):
-                    self.faults.append(f"{where} is {box!r}; pass sd.Box(size, center), or three sizes")
+                    self.faults.append(f"{where} is {shown(box)}; pass sd.Box(size, center), or three sizes")
                     continue
                 box = Box(box)
             n = len(self.faults)

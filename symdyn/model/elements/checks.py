@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.model.faults import Faults
+from symdyn.model.symbols import symbols_of
 
 # An eigenvalue below this part of the largest one is a rounding error of published numbers.
 ROUNDING = 1e-6
@@ -25,7 +26,7 @@ def six(faults: Faults, value: Any, what: str) -> tuple[sp.Expr, ...]:
 def positive(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Expr:
     """An expression; a number must be above zero."""
     taken = faults.expression(value, what)
-    if not taken.free_symbols and not taken > 0 and not any(fault.startswith(what) for fault in faults):
+    if not symbols_of(taken) and not taken > 0 and not any(fault.startswith(what) for fault in faults):
         faults.append(f"{what} is {float(taken):g}; pass a number above 0 {unit}".rstrip())
     return taken
 
@@ -33,14 +34,14 @@ def positive(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Expr:
 def not_negative(faults: Faults, value: Any, what: str, unit: str = "") -> sp.Expr:
     """An expression; a number must not be below zero."""
     taken = faults.expression(value, what)
-    if not taken.free_symbols and taken < 0:
+    if not symbols_of(taken) and taken < 0:
         faults.append(f"{what} is {float(taken):g}; pass a number that is not below 0 {unit}".rstrip())
     return taken
 
 
 def least_eigenvalue(matrix: sp.MatrixBase) -> float:
     """Of a symmetric matrix of numbers; zero where it is negative by rounding alone, and for one with symbols."""
-    if matrix.free_symbols:
+    if symbols_of(matrix):
         return 0.0
     values = np.array(matrix.tolist(), dtype=float)
     size = np.sqrt(np.abs(np.diag(values)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
@@ -12,6 +13,7 @@ import sympy as sp
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import least_eigenvalue, six
 from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, inner, vector
 
 ANGLES = ("auto", "ZYX", "rotation vector")
@@ -34,7 +36,8 @@ class LinearStiffness(Element):
     angles      "ZYX": roll, pitch, yaw of R = R_z(psi) R_y(theta) R_x(phi), along whose rates the moments act; singular at a
                 pitch of 90 degrees, where the run stops and tells so
                 "rotation vector": axis times angle, without singularity below half a turn, where it jumps to the opposite
-                "auto": "ZYX" for a body whose joint with the ground has these angles, else the rotation vector
+                "auto": "ZYX" for a body whose joint with the ground has these angles, also through bodies that are fixed to
+                each other, else the rotation vector; in absolute coordinates as the joints of the tree have it
     Where the moments vanish with the angles, both are the same for small angles; a prestress (`force`) turns with the axes of
     its kind. The potential is 1/2 (xi - reference)^T K (xi - reference) - force . (xi - reference) with the symmetric part of K;
     what is not symmetric in K has no potential and counts as a force that does work (a matrix of moments about fixed axes, of
@@ -54,7 +57,7 @@ class LinearStiffness(Element):
         self.reference = six(faults, reference, f"{where}: reference")
         self.angles = angles
         if angles not in ANGLES:
-            faults.append(f"{where}: angles is {angles!r}; pass one of {', '.join(map(repr, ANGLES))}")
+            faults.append(f"{where}: angles is {shown(angles)}; pass one of {', '.join(map(repr, ANGLES))}")
 
     @property
     def constants(self) -> Sequence[sp.Expr]:
@@ -65,6 +68,16 @@ class LinearStiffness(Element):
         return {"N/m": list(self.K[:3, :3]), "N": [*self.K[3:, :3], *self.force[:3]], "N/rad": list(self.K[:3, 3:]),
                 "N m/rad": list(self.K[3:, 3:]), "N m": self.force[3:], "m": [*self.point, *self.reference[:3]],
                 "rad": self.reference[3:]}
+
+    def with_angles_of(self, roll_pitch_yaw: bool) -> LinearStiffness:
+        """The same with "auto" decided, for a description in which the body hangs on another joint.
+
+        roll_pitch_yaw   whether the body's own joint with the ground has these angles as coordinates
+        """
+        decided = copy.copy(self)
+        if self.angles == "auto":
+            decided.angles = "ZYX" if roll_pitch_yaw else "rotation vector"
+        return decided
 
     def act(self, site: Site) -> Action:
         a = site.algebra

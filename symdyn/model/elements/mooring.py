@@ -10,6 +10,7 @@ import sympy as sp
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import not_negative, positive
 from symdyn.model.elements.site import Action, Site, Watch
+from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, vector
 from symdyn.tape.catenary import NEAREST, Catenary, potential
 from symdyn.tape.node import is_zero
@@ -94,7 +95,7 @@ class MooringLine(Element):
                       watches=watches)
 
     def _strain(self, site: Site, strain: Any) -> Watch:
-        unit = "" if self.stiffness.free_symbols else f" of {float(self.stiffness):.4g} N"
+        unit = "" if symbols_of(self.stiffness) else f" of {float(self.stiffness):.4g} N"
         return Watch(f"strain of {self.where}", strain, -1.0, STRAIN,
                      f"{self.where}: it is stretched by {{value}} of its length, with that part of EA{unit} as its tension; "
                      f"lines are meant up to {STRAIN:g}; look at its length, its stiffness and its places")

@@ -12,6 +12,7 @@ import sympy as sp
 from symdyn.model.elements.base import Element
 from symdyn.model.elements.checks import not_negative
 from symdyn.model.elements.site import Action, Site
+from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, dot
 
 # m^2/s^2: below this the air is at rest; a root of zero would have no derivative.
@@ -106,7 +107,7 @@ class Thrust(Element):
 
     @property
     def expressions(self) -> Sequence[sp.Expr]:
-        used = sorted(self.force.free_symbols - {self.speed}, key=str)
+        used = sorted(symbols_of(self.force) - {self.speed}, key=str)
         return [*self.wind, *used]
 
     @property

@@ -8,7 +8,7 @@ from symdyn.model.joints.base import Joint
 
 
 class AxisJoint(Joint):
-    """A joint with one coordinate and `axis`, a unit vector in the joint frame; see Joint for the frames."""
+    """A joint with one coordinate and `axis`, a vector in the joint frame; see Joint for the frames."""
 
     default_axis: tuple[int, int, int] = (0, 0, 1)
 

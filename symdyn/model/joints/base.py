@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from symdyn.model.bodies import Body
 from symdyn.model.faults import Faults
-from symdyn.model.symbols import Coordinate, as_coordinate
+from symdyn.model.symbols import Coordinate, as_coordinate, symbols_of
+from symdyn.model.sympy_vectors import frames_of, is_sympy_vector
+from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import Vector
 
 IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -39,8 +42,11 @@ class Joint:
     parent, child       bodies of the system (or their names); the ground is `system.ground`
     parent_point        (3,) where the joint sits on the parent, parent axes, m; default: the origin
     child_point         (3,) the same on the child
+                        (points and axes may be vectors of SymPy's, written in `body.frame`)
     parent_rotation     (3, 3) joint components to parent components; default: identity
     child_rotation      (3, 3) joint components to child components
+    axis                of joints that have one: its direction in the joint frame; numbers are divided by its length, expressions
+                        of parameters must have the length 1
     coordinates         one per degree of freedom; a coordinate may be an expression of others and of t; default: named
                         after the joint, q_NAME, or q_NAME_1, ...
     speeds              names for the generalized speeds; default: the derivatives of the coordinates
@@ -60,9 +66,9 @@ class Joint:
         self.parent = parent
         self.child = child
         self.faults = faults = Faults()
-        where = f"joint {name!r}"
-        self.parent_point = faults.vector(parent_point, f"{where}: parent_point", planar=True)
-        self.child_point = faults.vector(child_point, f"{where}: child_point", planar=True)
+        where = f"joint {shown(name)}"
+        self.parent_point = faults.vector(parent_point, f"{where}: parent_point", True, parent)
+        self.child_point = faults.vector(child_point, f"{where}: child_point", True, child)
         self.parent_rotation = self._rotation(parent_rotation, "parent_rotation")
         self.child_rotation = self._rotation(child_rotation, "child_rotation")
         self.unnamed = coordinates is None
@@ -110,18 +116,18 @@ class Joint:
         wanted = len(self.coordinate_units)
         if given is None:
             ends = [""] if wanted == 1 else [f"_{k + 1}" for k in range(wanted)]
-            given = [Coordinate(f"q_{self.name}{end}") for end in ends]
+            given = [Coordinate(f"q_{name_of(self)}{end}") for end in ends]
         if not listed(given):
-            self.faults.append(f"joint {self.name!r}: coordinates is {given!r}; pass a list of {wanted}")
+            self.faults.append(f"joint {shown(self.name)}: coordinates is {shown(given)}; pass a list of {wanted}")
             given = [sp.S.Zero] * wanted
         given = list(given)
         if len(given) != wanted:
-            self.faults.append(f"joint {self.name!r} ({self.kind}) takes {wanted} coordinates "
+            self.faults.append(f"joint {shown(self.name)} ({self.kind}) takes {wanted} coordinates "
                                f"({', '.join(self.coordinate_units)}), found {len(given)}")
             given = [sp.S.Zero] * wanted
         taken = [as_coordinate(e) for e in given]
         return tuple(e if isinstance(e, Coordinate)
-                     else self.faults.expression(e, f"joint {self.name!r}: coordinate {k + 1}")
+                     else self.faults.expression(e, f"joint {shown(self.name)}: coordinate {k + 1}")
                      for k, e in enumerate(taken))
 
     def _speeds(self, given: Sequence[Any] | None) -> tuple[sp.Symbol, ...] | None:
@@ -129,40 +135,55 @@ class Joint:
             return None
         given = [as_coordinate(e) for e in given] if listed(given) else given
         if not isinstance(given, list) or len(given) != self.n_speeds or not all(isinstance(e, sp.Symbol) for e in given):
-            self.faults.append(f"joint {self.name!r} ({self.kind}) takes {self.n_speeds} symbols as speeds, found {given}")
+            self.faults.append(f"joint {shown(self.name)} ({self.kind}) takes {self.n_speeds} symbols as speeds, found "
+                               f"{shown(given)}")
             return None
         return tuple(given)
 
     def _rotation(self, value: Any, what: str) -> sp.ImmutableMatrix:
         before = len(self.faults)
-        matrix = self.faults.matrix(IDENTITY if value is None else value, f"joint {self.name!r}: {what}")
+        matrix = self.faults.matrix(IDENTITY if value is None else value, f"joint {shown(self.name)}: {what}")
         residual = rotation_residual(matrix) if len(self.faults) == before else 0.0
         if residual > 1e-9:
-            self.faults.append(f"joint {self.name!r}: {what} is not a rotation: R R^T differs from the identity "
+            self.faults.append(f"joint {shown(self.name)}: {what} is not a rotation: R R^T differs from the identity "
                                f"by {residual:.2g} or its determinant is not +1; pass a rotation matrix")
         return matrix
 
     def _axis(self, value: Any, what: str = "axis") -> sp.ImmutableMatrix:
+        """A unit vector along an axis, joint frame; numbers are divided by their length, exactly where they are exact.
+
+        A vector of SymPy's may be written in the axes of the parent or of the child, which joint frames connect with the joint.
+        """
         before = len(self.faults)
         harmless = sp.ImmutableMatrix(getattr(self, "default_axis", (0, 0, 1)))
-        axis = self.faults.vector(value, f"joint {self.name!r}: {what}", planar=True)
+        axis = self._along(value, f"joint {shown(self.name)}: {what}")
         if len(self.faults) > before:
             return harmless
         length = numeric(sp.sqrt(axis.dot(axis)))
-        if abs(length - 1) > 1e-9:
-            found = f"has length {length:.6g}"
+        numbers = all(e.is_number for e in axis)
+        if length < 1e-12 or (not numbers and abs(length - 1) > 1e-9):
+            found = f"has length {length:.6g}" + ("" if numbers else " for arbitrary numbers")
             cure = "pass a direction that is not zero" if length < 1e-12 else "divide it by its length"
-            self.faults.append(f"joint {self.name!r}: {what} {list(axis)} {found}, not 1; {cure}")
+            self.faults.append(f"joint {shown(self.name)}: {what} {list(axis)} {found}, not 1; {cure}")
             return harmless
-        return _exactly_unit(axis)
+        return _exactly_unit(axis) if abs(length - 1) <= 1e-9 else _divided_by_its_length(axis)
+
+    def _along(self, value: Any, what: str) -> sp.ImmutableMatrix:
+        """Components of a direction in the joint frame."""
+        if not is_sympy_vector(value):
+            return self.faults.vector(value, what, planar=True)
+        sides = ((self.parent, self.parent_rotation), (self.child, self.child_rotation))
+        written = frames_of(value)
+        body, R = next(((body, R) for body, R in sides if isinstance(body, Body) and written == [body.frame]), sides[0])
+        return sp.ImmutableMatrix(R.T * self.faults.vector(value, what, frame=body))
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.name!r})"
+        return f"{type(self).__name__}({shown(self.name)})"
 
 
 def listed(value: Any) -> bool:
     """Whether a value is a sequence of values."""
-    return hasattr(value, "__iter__") and not isinstance(value, (str, bytes, dict))
+    return hasattr(value, "__iter__") and not isinstance(value, (str, bytes, dict, type)) and getattr(value, "ndim", 1) != 0
 
 
 def _exactly_unit(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
@@ -182,10 +203,20 @@ def _exactly_unit(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix([sp.Rational(sp.N(e / length, 60)) for e in exact])
 
 
+def _divided_by_its_length(axis: sp.ImmutableMatrix) -> sp.ImmutableMatrix:
+    """A unit vector along numbers: (1, 1, 0) becomes (sqrt(2)/2, sqrt(2)/2, 0), also where these are floats."""
+    short = [sp.Rational(e).limit_denominator(1000) if e.is_Float else e for e in axis]
+    if all(float(a) == float(b) for a, b in zip(short, axis, strict=True)):  # floats that short fractions are rounded to
+        return sp.ImmutableMatrix(short) / sp.sqrt(sum(e * e for e in short))
+    exact = [sp.Rational(e) if e.is_Float else e for e in axis]
+    length = sp.sqrt(sum(e * e for e in exact))
+    return sp.ImmutableMatrix([sp.Rational(sp.N(e / length, 60)) for e in exact])
+
+
 def numeric(expression: sp.Expr, symbols: Sequence[sp.Symbol] | None = None) -> float:
     """The value of an expression with its symbols (or more of them, in a given order), at fixed arbitrary numbers."""
     if symbols is None:
-        symbols = sorted(expression.free_symbols, key=str)
+        symbols = sorted(symbols_of(expression), key=str)
     value = expression.xreplace({s: sp.Float(0.3 + 0.37 * (k + 1) ** 0.5) for k, s in enumerate(symbols)})
     return float(sp.re(sp.N(value)))
 
@@ -194,7 +225,7 @@ def rotation_residual(matrix: sp.ImmutableMatrix) -> float:
     """How far a matrix is from a proper rotation: largest entry of R R^T - 1, or of det R - 1."""
     if matrix == sp.eye(3):
         return 0.0
-    symbols = sorted(matrix.free_symbols, key=str)
+    symbols = sorted(symbols_of(matrix), key=str)
     R = np.array([[numeric(e, symbols) for e in matrix.row(i)] for i in range(3)])
     return float(max(np.abs(R @ R.T - np.eye(3)).max(), abs(np.linalg.det(R) - 1)))
 

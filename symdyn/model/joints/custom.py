@@ -11,7 +11,8 @@ from symdyn.errors import UnsupportedExpression
 from symdyn.model.faults import NAME
 from symdyn.model.joints.base import IDENTITY, Joint, JointMotion, listed
 from symdyn.model.joints.transform import Transform
-from symdyn.model.symbols import Coordinate, as_coordinate
+from symdyn.model.symbols import Coordinate, as_coordinate, symbols_of
+from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
 
 
@@ -22,7 +23,8 @@ class Custom(Joint):
     rotation      (3, 3) of the coordinates and parameters, components in the child's joint frame to components in the
                   parent's (SymPy's rot_ccw_axis3, not rot_axis3); default: identity
     position      (3,) of the coordinates and parameters, origin of the child's joint frame in the parent's, m; default: zero
-    units         of the coordinates, such as ("rad", "m"); default: "1"
+    units         of the coordinates, such as ("rad", "m"); default: "1". A coordinate in "rad" or "1" counts as an angle where
+                  speeds are compared with velocities (scaling of constraints, spans of searches), one in "m" as a length
 
     Everything else follows by exact differentiation. The rotation must be one at every value of its symbols, and every
     coordinate must move the child in a way of its own; both are tried at random points. A motion that is given, or follows
@@ -37,7 +39,7 @@ class Custom(Joint):
                  child_rotation: Any = None) -> None:
         given = tuple(coordinates) if listed(coordinates) else coordinates
         super().__init__(name, parent, child, given, speeds, parent_point, child_point, parent_rotation, child_rotation)
-        self._where = where = f"joint {name!r} (custom)"
+        self._where = where = f"joint {shown(name)} (custom)"
         named = all(isinstance(q, Coordinate) for q in self.coordinates)
         # A plain symbol that is given as a coordinate is one in the transform, too.
         same = dict(zip(given, self.coordinates, strict=True)) if named else {}
@@ -53,7 +55,7 @@ class Custom(Joint):
     def constants(self) -> list[sp.Expr]:
         used: dict[sp.Symbol, None] = {}
         for e in (*self.rotation, *self.position):
-            used.update(dict.fromkeys(sorted(filter(_is_parameter, e.free_symbols), key=str)))
+            used.update(dict.fromkeys(sorted(filter(_is_parameter, symbols_of(e)), key=str)))
         return [*super().constants, *used]
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
@@ -69,7 +71,8 @@ class Custom(Joint):
     def _coordinates(self, given: Any) -> tuple[sp.Expr, ...]:
         taken = [as_coordinate(e) for e in given] if isinstance(given, tuple) else []
         if not 1 <= len(taken) <= 6 or not all(isinstance(e, Coordinate) for e in taken) or len(set(taken)) < len(taken):
-            self.faults.append(f"joint {self.name!r} (custom): coordinates is {given!r}; pass a list of 1 to 6 different "
+            self.faults.append(f"joint {shown(self.name)} (custom): coordinates is {shown(given)}; pass a list of 1 to 6 "
+                               "different "
                                "symbols, made with sd.coordinates (for a given motion, or one that follows other coordinates, "
                                "pass expressions to Free)")
             taken = [sp.S.Zero] * max(1, len(taken))
@@ -81,14 +84,14 @@ class Custom(Joint):
             return
         given = tuple(units) if listed(units) else ()
         if len(given) != len(self.coordinates) or not all(isinstance(u, str) and NAME.fullmatch(u) for u in given):
-            self.faults.append(f"{self._where}: units is {units!r}; pass a text such as 'rad' for each of its "
+            self.faults.append(f"{self._where}: units is {shown(units)}; pass a text such as 'rad' for each of its "
                                f"{len(self.coordinates)} coordinates")
             return
         self.coordinate_units = given
 
     def _refuse_foreign(self) -> None:
         for what, matrix in (("rotation", self.rotation), ("position", self.position)):
-            foreign = sorted(str(s) for s in matrix.free_symbols if s not in self.coordinates and not _is_parameter(s))
+            foreign = sorted(str(s) for s in symbols_of(matrix) if s not in self.coordinates and not _is_parameter(s))
             if foreign:
                 self.faults.append(f"{self._where}: its {what} uses {', '.join(foreign)}; it may use the joint's own coordinates "
                                    f"({', '.join(map(str, self.coordinates))}) and parameters")

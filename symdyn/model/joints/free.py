@@ -20,6 +20,7 @@ from symdyn.model.joints.rotation import (
     taken_orientation,
 )
 from symdyn.model.orientation import EulerAngles
+from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, identity, vector, zeros
 
 
@@ -41,15 +42,16 @@ class Free(Joint):
                  orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
                  parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
                  child_rotation: Any = None, velocity: str = "parent") -> None:
-        self.body_velocity = velocity == "body"
+        self.body_velocity = isinstance(velocity, str) and velocity == "body"
         default = EulerAngles("ZYX", "body" if self.body_velocity else "rates")
         self.orientation, faults = taken_orientation(name, orientation, default)
         self.coordinate_units = ("m", "m", "m", *orientation_units(self.orientation))
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
         self.faults.extend(faults)
-        if velocity not in ("parent", "body"):
-            self.faults.append(f"joint {name!r}: velocity is {velocity!r}; pass 'parent' (derivatives of x, y, z) or 'body' "
+        if not isinstance(velocity, str) or velocity not in ("parent", "body"):
+            self.faults.append(f"joint {shown(name)}: velocity is {shown(velocity)}; pass 'parent' (derivatives of x, y, z) or "
+                               "'body' "
                                "(components in the axes of the child's joint frame)")
 
     @property

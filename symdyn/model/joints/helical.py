@@ -9,13 +9,14 @@ import sympy as sp
 
 from symdyn.model.joints.axis import AxisJoint
 from symdyn.model.joints.base import JointMotion, turn
+from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
 
 
 class Helical(AxisJoint):
     """Rotation by `coordinate` (rad) about `axis` and translation by pitch * coordinate along it.
 
-    axis    a unit vector in the joint frame, default z
+    axis    a vector in the joint frame, default z; see Joint
     pitch   m/rad, a number or an expression of parameters: the advance of one full turn over 2 pi; positive: a
             right-handed screw
     See Joint for the frames.
@@ -30,7 +31,7 @@ class Helical(AxisJoint):
                  child_rotation: Any = None) -> None:
         super().__init__(name, parent, child, coordinate, axis, speed, parent_point, child_point, parent_rotation,
                          child_rotation)
-        self.pitch = self.faults.expression(pitch, f"joint {name!r}: pitch (m/rad)")
+        self.pitch = self.faults.expression(pitch, f"joint {shown(name)}: pitch (m/rad)")
 
     @property
     def constants(self) -> list[sp.Expr]:

@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.flexible.modal_body import ModalBody
 from symdyn.model.elements.checks import not_negative, positive
 from symdyn.model.joints.base import Joint, JointMotion
+from symdyn.shown import name_of, shown
 from symdyn.spatial.sixvectors import skew
 from symdyn.spatial.vectors import dot, identity, inner, vector, zeros
 from symdyn.tape.differentiate import forward
@@ -39,10 +40,10 @@ class Modal(Joint):
         self.carries = carries
         self.coordinate_units = ("m",) * beam.n
         super().__init__(name, parent, child, coordinates, speeds, (0, 0, 0), (0, 0, 0), None, None)
-        self.stiffness = positive(self.faults, stiffness, f"joint {name!r}: stiffness")
-        self.damping = not_negative(self.faults, damping, f"joint {name!r}: damping")
+        self.stiffness = positive(self.faults, stiffness, f"joint {shown(name)}: stiffness")
+        self.damping = not_negative(self.faults, damping, f"joint {shown(name)}: damping")
         if not isinstance(carries, (bool, np.bool_)):
-            self.faults.append(f"joint {name!r}: carries is {carries!r}; pass True or False")
+            self.faults.append(f"joint {shown(name)}: carries is {shown(carries)}; pass True or False")
 
     @property
     def reach(self) -> float:
@@ -97,4 +98,4 @@ def exactly(values: np.ndarray) -> np.ndarray:
 
 
 def _name(body: Any) -> str:
-    return str(getattr(body, "name", body))
+    return name_of(body)

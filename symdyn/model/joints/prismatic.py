@@ -11,7 +11,7 @@ from symdyn.spatial.vectors import identity, zeros
 
 
 class Prismatic(AxisJoint):
-    """Translation by `coordinate` (m) along `axis`, a unit vector in the joint frame, default x; see Joint for the frames."""
+    """Translation by `coordinate` (m) along `axis`, a vector in the joint frame, default x; see Joint for the frames."""
 
     kind = "prismatic"
     coordinate_units = ("m",)

@@ -11,7 +11,7 @@ from symdyn.spatial.vectors import zeros
 
 
 class Revolute(AxisJoint):
-    """Rotation by `coordinate` (rad) about `axis`, a unit vector in the joint frame, default z; see Joint for the frames."""
+    """Rotation by `coordinate` (rad) about `axis`, a vector in the joint frame, default z; see Joint for the frames."""
 
     kind = "revolute"
     coordinate_units = ("rad",)

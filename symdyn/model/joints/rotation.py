@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.model.joints.euler_angles import angles_motion, angles_rates, angles_rotation
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.symbols import Speed
+from symdyn.shown import shown
 from symdyn.spatial.vectors import identity, zeros
 
 Orientation = EulerAngles | EulerParameters
@@ -20,7 +21,8 @@ def taken_orientation(name: str, orientation: Any, default: EulerAngles) -> tupl
     """The orientation, and faults if it is none."""
     if orientation is None or isinstance(orientation, (EulerAngles, EulerParameters)):
         return orientation or default, []
-    return default, [f"joint {name!r}: orientation is {orientation!r}; pass sd.EulerAngles('ZYX') or another sequence, or "
+    return default, [f"joint {shown(name)}: orientation is {shown(orientation)}; pass sd.EulerAngles('ZYX') or another "
+                     "sequence, or "
                      "sd.EulerParameters()"]
 
 
@@ -35,7 +37,7 @@ def symbols_only(orientation: Orientation) -> str:
         return "with Euler parameters every coordinate must be a symbol; use Euler angles for a prescribed motion"
     if orientation.angular_velocity:
         return ("with its angular velocity as speeds every coordinate must be a symbol; use "
-                f"EulerAngles({orientation.sequence!r}, speeds='rates') for a prescribed motion")
+                f"EulerAngles({shown(orientation.sequence)}, speeds='rates') for a prescribed motion")
     return ""
 
 

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import sympy as sp
 
+from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import vector
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import PARAMETER
@@ -35,7 +36,7 @@ class Samples:
     """
 
     def __init__(self, expressions: Sequence[sp.Expr], coordinates: Sequence[sp.Symbol]) -> None:
-        self.symbols = [*coordinates, *sorted({s for e in expressions for s in e.free_symbols} - {*coordinates}, key=str)]
+        self.symbols = [*coordinates, *sorted({s for e in expressions for s in symbols_of(e)} - {*coordinates}, key=str)]
         self.points: list[dict[str, float]] = []
         stream = random.Random(1)
         for k in range(TRIES):

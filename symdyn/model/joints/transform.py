@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.model.joints.samples import TRIES, Samples
+from symdyn.model.symbols import symbols_of
 
 
 class Transform:
@@ -100,7 +101,7 @@ class Transform:
 
     def _derivative(self, matrix: sp.MatrixBase, by: sp.Symbol) -> sp.ImmutableMatrix:
         # SymPy differentiates Abs, Max and sign as functions of complex numbers unless told that there are none.
-        real = {s: sp.Symbol(s.name, real=True) for s in matrix.free_symbols if not s.is_real}
+        real = {s: sp.Symbol(s.name, real=True) for s in symbols_of(matrix) if not s.is_real}
         result = matrix.xreplace(real).diff(real.get(by, by))
         result = result.replace(sp.DiracDelta, lambda *_: sp.S.Zero)
         return sp.ImmutableMatrix(result.xreplace({new: old for old, new in real.items()}))

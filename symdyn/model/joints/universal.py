@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from symdyn.model.joints.base import Joint, JointMotion, numeric, turn
+from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, zeros
 
 
 class Universal(Joint):
-    """coordinates = [first angle, second angle] (rad), R = R_1 R_2; `axes` are two unit vectors in the joint frame.
+    """coordinates = [first angle, second angle] (rad), R = R_1 R_2; `axes` are two vectors in the joint frame.
 
     See Joint for the frames.
     """
@@ -24,12 +27,14 @@ class Universal(Joint):
                  child_rotation: Any = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
-        if not hasattr(axes, "__len__") or len(axes) != 2:
-            self.faults.append(f"joint {name!r} (universal) takes 2 axes, found {axes!r}")
+        if not isinstance(axes, (list, tuple, np.ndarray)) or len(np.shape(axes) if isinstance(axes, np.ndarray) else axes) != 2 \
+                or len(axes) != 2:
+            self.faults.append(f"joint {shown(name)} (universal) takes 2 axes, found {shown(axes)}")
             axes = ((1, 0, 0), (0, 1, 0))
         first, second = self.axes = (self._axis(axes[0], "first axis"), self._axis(axes[1], "second axis"))
         if not self.faults and abs(abs(numeric(first.dot(second))) - 1) < 1e-9:
-            self.faults.append(f"joint {name!r} (universal): its two axes are parallel; pass axes at an angle, or use Revolute")
+            self.faults.append(f"joint {shown(name)} (universal): its two axes are parallel; pass axes at an angle, or use "
+                               "Revolute")
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
         first, second = (algebra.constants(axis) for axis in self.axes)

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.animation import FuncAnimation
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import number_of
 from symdyn.runtime.paths import as_path
 from symdyn.runtime.pictures.bodies import ABOVE, make_artists, make_axes, move, show
 from symdyn.runtime.pictures.drawing import Drawing
@@ -17,6 +18,8 @@ from symdyn.runtime.pictures.film import Film
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
 
+# Pictures a second that players and browsers can be asked for.
+LEAST_FPS = 0.001
 MAX_FRAMES = 3000
 
 
@@ -34,18 +37,22 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     target = None if path is None else as_path(path, "of the animation", "motion.gif")
     if target is not None and target.suffix.lower() != ".gif":
         raise ArgumentError(f"cannot save the animation to {target.name}: the ending must be .gif")
-    if not (fps > 0 and speed > 0):
-        raise ArgumentError(f"fps and speed must be positive, found fps = {fps}, speed = {speed}")
+    rate, speed = (number_of(v, solution.module.name, f"{what} must be a positive number")
+                  for v, what in ((fps, "fps"), (speed, "speed")))
+    if not (LEAST_FPS <= rate <= 1 / LEAST_FPS and 0 < speed < np.inf):
+        raise ArgumentError(f"fps and speed must be positive, fps from {LEAST_FPS} to {1 / LEAST_FPS:.0f}, found fps = {rate:g}, "
+                            f"speed = {speed:g}")
     whole = Drawing.of(solution) if len(solution.t) > 1 else None
     if whole is None:
         raise ArgumentError(f"{solution.module.name}: there is nothing to animate: at least two times and the function "
                             "'positions' are needed, and bodies that extend or move")
     t = solution.t
-    count = int(abs(t[-1] - t[0]) / speed * fps) + 1
-    if count > MAX_FRAMES:
-        raise ArgumentError(f"{solution.module.name}: the film would have {count} pictures; raise speed above "
-                            f"{speed * count / MAX_FRAMES:.3g}, or lower fps")
-    times = t[0] + np.sign(t[-1] - t[0]) * np.arange(count) * speed / fps
+    wanted = abs(float(t[-1] - t[0])) / speed * rate + 1
+    if wanted > MAX_FRAMES:
+        raise ArgumentError(f"{solution.module.name}: the film would have {wanted:.4g} pictures; raise speed above "
+                            f"{speed * wanted / MAX_FRAMES:.3g}, or lower fps")
+    count = int(wanted)
+    times = t[0] + np.sign(t[-1] - t[0]) * np.arange(count) * speed / rate
     drawing = whole.at(t, times)
     spans = np.ptp(whole.limits(), axis=1)
     height = 5.0 if drawing.spatial else 6.0 * float(np.clip(spans[1] / spans[0], 0.35, 1.2)) + 0.6
@@ -65,7 +72,7 @@ def animate(solution: Solution, path: Any = None, fps: int = 25, speed: float = 
     # The layout is found once: it is the slowest part of drawing.
     figure.canvas.draw()
     figure.set_layout_engine("none")
-    film = Film(figure, draw, count, fps)
+    film = Film(figure, draw, count, rate)
     if target is not None:
         try:
             target.write_bytes(film.gif())

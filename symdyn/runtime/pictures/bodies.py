@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import NotReal, real
 from symdyn.runtime.pictures.drawing import Drawing
 from symdyn.runtime.pictures.scene import Scene
 from symdyn.runtime.pictures.style import MANY, colors_of
+from symdyn.shown import shown
 
 # Elevation and azimuth of the eye, degrees; on shapes it looks more from the side.
 VIEW = (22.0, -55.0)
@@ -100,14 +102,15 @@ def flat(axes: Any, points: np.ndarray) -> np.ndarray:
 def _view(view: Any, drawing: Drawing) -> tuple[float, float]:
     if view is None:
         return VIEW if drawing.solids is None else VIEW_OF_SOLIDS
+    wrong = (f"view is {shown(view)}; pass (elevation, azimuth) of the eye in degrees, such as (20, -60); the elevation is "
+             "between -90 and 90")
     try:
-        elevation, azimuth = map(float, view)
-    except (TypeError, ValueError):
-        elevation = azimuth = np.nan
-    if not (np.isfinite(azimuth) and abs(elevation) <= 90):
-        raise ArgumentError(f"view is {view!r}; pass (elevation, azimuth) of the eye in degrees, such as (20, -60); the "
-                            "elevation is between -90 and 90")
-    return elevation, azimuth
+        angles = real(view)
+    except NotReal as error:
+        raise ArgumentError(f"{wrong}: {error}") from None
+    if angles.shape != (2,) or not (np.isfinite(angles[1]) and abs(angles[0]) <= 90):
+        raise ArgumentError(wrong)
+    return float(angles[0]), float(angles[1])
 
 
 def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) -> None:

@@ -65,9 +65,11 @@ def _apart(panel: Panel) -> list[Panel]:
 
 
 def balance(solution: Solution, rows: np.ndarray) -> list[dict[str, str]]:
-    """Work of the loads and change of energy, (n_t, 2), and their difference over time."""
-    return [_curves(solution.t, Panel("energy", "J", ["work of loads", "change"], rows)),
-            _curves(solution.t, Panel("", "J", ["work \N{MINUS SIGN} change"], rows[:, :1] - rows[:, 1:]), small=True)]
+    """Work of the loads with what resets of events add, and change of energy, (n_t, 2), and their difference over time."""
+    added = "work of loads and resets" if solution.reset_energy else "work of loads"
+    less = f"{added.replace(' of loads', '')} \N{MINUS SIGN} change"
+    return [_curves(solution.t, Panel("energy", "J", [added, "change"], rows)),
+            _curves(solution.t, Panel("", "J", [less], rows[:, :1] - rows[:, 1:]), small=True)]
 
 
 def _curves(t: np.ndarray, panel: Panel, small: bool = False) -> dict[str, str]:

@@ -13,6 +13,7 @@ from symdyn.errors import ArgumentError
 from symdyn.runtime.pictures.bending import Bending, bendings
 from symdyn.runtime.pictures.meshes import Part, line, parts_of
 from symdyn.runtime.pictures.style import colors_of
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -152,5 +153,5 @@ def _color(given: Any, name: str) -> tuple[float, float, float]:
     try:
         return to_rgb(given)
     except ValueError:
-        raise ArgumentError(f"{name}: a shape has the colour {given!r}, which is none; pass '#rrggbb', a grey level such as "
+        raise ArgumentError(f"{name}: a shape has the colour {shown(given)}, which is none; pass '#rrggbb', a grey level such as "
                             "'0.8', or a name such as 'orange' or 'steelblue'") from None

@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from symdyn.errors import ArgumentError
+from symdyn.real_numbers import real_of
 from symdyn.runtime.pictures.bodies import height_of, make_artists, make_axes, show, title
 from symdyn.runtime.pictures.drawing import Drawing
 from symdyn.runtime.pictures.figure import Picture
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -67,17 +69,14 @@ def _pictures(solution: Solution, t: Any, view: Any) -> tuple[np.ndarray, list[A
     """Times of the pictures, and the views on them."""
     name, ends = solution.module.name, sorted((float(solution.t[0]), float(solution.t[-1])))
     given = solution.t[[0, -1]] if t is None else t
-    try:
-        times = np.atleast_1d(np.array(given, dtype=float))
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{name}: t must be a time or a list of times, found {t!r}") from None
+    times = np.atleast_1d(real_of(given, name, "t must be a time or a list of times"))
     views = list(view) if isinstance(view, (list, tuple)) and view and not np.isscalar(view[0]) else None
     if t is None and len(solution.t) == 1:
         times = times[:1]
     if views is not None and len(times) == 1:
         times = np.repeat(times, len(views))
     if times.ndim != 1 or not len(times):
-        raise ArgumentError(f"{name}: t must be a time or a list of times, found {t!r}")
+        raise ArgumentError(f"{name}: t must be a time or a list of times, found {shown(t)}")
     outside = [float(time) for time in times if not ends[0] <= time <= ends[1]]
     if outside:
         raise ArgumentError(f"{name}: the motion goes from t = {ends[0]:.6g} s to {ends[1]:.6g} s; t = "

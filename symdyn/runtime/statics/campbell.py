@@ -16,28 +16,26 @@ import numpy as np
 import scipy.optimize
 
 from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.real_numbers import real_of
 from symdyn.runtime.statics.analysis import decade
 from symdyn.runtime.statics.equilibrium import begin, find, settled, steps
 from symdyn.runtime.statics.manifold import Manifold, in_motion
-from symdyn.runtime.statics.modes import Mode, Modes, dominant, modes_of
+from symdyn.runtime.statics.modes import Mode, Modes, dominant, modes_of, sense_of
 from symdyn.runtime.statics.multiblade import Averaged, Steady, rotor_of, steady
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.spectrum import Unknown, spectrum
 from symdyn.runtime.statics.stability import of_manifold
 from symdyn.runtime.statics.terms import Place
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# A pattern of blades goes round if its cosine and sine are out of phase by so much: 1 is a round whirl, 0 a standing wave.
-LEAST_WHIRL = 0.2
 # State matrices in multi-blade coordinates are the same at all azimuths if entries differ by this part of the largest, scaled.
 CONSTANT = 1e-9
 # Orders of blades that are tried where theirs makes nothing constant, at most of so many blades.
 MOST_BLADES = 6
 FRAMES = ("fixed", "rotating")
-OPTIONS = ("free", "fixed", "start", "params", "t", "inputs", "blades", "azimuth", "azimuths", "max_iterations", "frame",
-           "averaged")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +45,8 @@ class Campbell:
     speed         name; values (n,): its values, rad/s
     eigenvalues   (n, n_modes) complex, 1/s; NaN where a mode could not be followed
     names         by the coordinates with most kinetic energy over all speeds; of blades also "collective", and "forward" or
-                  "backward" where their pattern goes round with the rotor or against it, seen from the fixed frame
+                  "backward" where their pattern goes round with the rotor or against it, seen from the fixed frame; without
+                  named blades by the mean of the modes' whirl, see Mode.whirl
     modes         at every speed, as found; equilibria: the states they are about (Equilibrium; multiblade.Steady, the mean over
                   a turn;
                   Stability of a periodic motion)
@@ -80,13 +79,13 @@ class Campbell:
     def __getitem__(self, name: str) -> np.ndarray:
         """Frequencies of a mode by its name, Hz, (n,). Raises ArgumentError for an unknown one."""
         if name not in self.names:
-            raise ArgumentError(f"{self.title}: there is no mode {name!r}; there are {', '.join(self.names)}")
+            raise ArgumentError(f"{self.title}: there is no mode {shown(name)}; there are {', '.join(self.names)}")
         return np.asarray(self.frequencies[:, self.names.index(name)])
 
     def plot(self, path: Any = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Any:
         """The diagram up to a frequency (Hz), with lines of multiples of the rotor's speed, as a figure; saved to a path.
 
-        By default modes that are far above the others and the lines are left out, which the legend tells. Needs matplotlib.
+        By default modes that are far above the others and the lines are left out, which the legend reports. Needs matplotlib.
         """
         from symdyn.runtime.pictures.campbell import plot
 
@@ -109,50 +108,33 @@ class Campbell:
 
 def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None,
              t: float = 0.0, inputs: Any = None, blades: Sequence[Sequence[Any]] = (), azimuth: Any = None,
-             azimuths: int = 12, max_iterations: int = 100, frame: str = "fixed", averaged: bool = False,
-             **others: Any) -> Campbell:
-    """Natural frequencies over a rotor's speed.
-
-    speed      name or symbol; values: rad/s. At each the equilibrium with this speed is found, then its modes
-    free, fixed, start, params, t, inputs   as for Module.equilibrium
-    blades     sets of coordinates of the blades of a rotor, one set per shape: the same coordinate of every blade, in the order
-               in which blades lie ahead of each other in the sense of the azimuth, such as [("flap1", "flap2", "flap3")]: modes
-               are named by multi-blade coordinates. That these make the equations constant is checked at `azimuths` positions;
-               where they do not (weight on the blades), the periodic motion is found and judged by Floquet theory
-    averaged   with blades: the mean of the equations over the azimuths in place of Floquet theory where they are periodic,
-               which is quicker and leaves out what is periodic; how much the entries vary is printed
-    azimuth    the coordinate whose rate the speed is, where the names do not say it
-    frame      "fixed": frequencies that the fixed frame sees; "rotating": those in the coordinates of the model, where the
-               equations are constant in them
-    Without blades a change of variables that makes the equations constant is looked for; where there is none (two blades, an
-    anisotropic rotor on anisotropic bearings), Floquet theory gives the modes. Raises NoEquilibrium, ArgumentError.
-    """
+             azimuths: int = 12, max_iterations: int = 100, frame: str = "fixed", averaged: bool = False) -> Campbell:
+    """See Module.campbell."""
     metadata, owner = module.metadata, module.name
-    listed(list(others), OPTIONS, "options", owner)
     if frame not in FRAMES:
-        raise ArgumentError(f"{owner}: frame must be 'fixed' or 'rotating', found {frame!r}")
+        raise ArgumentError(f"{owner}: frame must be 'fixed' or 'rotating', found {shown(frame)}")
     if frame == "rotating" and list(blades):
         raise ArgumentError(f"{owner}: blades are named, whose modes are seen from the fixed frame; leave them out, or "
                             f"frame='rotating'")
     named = listed(speed, metadata["u"], "speed", owner)
     if len(named) != 1:
-        raise ArgumentError(f"{owner}: speed must be one name or symbol, found {speed!r}")
+        raise ArgumentError(f"{owner}: speed must be one name or symbol, found {shown(speed)}")
     (name,) = named
     numbers, limit = _values(values, owner), steps(max_iterations, owner)
-    given = dict(fixed or {})
-    if name in {str(getattr(k, "name", k)) for k in given}:
+    prescribed = dict(fixed or {})
+    if name in {name_of(k) for k in prescribed}:
         raise ArgumentError(f"{owner}: {name} is in fixed, too; leave it out there")
     if isinstance(blades, str) or not isinstance(blades, Iterable):
-        raise ArgumentError(f"{owner}: blades must be a list of sets of coordinates, found {blades!r}")
+        raise ArgumentError(f"{owner}: blades must be a list of sets of coordinates, found {shown(blades)}")
     groups = [listed(group, metadata["q"], "blades", owner) for group in blades]
     if isinstance(azimuths, bool) or not isinstance(azimuths, (int, np.integer)):
-        raise ArgumentError(f"{owner}: azimuths must be a whole number, found {azimuths!r}")
+        raise ArgumentError(f"{owner}: azimuths must be a whole number, found {shown(azimuths)}")
     turned = listed(azimuth if azimuth is not None else name.removesuffix("_dot"), metadata["q"], "azimuth", owner)[0] \
         if groups or azimuth is not None else None
-    found: list[_Found] = []
+    result: list[_Found] = []
     last: Any = start
     for value in numbers:
-        selection = select(module, free, {**given, name: value}, None)
+        selection = select(module, free, {**prescribed, name: value}, None)
         place = begin(module, selection, None if isinstance(last, (Steady, dict)) else last, params, t, inputs)
         selection = settled(place, selection)
         title = f"{owner} at {name} = {value:g}"
@@ -161,17 +143,17 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
             each = _of_blades(module, place, selection, (name, turned, groups), int(azimuths), last, title, averaged)
         else:
             each = _of_rotor(place, selection, limit, frame, title)
-        found.append(each)
+        result.append(each)
         last = each.start
-    sets = [each.modes for each in found]
-    tracks = follow(sets, [each.inertia for each in found], numbers)
+    sets = [each.modes for each in result]
+    tracks = follow(sets, [each.inertia for each in result], numbers)
     eigenvalues = np.full((len(numbers), len(tracks)), complex(np.nan, np.nan))
     for j, track in enumerate(tracks):
         for k, mode in track.items():
             eigenvalues[k, j] = mode.eigenvalue
     held = selection.held
-    return Campbell(owner, name, numbers, eigenvalues, _names(tracks, numbers), tuple(sets), tuple(each.about for each in found),
-                    frame, held, max(each.varies for each in found) if averaged else 0.0)
+    return Campbell(owner, name, numbers, eigenvalues, _names(tracks, numbers), tuple(sets), tuple(each.about for each in result),
+                    frame, held, max(each.varies for each in result) if averaged else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +178,8 @@ def _of_rotor(place: Place, selection: Selection, limit: int, frame: str, title:
         if "module.stability" not in str(error):
             raise
         about, start, manifold = None, None, Manifold(in_motion(place, selection), selection)
-    found = of_manifold(manifold, rotating=frame == "rotating")
-    return _Found(Modes(title, found.modes, found.modes.notes), manifold.inertia, about or found, start)
+    result = of_manifold(manifold, rotating=frame == "rotating")
+    return _Found(Modes(title, result.modes, result.modes.notes), manifold.inertia, about or result, start)
 
 
 def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[str, str, list[list[str]]], azimuths: int,
@@ -205,7 +187,7 @@ def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[
     speed, azimuth, groups = names
     rotor = rotor_of(module, selection, speed, azimuth, groups)
     if azimuths < 1:
-        raise ArgumentError(f"{module.name}: {azimuths} azimuths asked for; at least 1 is needed")
+        raise ArgumentError(f"{module.name}: {azimuths} azimuths requested; at least 1 is needed")
     # Not in step with any number of blades: harmonics of the rotation average out.
     at = 2 * np.pi * np.arange(azimuths) / azimuths
     omega = float(selection.values[speed])
@@ -223,13 +205,14 @@ def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[
         _demand_order(about, varies, groups)
     if varies <= CONSTANT or averaged:
         unknown = 1e-14 * np.abs(linear.A()) + (4 * linear.spread if varies <= CONSTANT else 0.0)
-        found = spectrum(linear.A(), Unknown.of(unknown))
-        return _Found(modes_of(found, linear.shapes, title), linear.M, about, about, varies)
+        result = spectrum(linear.A(), Unknown.of(unknown))
+        modes = [_patterned(mode, omega) for mode in modes_of(result, linear.shapes, title)]
+        return _Found(Modes(title, modes), linear.M, about, about, varies)
     state = about.at(0.0)[0]
     manifold = Manifold(in_motion(state, selection), selection)
     judged = of_manifold(manifold)
     into = _into_blades(about, manifold)
-    modes = [_in_blades(mode, into, linear) for mode in judged.modes]
+    modes = [_patterned(_in_blades(mode, into, linear), omega) for mode in judged.modes]
     names_of = [m.name for m in modes]
     numbered = [m if names_of.count(m.name) == 1 else replace(m, name=f"{m.name} ({names_of[:k + 1].count(m.name)})")
                 for k, m in enumerate(modes)]
@@ -257,9 +240,9 @@ def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
         T = about.rotor.transform(0.0)[0]
         q = T @ about.a
         turned = Steady(rotor, about.place, np.linalg.solve(rotor.transform(0.0)[0], q), about.omega, about.azimuths)
-        found = float(_scaled_size(turned.averages()[1]).max(initial=0.0))
-        if found < 0.1 * best:
-            best, order = found, other
+        result = float(_scaled_size(turned.averages()[1]).max(initial=0.0))
+        if result < 0.1 * best:
+            best, order = result, other
     if order != tuple(range(count)):
         right = [tuple(g[k] for k in order) for g in groups]
         raise ArgumentError(f"{about.place.module.name}: blades: in this order multi-blade coordinates do not make the "
@@ -296,12 +279,9 @@ def _in_blades(mode: Mode, into: np.ndarray, linear: Averaged) -> Mode:
 
 
 def _values(values: Any, owner: str) -> np.ndarray:
-    try:
-        numbers = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        numbers = np.full(1, np.nan)
+    numbers = np.array(real_of(values, owner, "values must be speeds in rad/s"), ndmin=1)
     if numbers.ndim != 1 or not len(numbers) or not np.isfinite(numbers).all():
-        raise ArgumentError(f"{owner}: values must be speeds in rad/s, found {values!r}")
+        raise ArgumentError(f"{owner}: values must be speeds in rad/s, found {shown(values)}")
     return numbers
 
 
@@ -341,31 +321,43 @@ def _names(tracks: Sequence[dict[int, Mode]], values: np.ndarray) -> tuple[str, 
     for track in tracks:
         modes = list(track.values())
         shares = np.sum([m.shares for m in modes], axis=0)
-        told = dominant(shares, modes[0].coordinates).split(", ") if shares.any() else [modes[0].name]
-        stems = {label.rpartition(" ")[0] for label in told if label.endswith((" cosine", " sine"))}
+        leading = dominant(shares, modes[0].coordinates).split(", ") if shares.any() else [modes[0].name]
+        stems = {label.rpartition(" ")[0] for label in leading if label.endswith((" cosine", " sine"))}
         for stem in sorted(stems):
             sense = _whirl(track, stem, values)
             if sense:
-                cyclic = [k for k, label in enumerate(told) if label in (f"{stem} cosine", f"{stem} sine")]
-                told = [f"{stem} {sense}" if k == cyclic[0] else label for k, label in enumerate(told) if k not in cyclic[1:]]
-        names.append(", ".join(told) + ("" if stems else _sense(modes)))
+                cyclic = [k for k, label in enumerate(leading) if label in (f"{stem} cosine", f"{stem} sine")]
+                leading = [f"{stem} {sense}" if k == cyclic[0] else label
+                           for k, label in enumerate(leading) if k not in cyclic[1:]]
+        names.append(", ".join(leading) + ("" if stems else _sense(modes)))
     return tuple(n if names.count(n) == 1 else f"{n} ({names[:k + 1].count(n)})" for k, n in enumerate(names))
 
 
 def _sense(modes: Sequence[Mode]) -> str:
-    """Which way the displacements of a mode go round the axis of the rotor, if they do."""
-    whirl = float(np.mean([mode.whirl for mode in modes]))
-    return "" if abs(whirl) < LEAST_WHIRL else " forward" if whirl > 0 else " backward"
+    """Which way the displacements of a mode go round the axis of the rotor, if they do, in the mean over the speeds."""
+    translation, tilt = np.mean([mode.whirls for mode in modes], axis=0)
+    sense = sense_of(float(np.mean([mode.whirl for mode in modes])), (float(translation), float(tilt)))
+    return f" {sense}" if sense else ""
 
 
 def _whirl(track: dict[int, Mode], stem: str, values: np.ndarray) -> str:
     """Which way the pattern of a set of blades goes round, with the rotor or against it, seen from the fixed frame, if it
     does."""
-    turning = total = 0.0
-    for k, mode in track.items():
-        c, s = (mode.coordinates.index(f"{stem} {part}") for part in ("cosine", "sine"))
-        turning -= float(np.imag(mode.shape[c].conj() * mode.shape[s])) * (1.0 if values[k] >= 0 else -1.0)
-        total += float(np.sum(np.abs(mode.shape[[c, s]])**2)) / 2
-    if not total or abs(turning) < LEAST_WHIRL * total:
-        return ""
-    return "forward" if turning > 0 else "backward"
+    turning, total = np.sum([_pattern(mode, stem, float(values[k])) for k, mode in track.items()], axis=0)
+    return sense_of(float(turning / total), (0.0, 0.0)) if total else ""
+
+
+def _pattern(mode: Mode, stem: str, speed: float) -> tuple[float, float]:
+    """How much the pattern of a set of blades goes round, with the rotor positive, and what that is of a round whirl."""
+    c, s = (mode.coordinates.index(f"{stem} {part}") for part in ("cosine", "sine"))
+    turning = -float(np.imag(mode.shape[c].conj() * mode.shape[s])) * (1.0 if speed >= 0 else -1.0)
+    return turning, float(np.sum(np.abs(mode.shape[[c, s]])**2)) / 2
+
+
+def _patterned(mode: Mode, speed: float) -> Mode:
+    """A mode in multi-blade coordinates with the whirl of the pattern of its blades, where these name it."""
+    stems = dict.fromkeys(n.rpartition(" ")[0] for n in mode.name.split(", ") if n.endswith((" cosine", " sine")))
+    if not stems or not mode.shares.any():
+        return mode
+    turning, total = np.sum([_pattern(mode, stem, speed) for stem in stems], axis=0)
+    return replace(mode, whirl=float(turning / total), whirls=(0.0, 0.0)) if total else mode

@@ -18,7 +18,14 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.consistent import closest
-from symdyn.runtime.statics.manifold import Manifold, common_partition, in_motion, natural_length, natural_scales
+from symdyn.runtime.statics.manifold import (
+    Manifold,
+    common_partition,
+    held_indices,
+    in_motion,
+    natural_length,
+    natural_scales,
+)
 from symdyn.runtime.statics.steady import depends_on_time
 from symdyn.runtime.statics.terms import Place, coordinate_names, rest
 
@@ -40,6 +47,12 @@ PRECISE, ROUGH = 1e-12, 1e-8
 # steps,
 # and before the motion is followed precisely; the number of steps, and the largest.
 CLOSED, NEARLY, ITERATIONS, LARGEST_STEP = 1e-9, 1e-4, 25, 0.5
+# Where the period is searched for: the largest part by which a step changes it, and the factor by which it may leave the guess.
+LARGEST_CHANGE, FURTHEST = 0.2, 5.0
+# Flow in natural units, by the period, that is rest.
+NO_MOTION = 1e-6
+# Logarithm of the change of volumes in the space of states over a period that is none.
+KEPT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,19 +174,20 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
     found: Course | None = None
     motion = _motion(place, start, period, precise)
     partition: tuple[list[int], list[int]] | None = None
+    places: list[Place] = []
+    nodes: tuple[Manifold, ...] = ()
     for n in STEPS if closed else (OPEN_STEPS,):
-        places = [motion(period * k / n) for k in range(n)]
-        if n == STEPS[0] or not closed:
+        # Every second position is one of those before.
+        places = [places[k // 2] if places and k % 2 == 0 else motion(period * k / n) for k in range(n)]
+        if not nodes:
             partition = common_partition(start, places[1::max(1, n // 16)])
         try:
-            nodes = tuple(Manifold(each, start.selection, partition=partition or (start.partition if not k else None))
-                          for k, each in enumerate(places))
+            nodes = _nodes(start, places, partition, nodes)
         except ArgumentError:  # the choice fails between the positions that it was compared at
             if partition is None:
                 raise
             partition = None
-            nodes = tuple(Manifold(each, start.selection, partition=None if k else start.partition)
-                          for k, each in enumerate(places))
+            nodes = _nodes(start, places, None, ())
         found = Course(period, nodes, motion(period), closed, partition is None)
         if found.tail <= SMOOTH:
             break
@@ -194,6 +208,14 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
                             f"period "
                             "do not resolve them; loads with kinks (tables, Piecewise) have no monodromy matrix of this kind")
     return found
+
+
+def _nodes(start: Manifold, places: Sequence[Place], partition: tuple[list[int], list[int]] | None,
+           before: Sequence[Manifold]) -> tuple[Manifold, ...]:
+    """Manifolds at positions along a motion; `before`: those at every second one, () if none."""
+    return tuple(before[k // 2] if before and k % 2 == 0 else
+                 Manifold(each, start.selection, partition=partition or (None if k else start.partition))
+                 for k, each in enumerate(places))
 
 
 def _motion(place: Place, manifold: Manifold, period: float, precise: float) -> Callable[[float], Place]:
@@ -244,34 +266,83 @@ def _held_rates(place: Place, held: Sequence[str]) -> list[int] | None:
     return found
 
 
-def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], np.ndarray]) -> Course:
+def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], np.ndarray],
+                  open_course: Course | None = None) -> Course:
     """The periodic motion near a state, by shooting with the monodromy matrix. Raises NoEquilibrium where there is none near.
 
+    period        that of the motion, s; where nothing but the motion itself sets the time, a guess: a limit cycle has the period
+                  that it has. Where volumes in the space of states stay the same (no damping), a motion of each period may be
+                  near, and that of this period is searched for first
+    open_course   the precise motion from the state on, where it is there already
     Displacements on which nothing depends (the way along a straight track) need not come back.
-    Source: Seydel, Practical Bifurcation and Stability Analysis, section 7.1.
+    Source: Seydel, Practical Bifurcation and Stability Analysis, section 7.1 (phase condition: 7.1.2).
     """
-    manifold, precise = start, ROUGH
-    owner = start.place.module.name
+    precise = ROUGH if open_course is None else PRECISE
+    course = follow(start, period, closed=False, precise=precise) if open_course is None else open_course
+    if not autonomous(start):
+        return _shot(course, monodromy, precise, free=False)
+    change = 0.0 if course.bundled else period * float(np.mean(np.trace(course.A, axis1=1, axis2=2)))
+    first = abs(change) > KEPT
+    try:
+        return _shot(course, monodromy, precise, free=first)
+    except NoEquilibrium:
+        if first:
+            raise
+        return _shot(course, monodromy, precise, free=True)
+
+
+def autonomous(manifold: Manifold) -> bool:
+    """Whether nothing but the motion itself sets the time: t does not appear in the equations, and what is held stands still."""
+    place = manifold.place
+    if depends_on_time(place):
+        return False
+    coordinates, speeds = held_indices(place, manifold.selection)
+    return not (place.balance[place.parts["q_dot"]][coordinates].any() or place.u[speeds].any())
+
+
+def _shot(course: Course, monodromy: Callable[[Course], np.ndarray], precise: float, free: bool) -> Course:
+    """Newton's method for the state that comes back, from a motion that is known to `precise`.
+
+    free   the period is an unknown, too, and the change of the state orthogonal to the flow at the start, in natural units: of
+           the states along a closed motion, which all come back, the nearest one is found
+    """
+    manifold, period, guess = course.first, course.period, course.period
+    owner = manifold.place.module.name
     try:
         for step in range(ITERATIONS):
-            course = follow(manifold, period, closed=False, precise=precise)
+            course = course if not step else follow(manifold, period, closed=False, precise=precise)
             residual = _left_open(course)
             scale = _sizes(course)
             counted = np.flatnonzero(~_cyclic(course))
             left = float((np.abs(residual) / scale)[counted].max(initial=0.0))
-            if not step and left <= NEARLY:  # perhaps closed already: not to be moved then
+            if not step and precise == ROUGH and left <= NEARLY:  # perhaps closed already: not to be moved then
                 precise = PRECISE
                 residual = _left_open(follow(manifold, period, closed=False, precise=precise))
                 left = float((np.abs(residual) / scale)[counted].max(initial=0.0))
             J = (monodromy(course) - np.eye(len(residual)))[np.ix_(counted, counted)]
             change = np.zeros(len(residual))
             inner = scale[counted]
-            change[counted] = -inner * np.linalg.lstsq(J * inner / inner[:, None], residual[counted] / inner, rcond=1e-9)[0]
-            largest = float(np.abs(change[:course.first.n_d] / scale[:course.first.n_d]).max(initial=0.0))
+            J, right = J * inner / inner[:, None], residual[counted] / inner
+            if free:  # columns: states and period; the last row is the phase condition
+                before, after = (period * _flow(course.first, place)[counted] / inner
+                                 for place in (course.first.place, course.last))
+                J, right = np.block([[J, after[:, None]], [before, 0.0]]), np.append(right, 0.0)
+            newton = -np.linalg.lstsq(J, right, rcond=1e-9)[0]
+            change[counted] = inner * newton[:len(counted)]
+            longer = float(newton[-1]) if free else 0.0
+            largest = max(float(np.abs(change[:course.first.n_d] / scale[:course.first.n_d]).max(initial=0.0)),
+                          abs(longer) * LARGEST_STEP / LARGEST_CHANGE)
             if left <= CLOSED and precise == PRECISE:
-                return follow(_shifted(course.first, change) if step else manifold, period)
+                if free and np.abs(before).max(initial=0.0) <= NO_MOTION:
+                    raise NoEquilibrium(f"{owner}: no periodic motion found near the start: the search ended at a state of rest; "
+                                        "begin nearer to the motion, with at=..., or with another period=...")
+                return follow(_shifted(course.first, change), period * (1 + longer)) if step else follow(manifold, period)
             precise = PRECISE if left <= NEARLY else ROUGH
-            manifold = _shifted(course.first, change * min(1.0, LARGEST_STEP / largest) if largest else change)
+            part = min(1.0, LARGEST_STEP / largest) if largest else 1.0
+            manifold, period = _shifted(course.first, change * part), period * (1 + longer * part)
+            if not guess / FURTHEST < period < guess * FURTHEST:
+                raise NoEquilibrium(f"{owner}: no periodic motion found near the start: the search for the period left the guess "
+                                    f"of {guess:.6g} s for {period:.6g} s; begin elsewhere, with at=..., or another period=...")
     except EvaluationError as error:
         raise NoEquilibrium(f"{owner}: no periodic motion found near the start: "
                             f"{str(error).removeprefix(f'{owner}: ')}") from error
@@ -305,6 +376,11 @@ def comes_back(course: Course) -> bool:
     left, scale = _left_open(course), _sizes(course)
     counted = ~_cyclic(course)
     return bool((np.abs(left[counted]) <= 100 * CLOSED * scale[counted]).all())
+
+
+def _flow(manifold: Manifold, place: Place) -> np.ndarray:
+    """Rates of the coordinates of a manifold along the motion at a state, (m,)."""
+    return np.concatenate([place.u[manifold.displacements], place.ud[manifold.speeds], place.rates_z[manifold.states]])
 
 
 def _cyclic(course: Course) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Equilibria from many starts, told apart."""
+"""Equilibria from many starts, distinguished and named."""
 
 from __future__ import annotations
 
@@ -9,22 +9,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
+from symdyn.real_numbers import NotReal, length_of, real
+from symdyn.runtime.memory import in_bytes
 from symdyn.runtime.statics.equilibrium import Equilibrium, begin, find, settled, steps
 from symdyn.runtime.statics.manifold import natural_length
 from symdyn.runtime.statics.selection import Selection, listed, select
 from symdyn.runtime.statics.terms import Place, coordinate_names
+from symdyn.shown import shown
+from symdyn.turning import turns
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 # Equilibria this close, in m, rad and Euler parameters, are one.
 APART = 1e-6
-# Names tell them by coordinates that differ by more, in rad or lengths of the mechanism: if these do not do, by the second.
+# Names distinguish them by coordinates that differ by more, in rad or lengths of the mechanism; where none does, by the second.
 CLEARLY = (0.1, 1e-3)
-OPTIONS = ("starts", "ranges", "seed", "start", "free", "fixed", "params", "t", "inputs", "unknown_params", "max_iterations")
 # Random starts differ by so much unless ranges are given: in rad, and in what is no angle.
 TURNS, LENGTHS = np.pi, 1.0
+# Starts of one search, each of which takes milliseconds.
+MOST = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,65 +64,60 @@ class Equilibria:
 
     def __repr__(self) -> str:
         starts = len(self.iterations)
-        lines = [f"{self.title}: {len(self.found)} equilibria from {starts} starts, at most "
-                 f"{int(self.iterations.max(initial=0))} iterations, {len(self.failures)} starts without"]
+        lines = [f"{self.title}: {counted(len(self.found), 'equilibrium', 'equilibria')} from {counted(starts, 'start')}, "
+                 f"at most {counted(int(self.iterations.max(initial=0)), 'iteration')}, "
+                 f"{counted(len(self.failures), 'start')} without"]
         for equilibrium, count in zip(self.found, self.counts, strict=True):
-            lines.append(f"  {equilibrium.name}  ({count} starts)")
+            lines.append(f"  {equilibrium.name}  ({counted(int(count), 'start')})")
         return "\n".join(lines)
 
 
 def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int = 0, start: Any = None, free: Any = None,
                fixed: Any = None, params: Any = None, t: float = 0.0, inputs: Any = None, unknown_params: Any = None,
-               max_iterations: int = 100, **others: Any) -> Equilibria:
-    """Equilibria from many starts.
-
-    starts   how many random ones, or the starts themselves, each as for Module.equilibrium
-    ranges   coordinate or speed -> (least, most), or r for (-r, r): how far random starts are from `start`; a speed stands for
-             the motion along it (rotations in Euler parameters: about that axis). Default: half a turn, 1 m
-    seed     of the random numbers, a whole number of at least 0
-    The others as for Module.equilibrium. Two are the same if coordinates differ by less than 1e-6, angles of joints that turn
-    all the way by whole turns, Euler parameters by their sign. A start that leads to none is told in `failures`; raises
-    NoEquilibrium with the first message if none of them leads anywhere.
-    """
+               max_iterations: int = 100) -> Equilibria:
+    """See Module.equilibria."""
     selection = select(module, free, fixed, unknown_params)
-    listed(list(others), OPTIONS, "options", module.name)
     limit = steps(max_iterations, module.name)
     first = begin(module, selection, start, params, t, inputs)
     selection = settled(first, selection)
     if isinstance(starts, (int, np.integer)) and not isinstance(starts, bool):
-        if starts < 1:
-            raise ArgumentError(f"{module.name}: {starts} starts asked for; at least 1 is needed")
+        if not 0 < starts <= MOST:
+            size = f", {MOST} at most: their states alone take {in_bytes(int(starts) * first.x.nbytes)}" if starts > MOST else ""
+            raise ArgumentError(f"{module.name}: {shown(starts)} starts requested; at least 1 is needed{size}")
         places = _random(first, selection, int(starts), ranges, seed)
     else:
         if ranges is not None:
             raise ArgumentError(f"{module.name}: ranges are given, but so are the starts themselves; leave one of them out")
-        if isinstance(starts, (str, bytes, Mapping)) or not isinstance(starts, Iterable):
-            raise ArgumentError(f"{module.name}: starts must be a number of them, or a list of starts, found {starts!r}")
+        if isinstance(starts, (str, bytes, Mapping)) or not isinstance(starts, Iterable) or \
+                (length_of(starts) is None and hasattr(starts, "ndim")):
+            raise ArgumentError(f"{module.name}: starts must be a number of them, or a list of starts, found {shown(starts)}")
+        if length_of(starts) == 0:
+            raise ArgumentError(f"{module.name}: no starts are given; pass a number of them, or a list of one at least")
         places = [begin(module, selection, each, params, t, inputs) for each in starts]
-    found: list[Equilibrium] = []
+    distinct: list[Equilibrium] = []
     counts: list[int] = []
     iterations: list[int] = []
     failures: list[tuple[np.ndarray, str]] = []
     for place in places:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore" if found else "default")  # what is watched over is told once
+                warnings.simplefilter("ignore" if distinct else "default")  # validity checks warn once
                 new = find(place, selection, limit)
         except (NoEquilibrium, EvaluationError, ArgumentError) as error:  # also from a start where nothing can be evaluated
             failures.append((place.x, str(error)))
             iterations.append(-1)
             continue
         iterations.append(new.iterations)
-        known = [k for k, e in enumerate(found) if same(e, new)]
+        known = [k for k, e in enumerate(distinct) if same(e, new)]
         if known:
             counts[known[0]] += 1
         else:
-            found.append(new)
+            distinct.append(new)
             counts.append(1)
-    if not found:
+    if not distinct:
         raise NoEquilibrium(f"{module.name}: none of {len(failures)} starts leads to an equilibrium; the first: {failures[0][1]}")
-    order = sorted(range(len(found)), key=lambda k: (not found[k].stable, -counts[k]))
-    named = _named([found[k] for k in order])
+    order = sorted(range(len(distinct)), key=lambda k: (not distinct[k].stable, -counts[k]))
+    named = _named([distinct[k] for k in order])
     return Equilibria(module.name, tuple(named), tuple(counts[k] for k in order), np.array(iterations), tuple(failures))
 
 
@@ -146,7 +147,7 @@ def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: A
     """Starts around the first one."""
     module, metadata = first.module, first.module.metadata
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise ArgumentError(f"{module.name}: the seed must be a whole number of at least 0, found {seed!r}")
+        raise ArgumentError(f"{module.name}: the seed must be a whole number of at least 0, found {shown(seed)}")
     labels = coordinate_names(metadata)
     spans = _spans(first, ranges)
     direct = [n for n in spans if n not in labels and n not in selection.kept]
@@ -168,50 +169,52 @@ def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
     module = first.module
     metadata = module.metadata
     labels = coordinate_names(metadata)
-    spans = {label: _span(LENGTHS if metadata["units"].get(u) != "rad/s" else TURNS, label, module.name)
+    spans = {label: _span(TURNS if turns(metadata["units"].get(u)) else LENGTHS, label, module.name)
              for label, u in zip(labels, metadata["u"], strict=True)}
     if ranges is None:
         return spans
     if not isinstance(ranges, Mapping):
-        raise ArgumentError(f"{module.name}: ranges must be a mapping from coordinates to (least, most), found {ranges!r}")
+        raise ArgumentError(f"{module.name}: ranges must be a mapping from coordinates to (least, most), found {shown(ranges)}")
     turned = {n for group in metadata.get("unit_groups", ()) for n in group}
     known = dict.fromkeys([*labels, *[n for n in metadata["q"] if n not in turned], *metadata["u"]])
     names = listed(list(ranges), known, "ranges", module.name)
-    given = {labels[metadata["u"].index(n)] if n in metadata["u"] else n: _span(value, n, module.name)
+    requested = {labels[metadata["u"].index(n)] if n in metadata["u"] else n: _span(value, n, module.name)
              for n, value in zip(names, ranges.values(), strict=True)}
-    return {**dict.fromkeys(labels, (0.0, 0.0)), **given}
+    return {**dict.fromkeys(labels, (0.0, 0.0)), **requested}
 
 
 def _span(value: Any, name: str, owner: str) -> tuple[float, float]:
-    if isinstance(value, (str, bytes)):
-        raise ArgumentError(f"{owner}: the range of {name} is {value!r}; pass (least, most), or one number r for (-r, r)")
+    wrong = f"the range of {name} is {shown(value)}; pass (least, most), or one number r for (-r, r)"
     try:
-        pair = (-abs(float(value)), abs(float(value))) if np.ndim(value) == 0 else (float(value[0]), float(value[1]))
-    except (TypeError, ValueError, IndexError, KeyError):
-        pair = (np.nan, np.nan)
-    if not (np.isfinite(pair).all() and pair[0] <= pair[1]) or (np.ndim(value) and len(value) != 2):
-        raise ArgumentError(f"{owner}: the range of {name} is {value!r}; pass (least, most), or one number r for (-r, r)")
-    return pair
+        span = real(value)
+    except NotReal as error:
+        raise ArgumentError(f"{owner}: {wrong}: {error}") from None
+    pair = np.abs(span) * np.array([-1.0, 1.0]) if span.ndim == 0 else span
+    # Uniform numbers are drawn from the difference, which must be a double, too.
+    if pair.shape != (2,) or not (np.isfinite(pair).all() and pair[0] <= pair[1]
+                                  and np.abs(pair).max() <= np.finfo(float).max / 4):
+        raise ArgumentError(f"{owner}: {wrong}")
+    return float(pair[0]), float(pair[1])
 
 
-def _named(found: list[Equilibrium]) -> list[Equilibrium]:
-    """Each with its number, its stability, and what tells it from the others: coordinates, attitudes."""
-    if not found:
+def _named(distinct: list[Equilibrium]) -> list[Equilibrium]:
+    """Each with its number, its stability, and what distinguishes it from the others: coordinates, attitudes."""
+    if not distinct:
         return []
-    metadata = found[0].module.metadata
+    metadata = distinct[0].module.metadata
     turned = [[metadata["q"].index(n) for n in group] for group in metadata.get("unit_groups", ())]
     single = [k for k in range(len(metadata["q"])) if not any(k in group for group in turned)]
-    sizes = np.where([metadata["units"].get(metadata["q"][k]) == "m" for k in single], natural_length(found[0].place), 1.0)
-    columns = [np.array([e.q[single] / sizes for e in found])]
-    columns += [np.array([_attitude(e.q[group]) for e in found]) for group in turned]
+    sizes = np.where([metadata["units"].get(metadata["q"][k]) == "m" for k in single], natural_length(distinct[0].place), 1.0)
+    columns = [np.array([e.q[single] / sizes for e in distinct])]
+    columns += [np.array([_attitude(e.q[group]) for e in distinct]) for group in turned]
     # Each entry a column, an attitude three in one.
     parts = [np.hstack(columns)[:, k:k + 1] for k in range(len(single))] + columns[1:]
-    telling = sorted(_telling(parts))
+    distinguishing = sorted(_distinguishing(parts))
     result = []
-    for k, e in enumerate(found):
+    for k, e in enumerate(distinct):
         kind = e.verdict or "rigid"
         words = []
-        for i in telling:
+        for i in distinguishing:
             if i < len(single):
                 value = e.q[single[i]]
                 words.append(f"{metadata['q'][single[i]]} = {value if abs(value) > APART else 0:.4g}")
@@ -245,7 +248,7 @@ def _turn(vector: np.ndarray) -> str:
     return f"turned by {np.degrees(angle):.4g} deg about ({about})"
 
 
-def _telling(parts: list[np.ndarray]) -> list[int]:
+def _distinguishing(parts: list[np.ndarray]) -> list[int]:
     """Parts (n, m) in which all rows differ, as few as can be found one by one: those that part most pairs, then those that part
     them furthest."""
     count = len(parts[0]) if parts else 0

@@ -1,4 +1,4 @@
-"""Equilibria: states of rest, or of steady motion with given speeds, found from a start and judged by their eigenvalues."""
+"""Equilibria: states of rest, or of steady motion with prescribed speeds, found from a start and judged by their eigenvalues."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from symdyn.errors import ArgumentError, EquilibriumNotUnique, EvaluationError, NoEquilibrium, SimulationWarning, SymdynError
+from symdyn.counting import counted
+from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium, SimulationWarning, SymdynError
+from symdyn.real_numbers import real_of
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import normalised, number
 from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.statics.analysis import Analysis
-from symdyn.runtime.statics.gimbal import lock
+from symdyn.runtime.statics.gimbal import REMEDY, lock
 from symdyn.runtime.statics.manifold import Manifold, in_motion
-from symdyn.runtime.statics.noise import ENTRIES, EPSILON, SAFETY, SAMPLES, rounded
 from symdyn.runtime.statics.search import Search, Trial
 from symdyn.runtime.statics.selection import Selection, select
 from symdyn.runtime.statics.singular import singular_configuration
-from symdyn.runtime.statics.spectrum import ZERO
 from symdyn.runtime.statics.steady import accelerating, further_on, steadiness
-from symdyn.runtime.statics.terms import Place, coordinate_names, null_space, rest
+from symdyn.runtime.statics.terms import Place, coordinate_names, rest
+from symdyn.runtime.statics.uniqueness import demand_stiffness
 from symdyn.runtime.watches import WATCHES, warn
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -32,12 +34,13 @@ if TYPE_CHECKING:
 # Steady motion must fulfil the constraints up to this part of its speed.
 STEADY = 1e-9
 # Residuals that a message names, at most.
-TOLD = 4
-# Whether forces depend on time is asked so many seconds later.
+LISTED = 4
+# Forces are compared with those so many seconds later, for whether they depend on time.
 LATER = (0.37, 1.7, 7.3)
-LOCKED = ("there forces along its angles do not tell whether it is at rest; use Euler parameters (orientation='parameters' of a "
-          "catalogued system, orientation=EulerParameters() of a joint), or another order of the angles")
-_FORCES = {"rad/s": "N m", "m/s": "N"}
+AT_GIMBAL_LOCK = f"there forces along its angles do not decide whether it is at rest; {REMEDY}"
+_FORCES = {"rad/s": "N m", "m/s": "N", "1/s": "N m"}
+# Coordinates below this, rad or m, are printed as zero: they are the rounding of a search.
+ROUNDED = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,7 @@ class Judged:
 def judge(manifold: Manifold) -> Judged:
     """What small disturbances of a steady state do; raises nothing."""
     try:
-        singular = singular_configuration(manifold.place)
+        singular = singular_configuration(manifold.place, manifold.selection)
         if singular:
             return Judged("not decided", singular, None)
         steady = steadiness(manifold)
@@ -61,20 +64,20 @@ def judge(manifold: Manifold) -> Judged:
             return Judged(analysis.verdict, analysis.reason(), analysis.eigenvalues)
         from symdyn.runtime.statics.stability import of_manifold
 
-        found = of_manifold(manifold)
-        return Judged(found.verdict, found.reason, found.exponents)
+        result = of_manifold(manifold)
+        return Judged(result.verdict, result.reason, result.exponents)
     except SymdynError as error:
         return Judged("not decided", str(error), None)
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state of rest, or of steady motion with given speeds.
+    """A state of rest, or of steady motion with prescribed speeds.
 
     place, selection   the state with all that belongs to it, and what was kept
     residual           of forces that are left, by the speed they work along, N or N m
     iterations         steps tried
-    name               tells it from others (see Module.equilibria)
+    name               distinguishes it from others (see Module.equilibria)
     """
 
     place: Place
@@ -179,7 +182,7 @@ class Equilibrium:
         return True if self.verdict == "neutral" and self._least_energy() else None
 
     def _least_energy(self) -> bool:
-        """Whether this is rest at a strict minimum of the energy, as far as the linear equations tell: no damping, no extra
+        """Whether this is rest at a strict minimum of the energy, as far as the linear equations show: no damping, no extra
         states, and a stiffness that is symmetric and positive definite beyond rounding."""
         manifold = self._manifold
         if self.u.any() or not manifold.second_order:
@@ -199,16 +202,17 @@ class Equilibrium:
         kind = f"{self.verdict} equilibrium" if self.verdict else "equilibrium, nothing free to move,"
         if self.verdict == "not decided":
             kind = "equilibrium whose stability is not decided"
-        return f"{kind} after {self.iterations} iterations, forces to {self.residual_norm:.3g} N or N m"
+        return f"{kind} after {counted(self.iterations, 'iteration')}, forces to {self.residual_norm:.3g} N or N m"
 
     def __getitem__(self, name: Any) -> float:
         """A coordinate, speed, extra state, parameter or input by name or symbol. Raises ArgumentError for an unknown name."""
-        name = str(getattr(name, "name", name))
+        name = name_of(name)
         metadata = self.module.metadata
         for names, values in ((metadata["x"], self.x), (metadata["parameters"], self.params), (metadata["inputs"], self.inputs)):
             if name in names:
                 return float(values[names.index(name)])
-        raise ArgumentError(f"{self.module.name}: the equilibrium has no {name!r}; it has {', '.join(metadata['x'])}, parameters "
+        raise ArgumentError(f"{self.module.name}: the equilibrium has no {shown(name)}; it has {', '.join(metadata['x'])}, "
+                            "parameters "
                             "and inputs")
 
     def describe(self) -> str:
@@ -221,7 +225,9 @@ class Equilibrium:
             unit = metadata["units"].get(name, "")
             note = "  solved for" if name in self.selection.unknown else "  held" if name in self.held else \
                 "  kept" if name in self.selection.kept else ""
-            lines.append(f"  {name:<{width}} = {self[name]:>14.8g} {unit}{note}".rstrip())
+            value = self[name]
+            shown_value = 0.0 if name in metadata["q"] and abs(value) < ROUNDED else value
+            lines.append(f"  {name:<{width}} = {shown_value:>14.8g} {unit}{note}".rstrip())
         lines += [f"  held: {', '.join(self.held)}"] if self.held else []
         return "\n".join([*lines, f"  {self.reason}"])
 
@@ -240,7 +246,7 @@ def equilibrium(module: Module, free: Any = None, fixed: Any = None, start: Any 
 def steps(limit: Any, owner: str) -> int:
     """A number of iterations. Raises ArgumentError for anything else."""
     if isinstance(limit, bool) or not isinstance(limit, (int, np.integer)) or limit < 1:
-        raise ArgumentError(f"{owner}: max_iterations must be a whole number of at least 1, found {limit!r}")
+        raise ArgumentError(f"{owner}: max_iterations must be a whole number of at least 1, found {shown(limit)}")
     return int(limit)
 
 
@@ -251,42 +257,62 @@ def settled(place: Place, selection: Selection) -> Selection:
     metadata, labels = place.module.metadata, coordinate_names(place.module.metadata)
     columns = np.sqrt(1 / np.maximum(np.abs(np.diag(place.M)), 1e-300))
     by = np.abs(place.by(selection.unknown)[:len(labels)]) * columns[:, None]
-    told = by > 1e-9 * by.max(axis=0, initial=0.0)
-    found = [n for n in selection.candidates if n in labels and told[labels.index(n)].any()]
-    if len(found) != len(selection.unknown):
+    effective = by > 1e-9 * by.max(axis=0, initial=0.0)
+    result = [n for n in selection.candidates if n in labels and effective[labels.index(n)].any()]
+    if len(result) != len(selection.unknown):
         free = [*[n for n in metadata["q"] if n not in selection.kept], *selection.candidates[:len(selection.unknown)]]
         raise ArgumentError(
             f"{place.module.name}: {len(selection.unknown)} values are to be found ({', '.join(selection.unknown)}), which takes "
             f"as many conditions, but fixed gives {len(selection.values)} ({', '.join(selection.values)}); name in free the "
             "conditions among them, and the coordinates that are found, too, such as "
             f"free=[{', '.join(repr(n) for n in [*free, *selection.unknown])}]")
-    return replace(selection, conditions=tuple(found), candidates=())
+    return replace(selection, conditions=tuple(result), candidates=())
 
 
 def begin(module: Module, selection: Selection, start: Any, params: Any, t: float, inputs: Any) -> Place:
-    """Where the search begins."""
+    """Where the search begins. A start may name inputs and parameters that are solved for, too: guesses of them."""
     metadata = module.metadata
+    start, params, inputs = _guesses(module, selection, start, params, inputs)
     time = number(t, "a finite number of seconds as t", module.name)
     if isinstance(start, Equilibrium):
         x = start.x.copy()
     else:
-        if start is not None and not isinstance(start, Mapping) and np.shape(start) == (len(metadata["q"]),):
-            start = dict(zip(metadata["q"], start, strict=True))
+        if start is not None and not isinstance(start, Mapping):
+            start = real_of(start, module.name, "start must be numbers")
+            if start.shape == (len(metadata["q"]),):
+                start = dict(zip(metadata["q"], start.tolist(), strict=True))
         x = take(start, metadata["x"], "start", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
-        if isinstance(start, Mapping):
-            moving = [n for n in (str(getattr(k, "name", k)) for k in start) if n in metadata["u"] and n not in metadata["q"]
-                      and n not in selection.values and x[metadata["x"].index(n)]]
-            if moving:
-                raise ArgumentError(f"{module.name}: start gives the speed{'s' * (len(moving) > 1)} {', '.join(moving)}, but an "
-                                    "equilibrium is a state of rest; give speeds of a steady motion in fixed")
-    # Speeds are those that are given in fixed, the others zero.
+    # Speeds are those prescribed in fixed, the others zero.
     x[len(metadata["q"]):len(metadata["q"]) + len(metadata["u"])] = 0.0
     x = normalised(module, selection.apply(x))
     if isinstance(params, Mapping) and selection.parameters:  # a guess need not be given
-        given = {str(getattr(k, "name", k)) for k in params}
+        passed = {name_of(k) for k in params}
         known = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
-        params = {**dict.fromkeys([n for n in selection.parameters if n not in given and known[n] is None], 0.0), **params}
+        params = {**dict.fromkeys([n for n in selection.parameters if n not in passed and known[n] is None], 0.0), **params}
     return rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
+
+
+def _guesses(module: Module, selection: Selection, start: Any, params: Any, inputs: Any) -> tuple[Any, Any, Any]:
+    """Start, params and inputs, with guesses of what is solved for moved from the start into these."""
+    if not isinstance(start, Mapping):
+        return start, params, inputs
+    guesses = {n: v for n, v in ((name_of(k), v) for k, v in start.items())
+               if n in module.metadata["inputs"] or n in selection.parameters}
+    kept = [n for n in guesses if n not in selection.unknown]
+    if kept:
+        raise ArgumentError(f"{module.name}: start names {', '.join(kept)}, not among what is solved for "
+                            f"({', '.join(selection.unknown) or 'nothing'}); give values in inputs, or name them in free")
+    start = {k: v for k, v in start.items() if name_of(k) not in guesses}
+    merged = []
+    for what, passed, names in (("params", params, selection.parameters), ("inputs", inputs, selection.inputs)):
+        mine = {n: guesses[n] for n in names if n in guesses}
+        if mine and passed is not None and not isinstance(passed, Mapping):
+            passed = dict(zip(module.metadata["parameters" if what == "params" else "inputs"], passed, strict=False))
+        twice = [n for n in mine if passed is not None and n in {name_of(k) for k in passed}]
+        if twice:
+            raise ArgumentError(f"{module.name}: {', '.join(twice)} in start and in {what}; leave it out of one of them")
+        merged.append({**(passed or {}), **mine} if mine else passed)
+    return start, merged[0], merged[1]
 
 
 def given_inputs(module: Module, inputs: Any) -> np.ndarray:
@@ -310,15 +336,15 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     good, reason = search.run(limit)
     trial = search.best
     if not good:
-        _refuse(search, reason)
+        _raise_without_balance(search, reason)
     locked = lock(trial.place)
     if locked:
-        raise NoEquilibrium(f"{owner}: no equilibrium found: the state reached is at gimbal lock: {locked}; {LOCKED}")
+        raise NoEquilibrium(f"{owner}: no equilibrium found: the state reached is at gimbal lock: {locked}; {AT_GIMBAL_LOCK}")
     _demand_effect(search)
-    _demand_stiffness(search)
+    demand_stiffness(search)
     _demand_steady(trial)
     _demand_lasting(trial)
-    _look(search)
+    _warn_of_validity(search)
     return Equilibrium(trial.place, selection, _left(trial), search.steps)
 
 
@@ -328,7 +354,7 @@ def _left(trial: Trial) -> dict[str, float]:
     return {name: float(v) for name, v in zip(labels, _along(trial, trial.place.forces), strict=True)}
 
 
-def _refuse(search: Search, reason: str) -> NoReturn:
+def _raise_without_balance(search: Search, reason: str) -> NoReturn:
     """Raises NoEquilibrium with what is left, and where."""
     trial, module = search.best, search.module
     metadata = module.metadata
@@ -336,7 +362,7 @@ def _refuse(search: Search, reason: str) -> NoReturn:
     labels = coordinate_names(metadata)
     forces = _left(trial)
     weighed = np.abs(np.array(list(forces.values()))) * search.columns
-    order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:TOLD]
+    order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:LISTED]
     left = ", ".join(f"{forces[labels[k]]:.6g} {_FORCES.get(metadata['units'].get(metadata['u'][k], ''), '')}".strip()
                      + f" along {labels[k]}" for k in order)
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"], *trial.selection.unknown],
@@ -354,7 +380,7 @@ def _refuse(search: Search, reason: str) -> NoReturn:
     parts += [f"constraints are open: {open_}"] if open_ else []
     parts += [f"extra states change: {rates}"] if rates else []
     locked = lock(trial.place)
-    parts += [f"the last state is at gimbal lock: {locked}; {LOCKED}"] if locked else []
+    parts += [f"the last state is at gimbal lock: {locked}; {AT_GIMBAL_LOCK}"] if locked else []
     advice = "check the weight and the loads: another start hardly helps" if loose else \
         "begin elsewhere with start={...}, or check the loads"
     parts += [*loose, f"the last state is {where}; {advice}"]
@@ -385,82 +411,8 @@ def _demand_effect(search: Search) -> None:
                             "there: no value of it balances the forces; solve for another parameter, or fix another coordinate")
 
 
-def _demand_stiffness(search: Search) -> None:
-    """Raises EquilibriumNotUnique for a direction in which nothing holds."""
-    trial, module = search.best, search.module
-    place, columns = trial.place, search.columns
-    _, n_u, _, n_c = place.sizes
-    states = trial.selection.states
-    inner = place.by_z[n_u + n_c:][states][:, states]
-    drifting = bool(states) and np.linalg.matrix_rank(inner) < len(states)
-    if trial.selection.conditions or drifting:  # all unknowns take part, as many as equations, seen by the scaled derivative
-        J = search.scaled(trial)[1]
-        labels = [*_direction_names(trial), *[module.metadata["z"][k] for k in states], *trial.selection.unknown]
-        _, values, Vt = np.linalg.svd(J)
-        loose = Vt[len(values):] if len(values) < J.shape[1] else Vt[values <= 1e-9 * values.max(initial=0.0)]
-        if not trial.selection.conditions:  # extra states that nothing brings back may be anything
-            _, sizes, Wt = np.linalg.svd(loose[:, :trial.directions.shape[1]], full_matrices=False)
-            loose = Wt[sizes > 1e-6]
-    else:
-        Z = null_space(np.vstack([place.C_r, trial.selection.rows(place)]) * columns)
-        K, error = _stiffness(place, columns, trial.selection.states)
-        directions, _ = _without_stiffness(Z.T @ K @ Z, np.abs(Z.T) @ error @ np.abs(Z))
-        loose = directions @ Z.T
-        labels = list(coordinate_names(module.metadata))
-    if len(loose):
-        raise EquilibriumNotUnique(
-            f"{module.name}: the equilibrium is not unique: there is no stiffness along "
-            + " and along ".join(_told(direction, labels) for direction in loose)
-            + f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it"
-            + (f"; or begin with other values of {', '.join(trial.selection.unknown)}, in params or inputs: where they are "
-               "zero they may have no effect" if trial.selection.unknown else ""))
-
-
-def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """K of all speeds, (n_u, n_u), scaled, with what extra states do at rest, and how much of its entries rounding may be."""
-    def at(here: Place) -> np.ndarray:
-        forces, rates = here.parts["forces"], here.parts["z_dot"]
-        K = here.by_v[forces]
-        if states:
-            inner = here.by_z[rates][states][:, states]
-            K = K - here.by_z[forces][:, states] @ np.linalg.solve(inner, here.by_v[rates][states])
-        return np.asarray(K * np.outer(columns, columns))
-
-    K, stream = at(place), np.random.default_rng(11)
-    change = np.max([np.abs(at(rounded(place, stream)) - K) for _ in range(SAMPLES)], axis=0)
-    return K, SAFETY * change + ENTRIES * EPSILON * np.abs(K)
-
-
-def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (k, n) along which K is zero but for rounding, and its singular values."""
-    if not len(K):
-        return np.zeros((0, 0)), np.zeros(0)
-    rows, sums = np.abs(K).max(axis=1), np.abs(K).max(axis=0)
-    rows, sums = (1 / np.sqrt(np.where(v > 0, v, 1.0)) for v in (rows, sums))
-    U, values, Vt = np.linalg.svd(K * np.outer(rows, sums))
-    noise = np.einsum("ik,ij,kj->k", np.abs(U), error * np.outer(rows, sums), np.abs(Vt)) + EPSILON * values.max(initial=0.0)
-    found = Vt[values <= ZERO * noise] * sums
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-300), values
-
-
-def _direction_names(trial: Trial) -> list[str]:
-    labels = coordinate_names(trial.place.module.metadata)
-    return [labels[int(np.argmax(np.abs(column)))] for column in trial.directions.T]
-
-
-def _told(direction: np.ndarray, labels: list[str]) -> str:
-    """Coordinates of a direction by their shares of its square, the largest first."""
-    shares = direction**2 / np.sum(direction**2)
-    order = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= 0.05]
-    return ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in order)
-
-
-def _first(direction: np.ndarray, labels: list[str]) -> str:
-    return labels[int(np.argmax(np.abs(direction)))]
-
-
 def _demand_steady(trial: Trial) -> None:
-    """Raises NoEquilibrium if constraints do not let the given speeds stay."""
+    """Raises NoEquilibrium if constraints do not let the prescribed speeds stay."""
     place = trial.place
     if not place.sizes[3]:
         return
@@ -471,7 +423,7 @@ def _demand_steady(trial: Trial) -> None:
         k = int(np.argmax(np.abs(values)))
         if abs(values[k]) > STEADY * max(size, 1e-3):
             raise NoEquilibrium(f"{place.module.name}: at t = {place.t:g} s the constraints {what} {values[k]:.6g} m/s"
-                                f"{'^2' if values is demanded else ''} ({names[k]}) at the speeds that are given: there is no "
+                                f"{'^2' if values is demanded else ''} ({names[k]}) at the prescribed speeds: there is no "
                                 "rest there; give speeds that fit them, or simulate the motion")
 
 
@@ -487,14 +439,14 @@ def _demand_lasting(trial: Trial) -> None:
             if changed:
                 raise NoEquilibrium(
                     f"{place.module.name}: no steady motion: the forces balance at this position, but not further on: after "
-                    f"{later.t - place.t:.4g} s {changed}. The motion with the given speeds is periodic at best: "
+                    f"{later.t - place.t:.4g} s {changed}. The motion with the prescribed speeds is periodic at best: "
                     "module.stability(fixed={...}) finds it and judges it")
     except (EvaluationError, ArgumentError):  # a position further on that the mechanism cannot reach is reported by the verdict
         return
 
 
-def _look(search: Search) -> None:
-    """Warn of what elements watch over, and of forces that depend on time."""
+def _warn_of_validity(search: Search) -> None:
+    """Warn where validity checks of elements fail, and of forces that depend on time."""
     trial = search.best
     place, name = trial.place, trial.place.module.name
     if place.module.metadata.get(WATCHES, ()):
@@ -516,5 +468,5 @@ def _look(search: Search) -> None:
 
 def _along(trial: Trial, forces: np.ndarray) -> np.ndarray:
     """The part of forces that must balance, by speeds, (n_u,)."""
-    found: np.ndarray = trial.tested @ np.linalg.pinv(trial.tested) @ forces
-    return found
+    result: np.ndarray = trial.tested @ np.linalg.pinv(trial.tested) @ forces
+    return result

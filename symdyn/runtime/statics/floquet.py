@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symdyn.runtime.statics.course import Course, scales
+from symdyn.runtime.statics.course import PRECISE, Course, scales
 from symdyn.runtime.statics.spectrum import DISCRETE, Spectrum, Unknown, spectrum
 
 # Steps a period of collocation, doubled until the monodromy matrix changes by less than this part of it; at least, at most.
@@ -22,6 +22,8 @@ CHANGES, LEAST_STEPS, MOST_STEPS = 1e-12, 64, 8192
 ROUGHLY = 128
 # The bound of what is not known is this many times the last change, and at least this part of the matrix.
 SAFETY, LEAST = 1.0, 2e-12
+# Along a motion that accelerates also its own error, that of its steps times what they add up to.
+MOTION = 10 * PRECISE
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,8 @@ def fundamental(course: Course) -> Fundamental:
         before = end
     scale = scales(course)
     speed = float((np.abs(course.A[0]) * (scale / scale[:, None])).max(initial=0.0))
-    E = SAFETY * change + (LEAST + course.tail * speed * course.period) * size
+    motion = MOTION if any(node.place.ud.any() for node in course.nodes) else 0.0
+    E = SAFETY * change + (LEAST + motion + course.tail * speed * course.period) * size
     return Fundamental(values[:-1:steps // len(course.nodes)], end, E)
 
 

@@ -31,6 +31,8 @@ WHOLE = 1e-6
 OPEN = 1e-13
 # The mean of the motion in fixed axes names a frequency if its share is this part of the largest harmonic's.
 MEAN = 0.25
+# Translations, or tilts, that go round a smaller part of the area than this take no part in a whirl.
+PART = 0.01
 # Bodies that do not spin name a frequency if they have this part of the motion.
 SEEN = 1e-6
 
@@ -197,10 +199,12 @@ def axis(course: Course) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Seen:
     """A mode as an observer sees it: harmonics (multiple, share), the largest first, counted from its exponent's frequency;
-    whirl, from -1 to 1: the sense in which the displacement of the largest one goes round, positive with the rotation."""
+    whirl, from -1 to 1: the sense in which the displacement of the largest one goes round, positive with the rotation, 0 where
+    translation and tilt go round in opposite senses; whirls: those of translation and of tilt"""
 
     harmonics: tuple[tuple[int, float], ...]
-    whirl: float
+    whirl: float = 0.0
+    whirls: tuple[float, float] = (0.0, 0.0)
 
 
 class Observer:
@@ -255,21 +259,21 @@ class Observer:
         already (`fixed`), the mean; else all bodies.
         """
         if self.blind:
-            return Seen(((0, 1.0),), 0.0)
+            return Seen(((0, 1.0),))
         n_d, n = self.course.sizes[0], len(self.fields)
         fields = np.einsum("tij,tj->ti", self.fields, shapes[:, :n_d])
         harmonics = np.fft.fft(fields, axis=0) / n
         energies = np.abs(harmonics) ** 2
         total = float(energies.sum())
         if total <= 0:
-            return Seen(((0, 1.0),), 0.0)
+            return Seen(((0, 1.0),))
         multiples = np.round(np.fft.fftfreq(n, 1 / n)).astype(int)
         alone = 0.0
         if not self.rotating:
             if self.still.any() and energies[:, self.still].sum() > SEEN * total:
                 energies = energies * self.still
             elif fixed:
-                return Seen(((0, 1.0),), self._whirl(harmonics[0]))
+                return Seen(((0, 1.0),), *self._whirl(harmonics[0]))
             else:
                 alone = MEAN
         shares = energies.sum(axis=1) / energies.sum()
@@ -278,10 +282,11 @@ class Observer:
             order.remove(0)
             order.insert(0, 0)
         kept = tuple((int(multiples[k]), float(shares[k])) for k in order if shares[k] > 1e-6)[:8]
-        return Seen(kept, self._whirl(harmonics[order[0]] * (energies[order[0]] > 0)))
+        return Seen(kept, *self._whirl(harmonics[order[0]] * (energies[order[0]] > 0)))
 
-    def _whirl(self, amplitudes: np.ndarray) -> float:
-        """Twice the area that displacements and tilts go round per cycle, over the sum of their squares, about the axis."""
+    def _whirl(self, amplitudes: np.ndarray) -> tuple[float, tuple[float, float]]:
+        """Twice the area that displacements and tilts go round per cycle, over the sum of their squares, about the axis; and the
+        same of translations and of tilts apart."""
         parts = amplitudes.reshape(-1, self.per_body)
         kinds = [np.hstack([parts[:, :2], np.zeros((len(parts), 1))])] if self.per_body == 3 else [parts[:, :3], parts[:, 3:]]
         areas, whole = [], 0.0
@@ -290,5 +295,9 @@ class Observer:
             areas.append((-float(np.imag(np.cross(across.conj(), across) @ self.axis).sum()), float((np.abs(across) ** 2).sum())))
             whole += float((np.abs(vectors) ** 2).sum())
         area, size = sum(a for a, _ in areas), sum(n for _, n in areas)
-        against = any(a * area < 0 and abs(a) > 0.01 * abs(area) for a, _ in areas)
-        return area / size if size > 0.5 * whole and not against else 0.0
+        if not size > 0.5 * whole:  # mainly along the axis
+            return 0.0, (0.0, 0.0)
+        least = PART * max(abs(a) for a, _ in areas)
+        each = [a / n if abs(a) > least else 0.0 for a, n in areas]
+        whirls = each[0], each[1] if len(each) > 1 else 0.0
+        return area / size if whirls[0] * whirls[1] >= 0 else 0.0, whirls

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.statics.terms import Place
 
+REMEDY = ("use Euler parameters (orientation='parameters' of a catalogued system, orientation=EulerParameters() of a joint), or "
+          "another order of the angles")
 # Independence of the coordinates below this part of that of turned ones is lost.
 LOST = 1e-8
 # Angles are turned by so much for comparison, rad.
@@ -31,6 +33,14 @@ def lock(place: Place) -> str:
         return ""
     name = metadata["q"][angles[int(np.argmax(turned))]]
     return f"{name} = {np.degrees(place.q[metadata['q'].index(name)]):.6g} deg"
+
+
+def demand_no_lock(place: Place, what: str) -> None:
+    """Raises ArgumentError at gimbal lock; what: the request, as "modes were"."""
+    locked = lock(place)
+    if locked:
+        raise ArgumentError(f"{place.module.name}: {what} requested at gimbal lock: {locked}; small changes of its angles do not "
+                            f"give all small motions there; {REMEDY}")
 
 
 def independence(place: Place) -> float:

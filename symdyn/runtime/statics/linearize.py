@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, MissingExtra, SymdynError
 from symdyn.runtime.arguments import take
 from symdyn.runtime.consistent import NotConsistent, check_start, consistent, normalised, number
 from symdyn.runtime.masses import real_parameters
-from symdyn.runtime.statics.analysis import Analysis, held_note
+from symdyn.runtime.statics.analysis import WORDS, Analysis, held_note
 from symdyn.runtime.statics.equilibrium import Equilibrium, given_inputs
+from symdyn.runtime.statics.gimbal import demand_no_lock
 from symdyn.runtime.statics.manifold import Manifold, in_motion
 from symdyn.runtime.statics.modes import Modes
 from symdyn.runtime.statics.selection import Selection, holding, listed, select
@@ -21,9 +22,11 @@ from symdyn.runtime.statics.sensitivity import Sensitivity, of_eigenvalue, shift
 from symdyn.runtime.statics.singular import singular_configuration
 from symdyn.runtime.statics.steady import Steadiness, steadiness
 from symdyn.runtime.statics.terms import Place, coordinate_names, rest
+from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
+    from symdyn.runtime.statics.regulator import Regulator
     from symdyn.runtime.statics.stability import Stability
 
 
@@ -115,11 +118,12 @@ class Linearization:
 
     def _demand_steady(self, what: str) -> None:
         """Raises ArgumentError where eigenvalues decide nothing."""
-        singular = singular_configuration(self._manifold.place)
+        singular = singular_configuration(self._manifold.place, self._manifold.selection)
         if singular:
-            raise ArgumentError(f"{self.module.name}: {what} asked for at a {singular}; move the mechanism away from it")
+            raise ArgumentError(f"{self.module.name}: {what} requested at a {singular}; move the mechanism away from it")
+        demand_no_lock(self._manifold.place, what)
         if not self.steadiness.kind:
-            raise ArgumentError(f"{self.module.name}: {what} asked for at a state that is neither at rest nor in steady motion: "
+            raise ArgumentError(f"{self.module.name}: {what} requested at a state that is neither at rest nor in steady motion: "
                                 f"{self.steadiness.reason}. Eigenvalues decide nothing there; linearize at an equilibrium, or "
                                 "use module.stability(...), which follows a periodic motion")
 
@@ -156,6 +160,73 @@ class Linearization:
         """
         return self._modes
 
+    # -- control
+
+    def lqr(self, Q: Any, R: Any) -> Regulator:
+        """The gain K of in' = -K x' with the least integral of x'^T Q x' + in'^T R in' from any start.
+
+        Q   weights of the states x' (see `states`): a matrix (m, m), its diagonal (m,), or numbers by name or symbol, 0 where
+            left out; symmetric and positive semidefinite
+        R   weights of the inputs, (n_in, n_in), (n_in,), or by name or symbol, of all inputs; symmetric and positive definite
+        Under constraints, and with held coordinates, the states are the independent ones that the linearization has. The result
+        is also the function of (t, x) that applies the gain to the mechanism: inputs=linear.lqr(Q, R), or
+        inputs=sd.Sampled(linear.lqr(Q, R), period=0.01).
+
+        Raises ArgumentError for weights that are not definite, with the direction; where the equations are not stabilizable, with
+        the mode that no input reaches; where Q gives no weight to a mode that neither decays nor grows; and where A is not
+        constant along the motion. See symdyn.runtime.statics.regulator.Regulator, also for the source.
+        """
+        from symdyn.runtime.statics.regulator import lqr
+
+        self._demand_steady("a regulator was")
+        return lqr(self, Q, R)
+
+    def deviation(self, t: float, x: Any) -> np.ndarray:
+        """x' (m,), how far a state x = [q; u; z] of the mechanism (in order, or by name or symbol) is from the motion linearized
+        about, at the time t: of independent displacements, independent speeds and free extra states, to first order.
+
+        At rest the motion is the state itself; along steady motion coordinates go on at constant rates. Raises ArgumentError
+        where they do not (a wheel that rolls in a circle).
+        """
+        place, manifold = self._manifold.place, self._manifold
+        metadata = self.module.metadata
+        state = take(x, metadata["x"], "x", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, self.module.name)
+        n_q, n_u, *_ = place.sizes
+        rates = place.balance[place.parts["q_dot"]]
+        if rates.any():
+            bent = place.balance[place.parts["q_ddot"]]
+            k = int(np.argmax(np.abs(bent)))
+            if abs(bent[k]) > 1e-9 * float(np.abs(rates).max()) * max(1.0, float(np.abs(rates).max())):
+                raise ArgumentError(f"{self.module.name}: the motion linearized about is no straight one: {metadata['q'][k]} "
+                                    f"accelerates by {bent[k]:.4g} a second; apply the gain K to changes of your own")
+        off = state - place.x
+        off[:n_q] -= rates * (t - self.t)
+        v = np.linalg.lstsq(place.N, off[:n_q], rcond=None)[0]
+        return np.concatenate([v[manifold.displacements], off[n_q:n_q + n_u][manifold.speeds], off[n_q + n_u:][manifold.states]])
+
+    def to_scipy(self) -> Any:
+        """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs."""
+        from scipy.signal import StateSpace as ScipyStateSpace
+
+        return ScipyStateSpace(self.A, self.B, *self._observed()[:2])
+
+    def to_control(self) -> Any:
+        """The equations as a control.StateSpace of python-control, with names of states, inputs and outputs; with the states as
+        its outputs where the system has no outputs. Raises MissingExtra where python-control is not installed."""
+        try:
+            import control
+        except ImportError:
+            raise MissingExtra("linear.to_control() needs the package control: pip install 'symdyn[control]'") from None
+        C, D, outputs = self._observed()
+        return control.ss(self.A, self.B, C, D, states=list(self.states), inputs=list(self.module.metadata["inputs"]),
+                          outputs=list(outputs), name=self.module.name)
+
+    def _observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+        """C, D and names of the outputs, or of the states without outputs."""
+        if self.outputs:
+            return self.C_out, self.D, self.outputs
+        return np.eye(len(self.states)), np.zeros(self.B.shape), tuple(f"y_{n}" for n in self.states)
+
     def derivative(self, mode: Any, parameter: Any) -> Sensitivity:
         """Exact derivatives of a mode's eigenvalue, frequency and damping by a parameter.
 
@@ -169,7 +240,7 @@ class Linearization:
         owner = self.module.name
         named = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
         if len(named) != 1:
-            raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {parameter!r}")
+            raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {shown(parameter)}")
         (name,) = named
         if not self.steadiness.kind or self.G.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues hold at a state of rest or of steady motion; linearize at "
@@ -192,18 +263,25 @@ class Linearization:
         """Names of x' with units; a displacement along a speed that is no rate of a coordinate is marked."""
         units = self.module.metadata["units"]
         speeds = self.module.metadata["u"]
-        found = []
+        result = []
         for label, k in zip(self.coordinates, self._manifold.displacements, strict=True):
             if label == speeds[k]:
-                found.append(f"displacement along {label} [{units.get(label, '').removesuffix('/s') or '1'}]")
+                result.append(f"displacement along {label} [{units.get(label, '').removesuffix('/s') or '1'}]")
             else:
-                found.append(f"{label} [{units.get(label) or '1'}]")
-        return (*found, *[f"{n} [{units.get(n) or '1'}]" for n in self.states[len(self.coordinates):]])
+                result.append(f"{label} [{units.get(label) or '1'}]")
+        return (*result, *[f"{n} [{units.get(n) or '1'}]" for n in self.states[len(self.coordinates):]])
 
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"
         held = f", held: {', '.join(self.held)}" if self.held else ""
-        return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}{held}>"
+        return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}{held}; {self._judgement()}>"
+
+    def _judgement(self) -> str:
+        """The verdict, or why there is none, in words; raises nothing."""
+        try:
+            return self.verdict or WORDS[""]
+        except (SymdynError, np.linalg.LinAlgError) as error:
+            return f"no verdict: {str(error).removeprefix(f'{self.module.name}: ')}"
 
     def describe(self) -> str:
         """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
@@ -218,7 +296,7 @@ class Linearization:
                                             ("C_out", self.C_out, outs, states), ("D", self.D, outs, ins)):
             lines += _table(name, matrix, rows, columns)
         lines += held_note(self._manifold)
-        singular = singular_configuration(self._manifold.place)
+        singular = singular_configuration(self._manifold.place, self._manifold.selection)
         if singular:
             return "\n".join([*lines, singular])
         if self.steadiness.kind:
@@ -243,10 +321,10 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
               fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
     """See Module.linearize."""
     if isinstance(at, Equilibrium):
-        given = [n for n, v in (("params", params), ("t", t), ("inputs", inputs), ("free", free), ("fixed", fixed))
+        passed = [n for n, v in (("params", params), ("t", t), ("inputs", inputs), ("free", free), ("fixed", fixed))
                  if v is not None]
-        if given:
-            raise ArgumentError(f"{module.name}: {', '.join(given)} given with an equilibrium, which has its own; leave them "
+        if passed:
+            raise ArgumentError(f"{module.name}: {', '.join(passed)} given with an equilibrium, which has its own; leave them "
                                 "out, or pass at=equilibrium.x")
         if at.module is not module:
             raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; linearize with its own")
@@ -272,8 +350,8 @@ def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any,
     try:
         check_start(module, place.t, x, place.p)
     except NotConsistent as error:
-        found = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
-        raise ArgumentError(f"{found}; linear equations exist at states that fulfil the constraints: take "
+        result = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
+        raise ArgumentError(f"{result}; linear equations exist at states that fulfil the constraints: take "
                             "q, u = module.consistent(q, u, params), and pass (q, u)") from None
     return in_motion(place.at(x=x), selection), selection
 
@@ -290,7 +368,7 @@ def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int]
 
 
 def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
-    """The state that `at` tells; without accelerations."""
+    """The state that `at` stands for; without accelerations."""
     metadata = module.metadata
     if hasattr(at, "t") and hasattr(at, "x") and np.ndim(at.t) == 1:
         return _of_solution(module, at, params, t, inputs)

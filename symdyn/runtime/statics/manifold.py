@@ -25,11 +25,14 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.constraints import turning
+from symdyn.runtime.statics.gimbal import REMEDY
 from symdyn.runtime.statics.selection import Selection
 from symdyn.runtime.statics.terms import Place, coordinate_names, null_space
 
 # Entries of a row of N other than this number: what moves along the speed is no coordinate of its own.
 UNIT_ROW = 1e-13
+# Parts of a velocity below this part of the largest, in natural units, are rounding of the basis.
+DUST = 16 * float(np.finfo(float).eps)
 # Dependent changes may be this many times the independent ones where a choice is to serve along a motion.
 SERVES = 30.0
 # Masses below this part of the largest are none.
@@ -54,14 +57,27 @@ class Held:
 
 
 def held_rows(place: Place, selection: Selection) -> Held:
-    """The rows of what a selection holds.
+    """The rows of what a selection holds."""
+    metadata = place.module.metadata
+    n_u = place.sizes[1]
+    coordinates, speeds = held_indices(place, selection)
+    parts, n_x, n_in = place.parts, len(metadata["x"]), len(metadata["inputs"])
+    first, second = (np.arange(s.start, s.stop)[coordinates] for s in (parts["q_dot"], parts["q_ddot"]))
+    positions = place.N[coordinates]
+    still = np.zeros((len(speeds), n_x))
+    return Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]), np.vstack([place.whole_x[first], still]),
+                np.vstack([place.whole_x[second], still]),
+                np.vstack([place.whole_inputs[second], np.zeros((len(speeds), n_in))]))
+
+
+def held_indices(place: Place, selection: Selection) -> tuple[list[int], list[int]]:
+    """Indices of the held coordinates, and of the held speeds that are no rates of coordinates.
 
     A coordinate is held in its place, and so is the coordinate of a held speed that is its rate: its motion is prescribed. A
     speed that is no rate of a coordinate is held itself, and the displacement along it is free.
     """
     metadata = place.module.metadata
     labels = coordinate_names(metadata)
-    n_u = place.sizes[1]
     coordinates: list[int] = []
     speeds: list[int] = []
     for name in selection.held:
@@ -73,14 +89,7 @@ def held_rows(place: Place, selection: Selection) -> Held:
                 coordinates.append(metadata["q"].index(labels[k]))
             else:
                 speeds.append(k)
-    coordinates = list(dict.fromkeys(coordinates))
-    parts, n_x, n_in = place.parts, len(metadata["x"]), len(metadata["inputs"])
-    first, second = (np.arange(s.start, s.stop)[coordinates] for s in (parts["q_dot"], parts["q_ddot"]))
-    positions = place.N[coordinates]
-    still = np.zeros((len(speeds), n_x))
-    return Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]), np.vstack([place.whole_x[first], still]),
-                np.vstack([place.whole_x[second], still]),
-                np.vstack([place.whole_inputs[second], np.zeros((len(speeds), n_in))]))
+    return list(dict.fromkeys(coordinates)), speeds
 
 
 class Manifold:
@@ -97,6 +106,11 @@ class Manifold:
                  independent: Sequence[int] | tuple[Sequence[int], Sequence[int]] | None = None,
                  partition: tuple[Sequence[int], Sequence[int]] | None = None) -> None:
         self.place, self.selection = place, selection
+        following = [*place.module.metadata.get("implicit_loads", ()), *place.module.metadata.get("of_reactions", ())]
+        if following and selection.held:
+            raise ArgumentError(f"{place.module.name}: {', '.join(selection.held)} held, where {', '.join(following)} "
+                                f"{'depends' if len(following) == 1 else 'depend'} on reactions, which what is held would "
+                                "change; hold nothing, or give the mechanism a constraint or a prescribed motion that holds it")
         self.held = held_rows(place, selection)
         self.states = selection.free_states
         _, n_u, _, n_c = place.sizes
@@ -321,8 +335,8 @@ def _factorized(M: np.ndarray, name: str) -> Callable[[np.ndarray], np.ndarray]:
         factors = scipy.linalg.cho_factor(M)
     except np.linalg.LinAlgError:
         raise ArgumentError(f"{name}: the mass matrix of the independent velocities is not positive definite: its smallest "
-                            f"eigenvalue is {np.linalg.eigvalsh(M)[0]:.3g}; give masses to what moves, or leave gimbal lock of "
-                            "three angles by orientation=EulerParameters()") from None
+                            f"eigenvalue is {np.linalg.eigvalsh(M)[0]:.3g}; give masses to what moves; at gimbal lock of three "
+                            f"angles {REMEDY}") from None
 
     def solve(right: np.ndarray) -> np.ndarray:
         return np.asarray(scipy.linalg.cho_solve(factors, right))
@@ -365,6 +379,9 @@ def _basis(place: Place, rows: np.ndarray, independent: Sequence[int] | None,
     if not Z.shape[1]:
         return Z, []
     found = Z @ np.linalg.inv(block)
+    # What rounding leaves of a zero would couple what is independent by structure, and count as not known in every matrix.
+    sizes = np.abs(found / scales[:, None] * scales[list(independent)])
+    found[sizes <= DUST * sizes.max()] = 0.0
     found[list(independent)] = np.eye(len(block))
     return found, list(independent)
 

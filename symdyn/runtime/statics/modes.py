@@ -11,9 +11,12 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.statics.spectrum import Spectrum
+from symdyn.shown import name_of, shown
 
 # Coordinates with at least this share of the kinetic energy of the largest are named.
 NAMED = 0.35
+# A motion across the axis of a rotor goes round if it whirls by so much: 1 is a circle, 0 a straight line.
+LEAST_WHIRL = 0.2
 # Eigenvalues that differ by this part are one, several times, and share a space of shapes.
 SAME = 1e-10
 
@@ -58,7 +61,9 @@ class Mode:
     right, left  eigenvectors of the state matrix
     harmonics    of a periodic motion: (multiple k of its frequency, share of the energy) of the parts of the shape that move with
                  exp((eigenvalue + i k 2 pi / period) t), seen from the fixed frame, the largest first
-    whirl        from -1 to 1: how round displacements go about the axis of a rotor, positive in the sense of its rotation
+    whirl        from -1 to 1: how round displacements go about the axis of a rotor, positive in the sense of its rotation; 0
+                 where translation and tilt go in opposite senses
+    whirls       the same of translation and of tilt apart; 0 of what takes no part
     """
 
     eigenvalue: complex
@@ -71,6 +76,12 @@ class Mode:
     left: np.ndarray
     harmonics: tuple[tuple[int, float], ...] = ()
     whirl: float = 0.0
+    whirls: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def sense(self) -> str:
+        """Which way the mode goes round with respect to the rotation, seen from the fixed frame; see `sense_of`."""
+        return sense_of(self.whirl, self.whirls)
 
     @property
     def omega(self) -> float:
@@ -107,7 +118,8 @@ class Mode:
             return f"<Mode {self.name}: zero>"
         if not self.eigenvalue.imag:
             return f"<Mode {self.name}: time constant {self.time_constant:.6g} s, {self.kind}>"
-        return f"<Mode {self.name}: {self.frequency:.6g} Hz, damping {self.damping:.3g}, {self.kind}>"
+        sense = f", {self.sense}" if self.sense else ""
+        return f"<Mode {self.name}: {self.frequency:.6g} Hz, damping {self.damping:.3g}, {self.kind}{sense}>"
 
 
 class Modes:
@@ -128,12 +140,12 @@ class Modes:
         """Raises ArgumentError for a name that no mode, or more than one, has."""
         if isinstance(key, (int, np.integer)):
             if not -len(self) <= key < len(self):
-                raise ArgumentError(f"{self.title}: mode {key} asked for; there are {len(self)}, numbered from 0")
+                raise ArgumentError(f"{self.title}: mode {key} requested; there are {len(self)}, numbered from 0")
             return self.modes[key]
-        name = str(getattr(key, "name", key))
+        name = name_of(key)
         exact = [m for m in self.modes if m.name == name] or [m for m in self.modes if m.name.split(", ")[0] == name]
         if len(exact) != 1:
-            raise ArgumentError(f"{self.title}: {len(exact)} modes are named {name!r}; there are "
+            raise ArgumentError(f"{self.title}: {len(exact)} modes are named {shown(name)}; there are "
                                 f"{'; '.join(f'{k}: {m.name}' for k, m in enumerate(self.modes))}; pass the number")
         return exact[0]
 
@@ -149,8 +161,9 @@ class Modes:
 
     def __repr__(self) -> str:
         width = max([4, *[len(m.name) for m in self.modes]])
+        whirls = any(m.sense for m in self.modes)  # a column of its own where a mode goes round
         lines = [self.title, f"{'':>3}  {'mode':<{width}}  {'f [Hz]':>11}  {'omega [rad/s]':>13}  {'damped period [s]':>17}  "
-                             f"{'damping':>9}  {'time constant [s]':>17}  kind"]
+                             f"{'damping':>9}  {'time constant [s]':>17}  " + (f"{'kind':<11}  whirl" if whirls else "kind")]
         for k, m in enumerate(self.modes):
             oscillates = bool(m.eigenvalue.imag)
             numbers = [f"{m.frequency:>11.6g}" if oscillates else f"{'':>11}",
@@ -158,7 +171,8 @@ class Modes:
                        f"{m.period:>17.6g}" if oscillates else f"{'':>17}",
                        f"{m.damping:>9.4g}" if oscillates else f"{'':>9}",
                        f"{m.time_constant:>17.6g}" if np.isfinite(m.time_constant) else f"{'':>17}"]
-            lines.append(f"{k:>3}  {m.name:<{width}}  {'  '.join(numbers)}  {m.kind}")
+            kind = f"{m.kind:<11}  {m.sense}".rstrip() if whirls else m.kind
+            lines.append(f"{k:>3}  {m.name:<{width}}  {'  '.join(numbers)}  {kind}")
         return "\n".join([*lines, *self.notes])
 
 
@@ -179,11 +193,26 @@ def modes_of(spectrum: Spectrum, shapes: Shapes, title: str, notes: Sequence[str
         kind = "zero" if k in set(spectrum.zeros.tolist()) else "not decided" if k in undecided else \
             "unstable" if spectrum.signs[k] > 0 else "oscillation" if value.imag else "real"
         mode = _mode(shapes, value, right[:, k], spectrum.left[:, k], kind)
-        found.append(replace(mode, harmonics=seen[k].harmonics, whirl=seen[k].whirl) if seen else mode)
+        found.append(replace(mode, harmonics=seen[k].harmonics, whirl=seen[k].whirl, whirls=seen[k].whirls) if seen else mode)
     found = _paired(found)
     names = [m.name for m in found]
     return Modes(title, [m if names.count(m.name) == 1 else replace(m, name=f"{m.name} ({names[:k + 1].count(m.name)})")
                          for k, m in enumerate(found)], notes)
+
+
+def sense_of(whirl: float, whirls: tuple[float, float]) -> str:
+    """The sense of a whirl: "forward" (with the rotation), "backward" (against it), or "" where nothing goes round.
+
+    Translation and tilt may go round in opposite senses, as on bearings that are not isotropic. Each is named then, such as
+    "forward (translation), backward (tilt)": one word for both would depend on the length that tilts are weighed by.
+    Source: Muszynska, Forward and backward precession of a vertical anisotropically supported rotor, J. Sound Vib. 192 (1996).
+    """
+    def word(value: float) -> str:
+        return "" if abs(value) < LEAST_WHIRL else "forward" if value > 0 else "backward"
+
+    if whirls[0] * whirls[1] >= 0:
+        return word(whirl)
+    return ", ".join(f"{word(each)} ({what})" for each, what in zip(whirls, ("translation", "tilt"), strict=True) if word(each))
 
 
 def ordered(values: np.ndarray) -> np.ndarray:

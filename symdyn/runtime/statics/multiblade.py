@@ -107,14 +107,13 @@ def _state_matrix(M: np.ndarray, C: np.ndarray, K: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Averaged:
     """M a_ddot + C a_dot + K a = 0 of a rotor in the fixed frame, averaged; spread (2 n, 2 n): the largest difference of an entry
-    of the state matrix at an azimuth from the mean; forces: of what is left, beside the mean, by the coordinates, scaled."""
+    of the state matrix at an azimuth from the mean."""
 
     M: np.ndarray
     C: np.ndarray
     K: np.ndarray
     labels: tuple[str, ...]
     spread: np.ndarray
-    pulsating: float
 
     def A(self) -> np.ndarray:
         """State matrix of [a; a_dot]."""
@@ -155,18 +154,16 @@ class Steady:
         omega = self.omega
         index = np.ix_(self.rotor.free, self.rotor.free)
         free = list(self.rotor.free)
-        found = []
+        result = []
         for psi in self.azimuths:
             place, (T, first, second) = self.at(float(psi))
             m, c, k = place.M[index], place.by_u[index], place.by_v[index]
-            found.append((T.T @ place.forces[free], T.T @ m @ T, T.T @ (2 * omega * m @ first + c @ T),
+            result.append((T.T @ place.forces[free], T.T @ m @ T, T.T @ (2 * omega * m @ first + c @ T),
                           T.T @ (omega**2 * m @ second + omega * c @ first + k @ T)))
-        r, M, C, K = (np.mean([each[i] for each in found], axis=0) for i in range(4))
+        r, M, C, K = (np.mean([each[i] for each in result], axis=0) for i in range(4))
         mean = _state_matrix(M, C, K)
-        spread = np.max([np.abs(_state_matrix(*each[1:]) - mean) for each in found], axis=0)
-        scale = 1 / np.sqrt(np.abs(np.diag(M)))
-        pulsating = float(np.max([np.abs(scale * (each[0] - r)) for each in found], initial=0.0))
-        return np.asarray(r), Averaged(M, C, K, self.rotor.labels, spread, pulsating)
+        spread = np.max([np.abs(_state_matrix(*each[1:]) - mean) for each in result], axis=0)
+        return np.asarray(r), Averaged(M, C, K, self.rotor.labels, spread)
 
     def stepped(self, step: np.ndarray, iterations: int) -> Steady:
         """After a change of a; coordinates other than the blades' move along their speeds."""
@@ -192,20 +189,20 @@ def demand_equal_blades(state: Steady) -> None:
     for group in (list(g) for g in rotor.blades):
         for what, values, sizes in (("inertia", M[group], M[group]), ("stiffness", K[group], size[group])):
             if np.ptp(values) > EQUAL * sizes.max():
-                found = ", ".join(f"{labels[k]}: {v:.6g}" for k, v in zip(group, values, strict=True))
+                result = ", ".join(f"{labels[k]}: {v:.6g}" for k, v in zip(group, values, strict=True))
                 raise ArgumentError(f"{name}: blades: a set holds the same coordinate of every blade, one set per shape, such as "
                                     f"[('flap1', 'flap2', 'flap3'), ('edge1', 'edge2', 'edge3')], but these differ in {what}: "
-                                    f"{found}; group them by shape")
+                                    f"{result}; group them by shape")
 
 
 def steady(start: Steady) -> tuple[Steady, Averaged]:
     """The steady state near a start, by Newton's method. Raises NoEquilibrium, ArgumentError."""
     demand_equal_blades(start)
     name, turns = start.place.module.name, turning(start.place.module)[list(start.rotor.free)]
-    found = start
+    result = start
     try:
         for k in range(ITERATIONS):
-            r, linear = found.averages()
+            r, linear = result.averages()
             scale = 1 / np.sqrt(np.maximum(np.diag(linear.M), 1e-12 * np.diag(linear.M).max()))
             K = linear.K * np.outer(scale, scale)
             _, values, Vt = np.linalg.svd(K)
@@ -214,10 +211,10 @@ def steady(start: Steady) -> tuple[Steady, Averaged]:
                 raise NoEquilibrium(f"{name}: there is no stiffness along {linear.labels[int(np.argmax(shares))]} "
                                     f"({shares.max():.2f}) at {start.omega:g} rad/s: the steady state is not unique; fix it")
             step = -scale * np.linalg.solve(K, scale * r)
-            if float(np.linalg.norm(step / scale)) <= SOLVED * max(1.0, float(np.linalg.norm(found.a / scale))):
-                return found, linear
+            if float(np.linalg.norm(step / scale)) <= SOLVED * max(1.0, float(np.linalg.norm(result.a / scale))):
+                return result, linear
             largest = float(np.abs(step[turns]).max(initial=0.0))
-            found = found.stepped(step * min(1.0, LARGEST_TURN / largest) if largest else step, k + 1)
+            result = result.stepped(step * min(1.0, LARGEST_TURN / largest) if largest else step, k + 1)
     except EvaluationError as error:
         raise NoEquilibrium(f"{name}: no steady state at {start.omega:g} rad/s: {error}") from error
     raise NoEquilibrium(f"{name}: no steady state at {start.omega:g} rad/s after {ITERATIONS} iterations: the last step was "
@@ -225,7 +222,7 @@ def steady(start: Steady) -> tuple[Steady, Averaged]:
 
 
 def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, blades: Sequence[Sequence[str]]) -> Rotor:
-    """The rotor that names tell. Raises ArgumentError for what cannot be seen from the fixed frame."""
+    """The rotor with these names. Raises ArgumentError for what cannot be seen from the fixed frame."""
     metadata, owner = module.metadata, module.name
     if metadata.get("constraints") or metadata["z"]:
         raise ArgumentError(f"{owner}: multi-blade coordinates are for systems without constraints and extra states; derive "

@@ -120,7 +120,7 @@ class Search:
         self.weights = 1 / np.maximum(largest, floor)
         self.n_e = n_e
         self.best = trial.with_multipliers(self.weights[:n_e])
-        self.best.residual()  # where it cannot be evaluated that is told now
+        self.best.residual()  # where it cannot be evaluated this raises now
         self.far = FAR * max(1.0, float(np.abs(place.q).max(initial=0.0)))
 
     def widths(self, trial: Trial) -> np.ndarray:
@@ -155,11 +155,11 @@ class Search:
         if place.sizes[3]:
             acting += np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
         whole = self.columns * (acting + np.abs(place.by_v[:n_u]) @ self.columns)
-        found: np.ndarray = LEFT * acting + ROUNDING * whole.max(initial=0.0) / self.columns
-        return found
+        result: np.ndarray = LEFT * acting + ROUNDING * whole.max(initial=0.0) / self.columns
+        return result
 
     def balanced(self, trial: Trial) -> bool:
-        """Whether the forces that are left are small beside those that act."""
+        """Whether the forces that are left are small compared with those that act."""
         if not trial.tested.shape[1]:
             return True
         Q = trial.tested @ np.linalg.pinv(trial.tested)

@@ -13,9 +13,12 @@ import numpy as np
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
 from symdyn.runtime.statics.terms import Place, null_space
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
+# Unknown names that a message lists.
+TOLD = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +71,14 @@ class Selection:
         """R with R v = 0 for what stays, (n, n_u); equations: only for those whose equations do not hold."""
         metadata = self.module.metadata
         n_u = len(metadata["u"])
-        given: dict[str, np.ndarray] = {}
+        named: dict[str, np.ndarray] = {}
         for name in self.kept:
             if name in metadata["q"]:
-                given[name] = place.N[metadata["q"].index(name)]
+                named[name] = place.N[metadata["q"].index(name)]
             elif name in metadata["u"]:
-                given[name] = np.eye(n_u)[metadata["u"].index(name)]
-        held = [given[name] for name in self.conditions if equations and name in given]
-        rows = [row for name, row in given.items()
+                named[name] = np.eye(n_u)[metadata["u"].index(name)]
+        held = [named[name] for name in self.conditions if equations and name in named]
+        rows = [row for name, row in named.items()
                 if not (equations and (name in self.conditions or any(_same(row, h) for h in held)))]
         return np.array(rows).reshape(len(rows), n_u)
 
@@ -132,7 +135,7 @@ def holding(selection: Selection, hold: Any) -> Selection:
 
 def _conditions(module: Module, solved: list[str], values: Mapping[str, float], free: Iterable[str]
                 ) -> tuple[list[str], list[str]]:
-    """Conditions, and where there are too many to tell what they are among."""
+    """Conditions, and where there are too many, the candidates."""
     if not solved:
         both = [n for n in values if n in free]
         if both:
@@ -152,10 +155,10 @@ def _conditions(module: Module, solved: list[str], values: Mapping[str, float], 
 
 def _numbers(fixed: Any, names: list[str], owner: str) -> dict[str, float]:
     if not isinstance(fixed, Mapping):
-        raise ArgumentError(f"{owner}: fixed must be a mapping from coordinates and speeds to numbers, found {fixed!r}")
+        raise ArgumentError(f"{owner}: fixed must be a mapping from coordinates and speeds to numbers, found {shown(fixed)}")
     array = take(fixed, names, "fixed", dict.fromkeys(names, 0.0), owner)
-    given = {str(getattr(key, "name", key)) for key in fixed}
-    return {n: float(v) for n, v in zip(names, array, strict=True) if n in given}
+    named = {name_of(key) for key in fixed}
+    return {n: float(v) for n, v in zip(names, array, strict=True) if n in named}
 
 
 def listed(values: Any, known: Iterable[str], what: str, owner: str) -> list[str]:
@@ -164,18 +167,19 @@ def listed(values: Any, known: Iterable[str], what: str, owner: str) -> list[str
         return []
     if isinstance(values, str) or hasattr(values, "name"):
         values = [values]
-    if not isinstance(values, Iterable):
-        raise ArgumentError(f"{owner}: {what} must be names or symbols, found {values!r}")
-    found = [str(getattr(v, "name", v)) for v in values]
+    if not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
+        raise ArgumentError(f"{owner}: {what} must be names or symbols, found {shown(values)}")
+    result = [name_of(v) for v in values]
     there = list(known)
     faults = []
-    for name in (n for n in found if n not in there):
+    for name in (n for n in result if n not in there):
         near = difflib.get_close_matches(name, there, 3, cutoff=0.5)
-        faults.append(f"there is no {name!r}" + (f", did you mean {' or '.join(near)}?" if near else
+        faults.append(f"there is no {shown(name)}" + (f", did you mean {' or '.join(near)}?" if near else
                                                  f"; there are {', '.join(there) or 'none'}"))
     if faults:
-        raise ArgumentError(f"{owner}: {what}: {'; '.join(faults)}")
-    return found
+        more = f"; and {len(faults) - TOLD} more" if len(faults) > TOLD else ""
+        raise ArgumentError(f"{owner}: {what}: {'; '.join(faults[:TOLD])}{more}")
+    return result
 
 
 def _same(a: np.ndarray, b: np.ndarray) -> bool:

@@ -87,7 +87,7 @@ def of_eigenvalue(reduced: Manifold, spectrum: Spectrum, mode: Mode, changes: Ma
     mu, nu = _multipliers(reduced, value, x_v, x_z, y_u, y_z)
     changed = np.zeros(n_u + n_c + n_z, dtype=complex)
     for part, unit in ((np.real, 1.0), (np.imag, 1j)):
-        changed += unit * _second(place, changes, part(x_v), part(value * x_v), part(value**2 * x_v), part(x_z), part(mu))
+        changed += unit * second(place, changes, part(x_v), part(value * x_v), part(value**2 * x_v), part(x_z), part(mu))
     top, middle, bottom = np.split(changed, [n_u, n_u + n_c])
     scale = np.vdot(mode.left, mode.right)
     derivative = complex((-(y_u @ top) - nu @ middle + y_z @ bottom) / scale)
@@ -113,8 +113,9 @@ def _multipliers(reduced: Manifold, value: complex, x_v: np.ndarray, x_z: np.nda
     return right[:n_c] * place.scale, left[:n_c] * place.scale
 
 
-def _second(place: Place, changes: Mapping[str, float], v: np.ndarray, u: np.ndarray, ud: np.ndarray, z: np.ndarray,
-            lam: np.ndarray) -> np.ndarray:
+def second(place: Place, changes: Mapping[str, float], v: np.ndarray, u: np.ndarray, ud: np.ndarray, z: np.ndarray,
+           lam: np.ndarray) -> np.ndarray:
+    """Derivative of the statics along (v, u, ud, z, lam), differentiated along `changes` of what is named, (n_u + n_c + n_z,)."""
     names = place.module.metadata
     vary = {f"{group} {name}": value for group, values, of in (("v", v, "u"), ("u", u, "u"), ("ud", ud, "u"), ("z", z, "z"))
             for name, value in zip(names[of], values, strict=True)}

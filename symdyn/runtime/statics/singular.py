@@ -1,4 +1,4 @@
-"""Singular configurations: positions where the constraints lose rank that they have at positions nearby.
+"""Singular configurations: positions where the constraints, with what is held, lose rank that they have at positions nearby.
 
 There the positions that the constraints allow are no smooth manifold: branches meet, or a mechanism passes a dead point of its
 own, and linear equations do not exist. Constraints that depend on each other everywhere (redundant ones) are no such case, so
@@ -14,6 +14,8 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.consistent import on_constraints
 from symdyn.runtime.constraints import length as length_of
 from symdyn.runtime.constraints import names, scaled_jacobian, turning
+from symdyn.runtime.statics.manifold import held_indices, natural_scales
+from symdyn.runtime.statics.selection import Selection
 from symdyn.runtime.statics.terms import Place
 
 # Positions nearby are so far away, in rad or lengths of the mechanism; so many are tried.
@@ -22,13 +24,18 @@ AWAY, TRIES = 0.03, 4
 RANK = 1e-8
 
 
-def singular_configuration(place: Place) -> str:
-    """What is singular about a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is."""
+def singular_configuration(place: Place, selection: Selection) -> str:
+    """What is singular about a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is.
+
+    Held coordinates and speeds count as constraints: a crank that is held at its dead point holds a linkage at all positions
+    nearby, but not there.
+    """
     module = place.module
+    held = held_indices(place, selection)
     if not names(module):
         return ""
-    here = _rank(place, place.x)
-    if here == len(names(module)):
+    here = _rank(place, place.x, held)
+    if here == len(names(module)) + sum(map(len, held)):
         return ""
     stream = np.random.default_rng(5)
     turns, size = turning(module), length_of(module, place.p)
@@ -39,15 +46,21 @@ def singular_configuration(place: Place) -> str:
         x = place.x.copy()
         x[:n_q] = place.moved(change)
         try:
-            most = max(most, _rank(place, on_constraints(module, place.t, x, place.p)))
+            most = max(most, _rank(place, on_constraints(module, place.t, x, place.p), held))
         except (ArgumentError, EvaluationError):
             continue
     if most == here:
         return ""
-    return (f"singular configuration: the constraints have rank {here} here and rank {most} at positions nearby, so that "
-            f"{most - here} more direction{'s' * (most - here > 1)} would count as free than the mechanism has")
+    with_held = f" with what is held ({', '.join(selection.held)})" if any(held) else ""
+    return (f"singular configuration: the constraints{with_held} have rank {here} here and rank {most} at positions nearby, so "
+            f"that {most - here} more direction{'s' * (most - here > 1)} would count as free than the mechanism has")
 
 
-def _rank(place: Place, x: np.ndarray) -> int:
-    values = np.linalg.svd(scaled_jacobian(place.module, place.t, x, place.p), compute_uv=False)
+def _rank(place: Place, x: np.ndarray, held: tuple[list[int], list[int]]) -> int:
+    """Of the rows of constraints, and of those of held coordinates and speeds, which are given the length 1."""
+    coordinates, speeds = held
+    rows = np.vstack([place.at(x=x).N[coordinates], np.eye(place.sizes[1])[speeds]]) * natural_scales(place)
+    lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = rows / np.where(lengths > 0, lengths, 1.0)
+    values = np.linalg.svd(np.vstack([scaled_jacobian(place.module, place.t, x, place.p), rows]), compute_uv=False)
     return int((values > RANK * max(values[0], 1.0)).sum()) if len(values) else 0

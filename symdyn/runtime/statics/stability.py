@@ -13,10 +13,11 @@ import scipy.linalg
 from symdyn.errors import ArgumentError, EvaluationError, NoEquilibrium
 from symdyn.runtime.consistent import number
 from symdyn.runtime.statics.analysis import WORDS, Analysis, decade, held_note, reason, shapes_of
-from symdyn.runtime.statics.course import Course, closed_course, comes_back, follow, scales
+from symdyn.runtime.statics.course import Course, autonomous, closed_course, comes_back, follow, scales
 from symdyn.runtime.statics.equilibrium import Equilibrium, equilibrium
 from symdyn.runtime.statics.floquet import exponents, fundamental, monodromy, multipliers
 from symdyn.runtime.statics.frames import ROUNDED, Change, Observer, Seen, constant_change, spinning
+from symdyn.runtime.statics.gimbal import demand_no_lock
 from symdyn.runtime.statics.manifold import Manifold, in_motion
 from symdyn.runtime.statics.modes import Modes, modes_of, ordered, settled_values
 from symdyn.runtime.statics.selection import holding
@@ -24,6 +25,7 @@ from symdyn.runtime.statics.singular import singular_configuration
 from symdyn.runtime.statics.spectrum import CONTINUOUS, Spectrum, spectrum
 from symdyn.runtime.statics.steady import accelerating, depends_on_time, fastest, steadiness
 from symdyn.runtime.statics.terms import coordinate_names
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -87,7 +89,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
     from symdyn.runtime.statics.linearize import state_of
 
     if isinstance(period, bool):
-        raise ArgumentError(f"{module.name}: pass a period in seconds, found {period!r}")
+        raise ArgumentError(f"{module.name}: pass a period in seconds, found {shown(period)}")
     if period is not None:
         period = number(period, "a period in seconds", module.name)
         if period <= 0:
@@ -103,7 +105,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
             raise ArgumentError(f"{module.name}: {', '.join(given)} given with an equilibrium, which has its own; leave them out")
         selection = holding(at.selection, hold)
         return of_manifold(Manifold(in_motion(at.place, selection), selection), period)
-    speeds = {str(getattr(k, "name", k)) for k in fixed} & set(module.metadata["u"]) if isinstance(fixed, Mapping) else set()
+    speeds = {name_of(k) for k in fixed} & set(module.metadata["u"]) if isinstance(fixed, Mapping) else set()
     if start is not None and period is None and not speeds:
         rest = equilibrium(module, free, fixed, start, params, t, inputs)
         return of_manifold(Manifold(in_motion(rest.place, holding(rest.selection, hold)), holding(rest.selection, hold)))
@@ -117,7 +119,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
 
 
 def _still(module: Module) -> dict[str, float]:
-    """The initial values with speeds zero: where a search for a motion with given speeds begins."""
+    """The initial values with speeds zero: where a search for a motion with prescribed speeds begins."""
     metadata = module.metadata
     return {n: 0.0 if n in metadata["u"] and n not in metadata["q"] else metadata["initial"].get(n, 0.0) for n in metadata["x"]}
 
@@ -133,7 +135,8 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
         nothing = np.zeros(0, dtype=complex)
         return Stability(title, "", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
                          (*held_note(manifold), WORDS[""]), manifold.selection.held, None)
-    singular = singular_configuration(place)
+    demand_no_lock(place, "the stability was")
+    singular = singular_configuration(place, manifold.selection)
     if singular:
         nothing = np.zeros(0, dtype=complex)
         return Stability(title, "not decided", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
@@ -149,15 +152,17 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
         return _constant(manifold, steady.kind, title)
     if length is None:
         what = "t appears in the equations" if depends_on_time(place) else "no single speed of rotation gives a period"
+        guess = ", a guess of it," if autonomous(manifold) else ""
         raise ArgumentError(f"{place.module.name}: neither rest nor steady motion: {steady.reason}; {what}: pass period=..., in "
-                            "seconds, if the motion is periodic; of other motions eigenvalues say nothing")
+                            f"seconds{guess} if the motion is periodic; of other motions eigenvalues say nothing")
     if steady.kind:
         course = follow(manifold, length)
         change = constant_change(course)
         seen_by = Observer(course, rotating)
         return _turned(course, change, steady.kind, title, seen_by) if change else _named(course, steady.kind, title, seen_by)
-    if accelerating(place, manifold) or any(accelerating(node.place, node) for node in follow(manifold, length, False).nodes):
-        course, kind = closed_course(manifold, length, monodromy), "periodic motion"
+    open_course = None if accelerating(place, manifold) else follow(manifold, length, closed=False)
+    if open_course is None or any(accelerating(node.place, node) for node in open_course.nodes):
+        course, kind = closed_course(manifold, length, monodromy, open_course), "periodic motion"
         if not any(accelerating(node.place, node) for node in course.nodes):
             kind = "steady motion" if course.first.place.u.any() else "rest"
     else:
@@ -168,7 +173,8 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
     seen_by = Observer(course, rotating)
     found = _periodic(course, kind, title, seen_by) if change is None else _turned(course, change, kind, title, seen_by)
     moved = float(np.abs(course.first.place.x - place.x).max(initial=0.0))
-    said = (found.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state", *found.evidence[1:])
+    guess = f", from a guess of {length:.6g} s for its period" if course.period != length else ""
+    said = (found.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state{guess}", *found.evidence[1:])
     return replace(found, motion=motion, evidence=said if moved else found.evidence)
 
 
@@ -263,12 +269,12 @@ def _as_seen(observer: Observer, values: np.ndarray, shape: Callable[[int], np.n
             other = found[partner]
             main = round(float((shifted[partner] - values[partner]).imag * observer.course.period / (2 * np.pi)))
             shifted[k] -= 2j * np.pi / observer.course.period * main
-            found[k] = Seen(tuple((-multiple, share) for multiple, share in other.harmonics), other.whirl)
+            found[k] = replace(other, harmonics=tuple((-multiple, share) for multiple, share in other.harmonics))
             continue
         seen = observer.seen(shape(k), fixed)
         main = seen.harmonics[0][0]
         shifted[k] += 2j * np.pi / observer.course.period * main
-        found[k] = Seen(tuple((multiple - main, share) for multiple, share in seen.harmonics), seen.whirl)
+        found[k] = replace(seen, harmonics=tuple((multiple - main, share) for multiple, share in seen.harmonics))
     return shifted, [found[k] for k in range(len(values))]
 
 

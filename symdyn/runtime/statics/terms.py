@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.runtime.arguments import fixed
 from symdyn.runtime.constraints import names as constraint_names
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Singular values below this part of the largest count as zero where ranks of constraints are asked for.
+# Singular values below this part of the largest count as zero where ranks of constraints are computed.
 RANK = 1e-8
 
 
@@ -33,6 +34,10 @@ class Place:
     inputs: np.ndarray
     ud: np.ndarray
     lam: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("x", "p", "inputs", "ud", "lam"):  # results are evaluated from them when they are asked for
+            object.__setattr__(self, name, fixed(getattr(self, name)))
 
     def at(self, **changes: Any) -> Place:
         """The same with some of these replaced."""

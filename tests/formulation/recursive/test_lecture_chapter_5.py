@@ -20,6 +20,7 @@ from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
 from symdyn.formulation.recursive.numbers import NumericTree
 from symdyn.formulation.recursive.page import Page
 from symdyn.formulation.recursive.velocities import velocities
+from symdyn.model.symbols import symbols_of
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Output
 from tests.formulation.recursive.test_page import page_of
@@ -47,7 +48,7 @@ def same(found: sp.Matrix, slide: Any) -> bool:
 def equal_in_numbers(found: sp.Matrix, slide: Any) -> bool:
     """Whether they agree to 35 digits at arbitrary numbers; for what takes long to simplify."""
     difference = sp.Matrix(found) - sp.Matrix(slide)
-    values = {s: sp.Rational(k + 2, 7) for k, s in enumerate(sorted(difference.free_symbols, key=str))}
+    values = {s: sp.Rational(k + 2, 7) for k, s in enumerate(sorted(symbols_of(difference), key=str))}
     return all(abs(sp.N(e.xreplace(values), 40)) < 1e-35 for e in difference)
 
 

@@ -84,7 +84,11 @@ def planar_of(system: Any, equations: Any, params: np.ndarray, x0: np.ndarray) -
     springs, torques = [], []
     for load in model.loads:
         if isinstance(load, SpringDamper):
-            stiffness, damping, length = (float(read.number(e)) for e in (load.stiffness, load.damping, load.length))
+            numbers = [read.number(e) for e in (load.stiffness, load.damping, load.length)]
+            if not all(e.is_number for e in numbers):
+                raise Unfit(f"{load.label} has the stiffness {load.stiffness}, the damping {load.damping} and the length "
+                            f"{load.length}; what is built is springs and dampers by numbers")
+            stiffness, damping, length = map(float, numbers)
             ends = place(load.body_a, load.point_a), place(load.body_b, load.point_b)
             springs.append((ends, stiffness, damping, length))
             continue

@@ -1,0 +1,195 @@
+"""Which statements of tapes a state exercises: those whose value, changed a little, changes a result by more than its tolerance.
+
+All states are looked at together, forward and back, in floats. A statement that no state exercises may be wrong without any
+reference vector showing it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.tape.floats import function_of
+from symdyn.tape.node import PARAMETER, Node
+from symdyn.tape.ops import OPERATIONS
+from symdyn.tape.tape import Tape
+
+# Relative change of a statement's value that has to show in a result, by how much relative to its largest entry.
+CHANGE, SHOWS = 1e-2, 1e-11
+# Steps that are no arithmetic of their own.
+PASSED_ON = ("leaf", "neg", "call", "item", "guard", "pi")
+# Halvings of the way between two states towards the one where a divisor vanishes.
+HALVINGS = 60
+
+
+class _Numbers:
+    """What the table of partial derivatives asks of a recorder, on arrays."""
+
+    @staticmethod
+    def apply(op: str, *values: Any) -> Any:
+        return function_of(op)(*values)
+
+    @staticmethod
+    def pow(base: Any, exponent: Any) -> Any:
+        return np.power(base, exponent)
+
+    @staticmethod
+    def pi() -> float:
+        return float(np.pi)
+
+
+class Rows:
+    """A tape at n points at once: values of all its steps, where its checks hold, and which steps the results depend on there.
+
+    values   leaf name -> array (n,)
+    """
+
+    def __init__(self, tape: Tape, values: Mapping[str, np.ndarray], n: int) -> None:
+        self.tape, self.n = tape, n
+        self.of: dict[Node, Any] = {}
+        with np.errstate(all="ignore"):
+            for node in tape.steps:
+                self.of[node] = self._step(node, values)
+        self.checked = [node for node in tape.steps if node in tape.recorder.checks and node.op != "call"]
+        self.defined = self._finite()
+
+    def margin(self, node: Node) -> np.ndarray:
+        """What must be positive of a checked step."""
+        return np.broadcast_to(self.number(node.args[1] if node.op == "guard" else node), (self.n,))
+
+    def number(self, value: Any) -> Any:
+        return self.of[value] if isinstance(value, Node) else value if isinstance(value, bool) else float(value)
+
+    def _step(self, node: Node, values: Mapping[str, np.ndarray]) -> Any:
+        if node.op == "leaf":
+            return values[node.args[1]]
+        if node.op == "call":
+            shape = (self.n,)
+            return np.moveaxis(node.args[0].rows([np.broadcast_to(self.number(a), shape) for a in node.args[1:]]), -1, 0)
+        if node.op == "item":
+            return self.of[node.args[0]][node.args[1]]
+        if node.op == "guard":
+            return self.number(node.args[0])
+        return function_of(node.op)(*[self.number(a) for a in node.args])
+
+    def _finite(self) -> np.ndarray:
+        good = np.ones(self.n, dtype=bool)
+        with np.errstate(all="ignore"):
+            for node in self.checked:
+                good &= self.margin(node) > 0
+            for output in self.tape.outputs.values():
+                for entry in output.entries:
+                    good &= np.isfinite(np.broadcast_to(self.number(entry), (self.n,)).astype(float))
+        return good
+
+    def exercised(self) -> dict[Node, np.ndarray]:
+        """Step that runs -> booleans (n,); of a choice both branches, as (step, True) and (step, False)."""
+        entries = [e for output in self.tape.outputs.values() for e in output.entries]
+        scale = np.zeros(self.n)
+        for e in entries:
+            scale = np.maximum(scale, np.abs(np.broadcast_to(self.number(e), (self.n,)).astype(float)))
+        scale = np.where(scale > 0, scale, 1.0)
+        stream = random.Random(1)
+        weight: dict[Node, Any] = {}
+        for e in entries:  # random weights, so that effects on two entries do not cancel
+            if isinstance(e, Node):
+                weight[e] = weight.get(e, 0.0) + stream.uniform(0.5, 1.5) * stream.choice((1, -1)) * np.ones(self.n)
+        found: dict[Any, np.ndarray] = {}
+        with np.errstate(all="ignore"):
+            for node in reversed(self.tape.steps):
+                if node not in weight or node.op == "leaf":
+                    continue
+                self._back(node, weight)
+                self._note(node, weight[node], scale, found)
+        return {key: value & self.defined for key, value in found.items()}
+
+    def _note(self, node: Node, weight: Any, scale: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+        if node.op in PASSED_ON:
+            return
+        if node.op == "select":
+            condition = np.broadcast_to(np.asarray(self.number(node.args[0]), dtype=bool), (self.n,))
+            matters = np.abs(weight) > 0
+            found[node, True], found[node, False] = matters & condition, matters & ~condition
+            return
+        value = self.number(node)
+        found[node] = np.nan_to_num(np.abs(weight * value)) * CHANGE > SHOWS * scale
+
+    def _back(self, node: Node, weight: dict[Node, Any]) -> None:
+        """Pass the weight of a step on to its arguments."""
+        mine = weight[node]
+        if node.op == "item":
+            weight[node.args[0]] = weight.get(node.args[0], 0.0) + np.abs(mine)
+            return
+        if node.op == "call":  # each value of a numeric algorithm is taken to act on all of its results
+            for a in node.args[1:]:
+                if isinstance(a, Node):
+                    weight[a] = weight.get(a, 0.0) + mine
+            return
+        rule = OPERATIONS[node.op].partials
+        if rule is None:
+            return
+        values = tuple(self.number(a) for a in node.args)
+        for a, partial in zip(node.args, rule(_Numbers, self.of[node], values)):
+            if isinstance(a, Node):
+                passed = np.nan_to_num(np.asarray(mine * partial, dtype=float))
+                weight[a] = weight.get(a, 0.0) + passed
+
+
+def statements(tapes: Sequence[Tape]) -> set[Any]:
+    """What there is to exercise in tapes: every statement on which a result depends, of a choice both branches."""
+    found: set[Any] = set()
+    for tape in tapes:
+        for node in _valued(tape):
+            if node.op == "select":
+                found |= {(node, True), (node, False)}
+            elif node.op not in PASSED_ON and OPERATIONS[node.op].kind != "compare":
+                found.add(node)
+    return found
+
+
+def deciding(tapes: Sequence[Tape]) -> set[Node]:
+    """The other statements of tapes, which serve only conditions and the margins of checks."""
+    return {node for tape in tapes for node in set(tape.steps) - _valued(tape) if node.op not in PASSED_ON}
+
+
+def _valued(tape: Tape) -> set[Node]:
+    """The steps that results are computed from."""
+    found: set[Node] = set()
+    waiting = [e for output in tape.outputs.values() for e in output.entries if isinstance(e, Node)]
+    while waiting:
+        node = waiting.pop()
+        if node in found:
+            continue
+        found.add(node)
+        values = node.args[:1] if node.op in ("guard", "item") else node.args[1:] if node.op == "select" else node.args
+        waiting += [a for a in values if isinstance(a, Node)]
+    return found
+
+
+def singular_states(tape: Tape, values: Mapping[str, np.ndarray], n: int) -> Iterator[dict[str, np.ndarray]]:
+    """Points (each value an array (1,)) where a guarded divisor of the tape vanishes: between two where its signs differ.
+
+    Parameters stay those of the first of the two.
+    """
+    rows = Rows(tape, values, n)
+    fixed = {leaf.args[1] for leaf in tape.inputs if leaf.mask == PARAMETER}
+    for node in (step for step in rows.checked if step.op == "guard" and isinstance(step.args[0], Node)):
+        divisor = np.broadcast_to(rows.number(node.args[0]), (n,))
+        above, below = (np.flatnonzero(side) for side in (divisor > 0, divisor < 0))
+        if not (above.size and below.size):
+            continue
+        i, j = above[:1], below[:1]
+        ends = [{name: v[k] for name, v in values.items()} for k in (i, j)]
+        ends[1] = {name: ends[0][name] if name in fixed else v for name, v in ends[1].items()}
+        alone = Tape.of(tape.recorder, divisor=[node.args[0]])
+        sign = [np.sign(Rows(alone, end, 1).number(node.args[0])) for end in ends]
+        if sign[0] == sign[1]:
+            continue
+        for _ in range(HALVINGS):
+            middle = {name: (ends[0][name] + ends[1][name]) / 2 for name in values}
+            there = np.sign(Rows(alone, middle, 1).number(node.args[0]))
+            ends[0 if there == sign[0] else 1] = middle
+        yield ends[0]

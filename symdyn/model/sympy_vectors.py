@@ -1,0 +1,66 @@
+"""Vectors and dyadics of SymPy's ReferenceFrames, taken over as components where their frame is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from symdyn.errors import ModelError
+
+
+def is_sympy_vector(value: Any) -> bool:
+    """Whether a value is a vector of sympy.physics.vector; that package, which loads slowly, is not imported for it."""
+    return type(value).__module__ == "sympy.physics.vector.vector"
+
+
+def is_dyadic(value: Any) -> bool:
+    """Whether a value is a dyadic of sympy.physics.vector."""
+    return type(value).__module__ == "sympy.physics.vector.dyadic"
+
+
+def is_frame(value: Any) -> bool:
+    """Whether a value is a ReferenceFrame of sympy.physics.vector."""
+    return type(value).__module__ == "sympy.physics.vector.frame"
+
+
+def new_frame(name: str) -> Any:
+    """A ReferenceFrame."""
+    from sympy.physics.vector import ReferenceFrame
+
+    return ReferenceFrame(name)
+
+
+def as_frame(value: Any, what: str) -> Any:
+    """A ReferenceFrame as it is, or None. Raises ModelError for anything else."""
+    if value is not None and not is_frame(value):
+        raise ModelError([f"{what} is {value!r}; pass a ReferenceFrame of sympy.physics.mechanics"])
+    return value
+
+
+def frames_of(value: Any) -> list[Any]:
+    """The ReferenceFrames whose unit vectors a vector or dyadic is written with; none for zero."""
+    parts = value.args if is_sympy_vector(value) else [unit.args[0] for _, *units in value.args for unit in units]
+    return list(dict.fromkeys(frame for _, frame in parts))
+
+
+def components(value: Any, frame: Any, what: str) -> sp.Matrix:
+    """Components in a frame: (3, 1) of a vector, (3, 3) of a dyadic.
+
+    Raises ModelError, which documents what to write, where no frame is known (None) and for what is written in other frames.
+    """
+    kind = "vector" if is_sympy_vector(value) else "dyadic"
+    written = frames_of(value)
+    if not written:
+        return sp.zeros(3, 1 if is_sympy_vector(value) else 3)
+    if written == [frame]:
+        return value.to_matrix(frame)
+    names = " and ".join(str(f) for f in written)
+    one = written[0]
+    if frame is None:
+        matrix = f"{kind}.to_matrix({one})"
+        raise ModelError([f"{what} is the SymPy {kind} {value} in the frame {names}, and no frame is known here; pass its "
+                          f"components, {matrix if kind == 'dyadic' else f'list({matrix})'}; bodies, and the system, take "
+                          f"their frames as frame={one}"])
+    raise ModelError([f"{what} is the SymPy {kind} {value} in the frame {names}; here the frame {frame} is known: write it in "
+                      f"that one, as body.frame and system.frame have it, or pass its components"])

@@ -1,0 +1,110 @@
+"""Real numbers from what a user gives: arrays of doubles, and nothing that NumPy would turn into some by leaving a part out.
+
+NumPy drops imaginary parts, ignores masks, reads numbers from text and dates, and raises errors of several kinds for numbers
+beyond the range of doubles. Every border where numbers come in goes through here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.shown import shown
+
+# The type of arrays that need no further look.
+DOUBLE = np.dtype(float)
+# Axes that values of any argument have at most, with one to spare.
+MOST_AXES = 4
+MASKED = "a masked array, whose hidden entries would count; pass .filled(...) or .compressed()"
+
+
+class NotReal(ValueError):
+    """A value is no array of real numbers; the message says what it is instead, and what to do."""
+
+
+def real(values: Any) -> np.ndarray:
+    """An array of doubles, the array itself if it is one; NaN and infinity pass.
+
+    Raises NotReal for complex numbers (also with imaginary part zero), masked entries, text, dates, numbers beyond the range of
+    doubles, rows of different lengths, and anything else that has no numbers.
+    """
+    if type(values) is np.ndarray and values.dtype is DOUBLE:
+        return values
+    if type(values) is float:
+        return np.array(values)
+    if _holds_masked(values):
+        raise NotReal(MASKED)
+    try:
+        array = np.asanyarray(values)
+    except Exception as error:  # rows of different lengths, or whatever __array__ and __len__ of a user's class raise
+        raise NotReal(f"no array of numbers ({error})") from None
+    if np.ma.isMaskedArray(array):
+        raise NotReal(MASKED)
+    array = np.asarray(array)
+    if array.dtype.kind in "fiub":
+        return array.astype(float) if array.dtype is not DOUBLE else array
+    if array.dtype.kind == "c":
+        raise NotReal("complex; pass the real part, .real, if that is meant")
+    if array.dtype.kind in "SUT":
+        raise NotReal("text, which is not read as numbers")
+    if array.dtype.kind != "O":
+        raise NotReal(f"of the type {array.dtype}, not numbers")
+    return np.array([_double(v) for v in array.ravel().tolist()], dtype=float).reshape(array.shape)
+
+
+def number(value: Any) -> float:
+    """One real number as a double; NaN and infinity pass. Raises NotReal as `real`, and for several."""
+    if type(value) is float:
+        return value
+    array = real(value)
+    if array.ndim:
+        raise NotReal(f"an array of the shape {array.shape}, where one number belongs")
+    return float(array)
+
+
+def length_of(values: Any) -> int | None:
+    """How many entries a list or array has, without a look at them; None for what has no length, such as one number."""
+    if isinstance(values, type) or not hasattr(values, "__len__") or (hasattr(values, "ndim") and values.ndim == 0):
+        return None
+    return len(values)
+
+
+def real_of(values: Any, owner: str, wanted: str) -> np.ndarray:
+    """As `real`; raises ArgumentError, with the owner and `wanted` as what must be, such as "x must be numbers"."""
+    try:
+        return real(values)
+    except NotReal as error:
+        raise ArgumentError(f"{owner}: {wanted}, found {shown(values)}: {error}") from None
+
+
+def number_of(value: Any, owner: str, wanted: str) -> float:
+    """As `number`; raises ArgumentError, with the owner and `wanted` as what must be, such as "t must be a number"."""
+    try:
+        return number(value)
+    except NotReal as error:
+        raise ArgumentError(f"{owner}: {wanted}, found {shown(value)}: {error}") from None
+
+
+def _holds_masked(values: Any) -> bool:
+    """Whether a list has masked arrays, or entries of some, in it, whose masks NumPy leaves out."""
+    rows = [values] if isinstance(values, (list, tuple)) else []
+    for _ in range(MOST_AXES):  # a list may be an entry of itself
+        entries = [v for row in rows for v in row if not isinstance(v, (float, int))]
+        if any(np.ma.isMaskedArray(v) for v in entries):
+            return True
+        rows = [v for v in entries if isinstance(v, (list, tuple))]
+    return False
+
+
+def _double(value: Any) -> float:
+    """One entry of an array of objects."""
+    if value is None or isinstance(value, (str, bytes, complex, np.complexfloating)):
+        raise NotReal(f"not all numbers ({shown(value, 40)} is among them)")
+    try:
+        return float(value)
+    except OverflowError:
+        raise NotReal(f"beyond the range of double precision, 1.8e308 ({shown(value, 40)})") from None
+    except Exception:
+        raise NotReal(f"not all numbers ({shown(value, 40)} is among them)") from None

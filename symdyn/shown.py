@@ -1,0 +1,30 @@
+"""Values of a user in messages: short, whatever they are, and never a reason for another error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+LENGTH = 120
+
+
+def shown(value: Any, length: int = LENGTH) -> str:
+    """The value's repr, cut to so many characters, and its type where there is no repr.
+
+    A whole number of thousands of digits has none: Python does not write it out. What a user's own class raises passes for none.
+    """
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
+        return f"a whole number of about {int(value.bit_length() * 0.30103) + 1} digits"
+    try:
+        text = repr(value[:length]) if isinstance(value, (str, bytes)) else repr(value)
+    except Exception:
+        return f"a value of the type {type(value).__name__}"
+    return text if len(text) <= length + 2 else f"{text[:length]} ..."
+
+
+def name_of(value: Any) -> str:
+    """The name of a symbol or of anything else that has one, text as it is; of the rest what `shown` makes of it."""
+    try:
+        name = getattr(value, "name", value)
+    except Exception:  # of a user's own class
+        name = value
+    return str(name) if isinstance(name, str) else shown(name)

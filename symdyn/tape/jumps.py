@@ -1,0 +1,74 @@
+"""Where expressions may jump: what their signs, conditions and floors change at, for the search of chattering."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from symdyn.errors import UnsupportedExpression
+from symdyn.tape.node import COORDINATE, INPUT, SPEED, STATE, TIME, Node
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.sympy_bridge import expand
+from symdyn.tape.tape import Output, reachable
+
+_MOVING = TIME | COORDINATE | SPEED | STATE | INPUT
+_COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_ROUNDED = {"floor": Fraction(1, 2), "ceil": Fraction(1, 2)}
+# Expressions with more operations than this are named by where they stand alone.
+_SHORT, _LETTERS = 60, 100
+
+
+class Jump(NamedTuple):
+    """One place where expressions may jump.
+
+    surface   what passes zero there; node: the operation that jumps
+    smooth    how the jump can be made smooth, with {s} for the surface
+    """
+
+    surface: Any
+    node: Node
+    smooth: str
+
+
+def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
+    """Where these entries may jump along a motion, each surface once; kinks, of abs, min and max, do not count."""
+    found: dict[Any, Jump] = {}
+    for node in reachable(entries):
+        if not node.mask & _MOVING:
+            continue
+        if node.op == "sign":
+            surface, smooth = node.args[0], "tanh(({s})/eps) in place of sign({s})"
+        elif node.op in _COMPARED:
+            surface, smooth = recorder.sub(*node.args), "(1 + tanh(({s})/eps))/2 as the weight of the two sides"
+        elif node.op in _ROUNDED:
+            nearest = recorder.apply("floor", recorder.add(node.args[0], _ROUNDED[node.op]))
+            surface, smooth = recorder.sub(node.args[0], nearest), "a smooth step within eps of each whole number"
+        else:
+            continue
+        if isinstance(surface, Node):
+            opposite = surface.args[0] if surface.op == "neg" else recorder.neg(surface)
+            if surface not in found and opposite not in found:
+                found[surface] = Jump(surface, node, smooth)
+    return list(found.values())
+
+
+def description(jump: Jump, symbols: Any) -> dict[str, str]:
+    """What jumps, its surface, the remedy, and where it stands, as text; symbols: leaf -> the user's symbol."""
+    surface = _text(jump.surface, symbols)
+    what = "a condition" if jump.node.op in _COMPARED else jump.node.op
+    if surface:
+        what = f"the condition {surface} {_COMPARED[jump.node.op]} 0" if jump.node.op in _COMPARED else _text(jump.node, symbols)
+    return {"what": what, "surface": surface or "its argument", "where": jump.node.section,
+            "remedy": jump.smooth.format(s=surface or "x")}
+
+
+def _text(node: Node, symbols: Any) -> str:
+    """The expression, "" if it is long or has no explicit form."""
+    if len(reachable([node])) > _SHORT:
+        return ""
+    try:
+        text = str(expand(Output.of("value", node), symbols))
+    except (UnsupportedExpression, KeyError):
+        return ""
+    return text if len(text) <= _LETTERS else ""

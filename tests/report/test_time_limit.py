@@ -1,0 +1,81 @@
+"""The time limit of explicit forms holds, and what is not reached in it is an error that names alternatives."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import SymdynError
+from symdyn.report.limit import TimeUp, within
+from symdyn.report.simplify import simplified
+
+
+def forever() -> None:
+    while True:
+        with contextlib.suppress(Exception):  # must not hold the interruption up
+            sum(range(100))
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.2])
+def test_what_takes_longer_is_interrupted(seconds):
+    begin = time.monotonic()
+    with pytest.raises(TimeUp):
+        within(seconds, forever)
+    assert time.monotonic() - begin < seconds + 0.5
+
+
+def test_what_is_done_in_time_is_returned_and_never_interrupted_later():
+    assert [within(0.02, lambda k=k: k) for k in range(50)] == list(range(50))
+    time.sleep(0.1)
+    with pytest.raises(ZeroDivisionError):
+        within(1.0, lambda: 1 / 0)
+
+
+def test_other_threads_are_limited_by_themselves():
+    found = []
+
+    def limited():
+        try:
+            within(0.1, forever)
+        except TimeUp:
+            found.append("interrupted")
+
+    threads = [threading.Thread(target=limited) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    assert within(5.0, lambda: [thread.join() for thread in threads]) and found == ["interrupted"] * 2
+
+
+def test_long_expressions_are_simplified_within_the_limit():
+    """Without the limit, multiplying out the accelerations of a four-bar linkage takes minutes."""
+    equations = replace(sd.systems.get("four_bar").augmented(), simplify_seconds=1.0)
+    begin = time.monotonic()
+    value = equations.explicit("accelerations")
+    assert time.monotonic() - begin < 3  # 1.1 s on an idle machine
+    plain = equations.explicit("accelerations", simplify=False)
+    symbols = sorted(plain.free_symbols, key=str)
+    numbers = [(k + 3) / (7 + k % 3) for k in range(len(symbols))]
+    found, wanted = (sp.lambdify(symbols, v[1])(*numbers) for v in (value, plain))
+    assert found == pytest.approx(wanted, rel=1e-9)
+
+
+def test_an_entry_is_as_simple_as_when_the_time_was_up():
+    x = sp.Symbol("x", real=True)
+    long = sp.Mul(*[sp.Add(*[sp.sin(k * j * x) + j for j in range(1, 9)]) for k in range(1, 9)])
+    assert simplified(sp.Matrix([long, sp.sin(x) ** 2 + sp.cos(x) ** 2]), 0.3) == sp.Matrix([long, 1])
+
+
+def test_a_form_that_is_not_reached_in_time_names_the_alternatives(monkeypatch):
+    monkeypatch.setattr("symdyn.formulation.equations._EXPANDED", 0.05)
+    monkeypatch.setattr("symdyn.formulation.equations.expand", lambda *_: forever())
+    equations = replace(sd.systems.get("pendulum").embedding(), simplify_seconds=0.1)
+    message = (r"accelerations has \d+ steps and is no explicit expression within 0.1 s; print its steps with "
+               r"latex\('accelerations', intermediates=True\), evaluate it with lambdify")
+    with pytest.raises(SymdynError, match=message):
+        equations.explicit("accelerations")
