@@ -11,7 +11,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "symdyn.model.symbols": ("coordinates", "inputs", "parameters", "partial_rate", "speeds"),
+    "symdyn.model.symbols": ("coordinates", "inputs", "motions", "parameters", "partial_rate", "speeds"),
     "symdyn.model.points": ("acceleration", "bias_acceleration", "jacobian", "position", "velocity"),
     "symdyn.model.quantity": ("angular_velocity", "distance", "multiplier", "reaction", "rotation_matrix"),
     "symdyn.model.joints": ("Custom", "Cylindrical", "Fixed", "Free", "Helical", "Planar", "Prismatic", "Revolute",

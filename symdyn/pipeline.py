@@ -26,6 +26,7 @@ from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.skipped import skipped
+from symdyn.model.symbols import GivenMotion
 from symdyn.runtime.arguments import some
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
 from symdyn.runtime.methods import split_name
@@ -238,6 +239,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "reaction_kinds": [kind for *_, kind in equations.joints],
                 "unit_groups": [[q.name for q in group] for group in equations.unit_groups],
                 "implicit_loads": list(equations.implicit_loads), "of_reactions": list(equations.of_reactions),
+                "motions": [s.name for s in equations.symbols.inputs if isinstance(s, GivenMotion)],
                 "charts": [list(chart) for chart in equations.charts],
                 "masses": {p.name: body for p, body in equations.symbols.masses.items()},
                 "output_units": dict(equations.symbols.point_units),

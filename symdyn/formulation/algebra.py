@@ -12,7 +12,7 @@ import sympy as sp
 from symdyn.errors import UnsupportedExpression
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Coordinate, time
+from symdyn.model.symbols import Coordinate, GivenMotion, GivenRate, time
 from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.recorder import Recorder
@@ -69,8 +69,8 @@ class TapeAlgebra:
         return self.constants(values).reshape(values.shape)
 
     def by_time(self, coordinates: Iterable[sp.Symbol], rates: Iterable[Any]) -> dict[Any, Any]:
-        """Seeds of the derivative by time at constant speeds: q -> q_dot, t -> 1."""
-        return {**dict(zip([self.leaves[q] for q in coordinates], rates, strict=True)), self.leaves[time]: 1}
+        """Seeds of the derivative by time at constant speeds: q -> q_dot, t -> 1, and given motions z -> z_dot -> z_ddot."""
+        return {**dict(zip([self.leaves[q] for q in coordinates], rates, strict=True)), **given_by_time(self.leaves)}
 
     def name(self, name: str, value: Any) -> Any:
         """Name the entries of a quantity by number."""
@@ -79,6 +79,12 @@ class TapeAlgebra:
     def vector(self, name: str, value: Any) -> Any:
         """Name the components of a vector or matrix in space x, y, z."""
         return self.recorder.name(name, value, axes=True)
+
+
+def given_by_time(leaves: Mapping[sp.Basic, Any]) -> dict[Any, Any]:
+    """Seeds of the derivative by time of what is given over time alone: t -> 1, z -> z_dot -> z_ddot."""
+    given = [s for s in leaves if isinstance(s, (GivenMotion, GivenRate))]
+    return {leaves[time]: 1, **{leaves[s]: leaves[s.dot] for s in given}}
 
 
 def leaves_of(model: Model, recorder: Recorder) -> dict[sp.Basic, Any]:

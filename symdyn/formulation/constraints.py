@@ -27,7 +27,7 @@ from symdyn.model.symbols import Coordinate, symbols_of
 from symdyn.spatial.vectors import dot, inner, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.node import PARAMETER, TIME, Node, is_zero
+from symdyn.tape.node import INPUT, PARAMETER, TIME, Node, is_zero
 from symdyn.tape.tape import Tape
 
 # What is smaller at STATES random states is zero but for rounding: lengths in m, directions.
@@ -177,10 +177,10 @@ class Gathered:
             return False
         what = row.value if row.holonomic else row.rate
         mask = what.mask if isinstance(what, Node) else 0
-        if mask & ~(TIME | PARAMETER) and np.ptp(numbers[:, 0]) > ROUNDING:
+        if mask & ~(TIME | INPUT | PARAMETER) and np.ptp(numbers[:, 0]) > ROUNDING:
             self.faults.append(f"{row.name} holds nothing: its derivatives by all coordinates and speeds vanish at every state; "
                                "remove it, or correct it")
-        elif mask & TIME:
+        elif mask & (TIME | INPUT):
             self.faults.append(f"{row.name} holds what is prescribed as a function of time: no coordinate of the system is in "
                                "it; remove it, or replace the prescribed motion by a coordinate")
         elif mask & PARAMETER:
@@ -200,7 +200,7 @@ class Gathered:
         parameters = {p.name: float(v) for p, v in self.model.defaults.items()}
         numbers: dict[str, Any] = {}
         for leaf in tape.inputs:
-            moving = leaf.mask & ~(TIME | PARAMETER)
+            moving = leaf.mask & ~(TIME | INPUT | PARAMETER)
             name, drawn = leaf.args[1], stream.uniform(0.2, 1.2, STATES if moving else None)
             numbers[name] = parameters[name] * (1 + drawn / 100) if parameters.get(name) else drawn
         for joint in (j for j in self.model.joints if isinstance(getattr(j, "orientation", None), EulerParameters)):

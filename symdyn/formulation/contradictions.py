@@ -96,8 +96,9 @@ def _draw(equations: Equations, numbers: Mapping[str, float]) -> _Draw | None:
     symbols = equations.symbols
     stream = np.random.default_rng(7)
     values: dict[str, Any] = {"t": 0.37, **numbers}
-    for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs):
+    for group in (symbols.coordinates, symbols.speeds, symbols.states):
         values |= {s.name: stream.uniform(0.5, 1.5, STATES) for s in group}
+    values |= {s.name: stream.uniform(0.5, 1.5) for s in symbols.inputs}  # motions are given, as time is
     found = evaluate_rows(equations.tape("C", "C_r", "C_t", "M_tilde"), values, STATES)
     arrays = [found[name] for name in ("C", "C_r", "C_t", "M_tilde")]
     defined = np.all([np.isfinite(a.reshape(STATES, -1)).all(axis=1) for a in arrays], axis=0)

@@ -21,7 +21,7 @@ from symdyn.formulation.explicit_check import ByHand, Part, recording
 from symdyn.formulation.motion import Motion
 from symdyn.formulation.provenance import OfCoordinates
 from symdyn.formulation.rank import first_dependent
-from symdyn.model.symbols import Coordinate, time
+from symdyn.model.symbols import Coordinate, GivenMotion, time
 from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape.differentiate import jacobian
 
@@ -79,7 +79,7 @@ class PositionMap(Motion):
             self.r = recorder.name("r", algebra.constants(r))
             self.M = algebra.matrix(M)
             self.F = recorder.name("F", algebra.constants(F))
-        self.given_motion = any(e.has(time) for e in r)
+        self.given_motion = any(e.has(time, GivenMotion) for e in r)
 
     def quantities(self) -> dict[str, Any]:
         own = {"J": self.J, "Jdot": self.Jdot, "Jd_qd": self.Jd_qd, "k_tilde": self.k_tilde, "F_tilde": self.F_tilde,

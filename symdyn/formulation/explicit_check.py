@@ -19,6 +19,7 @@ from symdyn.model.quantity import Quantity
 from symdyn.model.symbols import (
     Acceleration,
     Coordinate,
+    GivenMotion,
     Input,
     Rate,
     as_coordinate,
@@ -27,6 +28,7 @@ from symdyn.model.symbols import (
     symbols_of,
     take_over,
     time,
+    with_rates,
 )
 from symdyn.shown import name_of, shown
 from symdyn.tape import node as kinds
@@ -144,11 +146,12 @@ class ByHand:
                 for s in sorted(symbols_of(e), key=lambda a: a.name):
                     self._use(part, s, parameters, inputs)
         names = {c.name for c in self.q} | {c.dot.name for c in self.q}
-        for s in [*parameters, *inputs]:
+        given = list(with_rates(inputs))
+        for s in [*parameters, *given]:
             if s.name in names:
                 self.faults.append(f"{s} is the name of a coordinate or its derivative, and of another symbol with other "
                                    "assumptions; use the same symbol everywhere, or another name")
-        return list(parameters), list(inputs)
+        return list(parameters), given
 
     def _use(self, part: Part, s: sp.Symbol, parameters: dict[sp.Symbol, None], inputs: dict[sp.Symbol, None]) -> None:
         what, faults = part.what, self.faults
@@ -171,7 +174,7 @@ class ByHand:
             faults.append(f"{what} uses {s}, which is not among the coordinates {', '.join(map(str, self.q))}; add it, or "
                           "use a parameter in its place")
         elif isinstance(s, Input):
-            if part.inputs:
+            if part.inputs or (part.moving and isinstance(s, GivenMotion)):
                 inputs[s] = None
             else:
                 faults.append(f"{what} uses the input {s}; it may use {part.allowed}")

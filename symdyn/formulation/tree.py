@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.algebra import TapeAlgebra, add_rates
+from symdyn.formulation.algebra import TapeAlgebra, add_rates, given_by_time
 from symdyn.formulation.axes import along_coordinate_axis
 from symdyn.formulation.flexible import FlexibleLink
 from symdyn.formulation.locking import lockable
@@ -25,7 +25,7 @@ from symdyn.model.joints import Fixed, Joint, JointMotion, Modal
 from symdyn.model.joints.base import turn
 from symdyn.model.joints.modal import exactly
 from symdyn.model.record import Model, joint_speeds
-from symdyn.model.symbols import Coordinate, time
+from symdyn.model.symbols import Coordinate
 from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import identity, vector, zeros
 from symdyn.tape.differentiate import forward
@@ -249,7 +249,7 @@ class _Builder:
                 speed = forward(a.recorder, [s[k]], by_time)[0]
                 row = [forward(a.recorder, [speed], {a.leaves[u]: 1})[0] for u in self.model.speeds]
                 w.append(speed)
-                self.w_t.append(forward(a.recorder, [s[k]], {a.leaves[time]: 1})[0])
+                self.w_t.append(forward(a.recorder, [s[k]], given_by_time(a.leaves))[0])
                 self.b.append(forward(a.recorder, [speed], by_time)[0])
             self.rows.append(row)
         self.w.extend(w)

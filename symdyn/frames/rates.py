@@ -8,7 +8,19 @@ from typing import Any
 import sympy as sp
 
 from symdyn.errors import ModelError
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, as_expression, partial_rate, symbols_of, time
+from symdyn.model.symbols import (
+    Acceleration,
+    Coordinate,
+    GivenAcceleration,
+    GivenMotion,
+    GivenRate,
+    Input,
+    Rate,
+    as_expression,
+    partial_rate,
+    symbols_of,
+    time,
+)
 from symdyn.shown import shown
 
 
@@ -46,7 +58,7 @@ def differentiated(expressions: Iterable[sp.Expr]) -> list[sp.Expr]:
     faults = [fault for s in symbols for fault in _faults(s)]
     if faults:
         raise ModelError(faults)
-    moving = [s for s in symbols if isinstance(s, (Coordinate, Rate))]
+    moving = [s for s in symbols if isinstance(s, (Coordinate, Rate, GivenMotion, GivenRate))]
     return [sp.Add(partial_rate(e), *[e.diff(s) * s.dot for s in moving if e.has(s)]) for e in entries]
 
 
@@ -56,12 +68,12 @@ def moves(symbol: sp.Symbol) -> bool:
 
 
 def _faults(symbol: sp.Symbol) -> list[str]:
-    if isinstance(symbol, Acceleration):
+    if isinstance(symbol, (Acceleration, GivenAcceleration)):
         return [f"the rate of {symbol} is asked for, a third derivative, for which there is no symbol; "
                 "give the motion as an expression in sd.t"]
-    if isinstance(symbol, Input):
-        return [f"the rate of the input {symbol} is asked for, which is not known; use a coordinate, whose rate is its .dot, "
-                "or an expression in sd.t"]
+    if isinstance(symbol, Input) and not isinstance(symbol, (GivenMotion, GivenRate)):
+        return [f"the rate of the input {symbol} is asked for, which is not known; use a coordinate or a motion, whose rate is "
+                "its .dot, or an expression in sd.t"]
     if symbol.name == "t" and symbol != time:
         return ["there is a symbol t with assumptions, which is not the time; use sd.t"]
     return []

@@ -26,7 +26,7 @@ from symdyn.model.points import Point
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model
 from symdyn.model.symbol_check import check_coordinates, check_symbols, spelling, symbols_in
-from symdyn.model.symbols import finite, take_over, time
+from symdyn.model.symbols import GivenAcceleration, GivenRate, finite, take_over, time
 from symdyn.model.uses import units_of, uses
 from symdyn.shown import name_of, shown
 
@@ -76,8 +76,9 @@ class _Checker:
         self._loads()
         self._shapes()
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
-        initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states],
-                                                       *self.inputs], "coordinate, speed, state or input")
+        started = [i for i in self.inputs if not isinstance(i, (GivenRate, GivenAcceleration))]
+        initial = self._numbers(s.initial, "initial", [*self.coordinates, *self.speeds, *[z.symbol for z in s.states], *started],
+                                "coordinate, speed, state or input")
         self.units = self._unit_names()
         duration = self._number(s.duration, "duration")
         if duration is not None and duration <= 0:

@@ -12,7 +12,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Custom, Fixed, Free, Helical, Joint
 from symdyn.model.quantity import Quantity, of_speeds
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, symbols_of
+from symdyn.model.symbols import Acceleration, Coordinate, GivenMotion, GivenRate, Input, Rate, symbols_of
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -119,13 +119,16 @@ def constraint_faults(constraints: Iterable[Constraint], moving: Iterable[sp.Sym
     moving, states, rates = set(moving), set(states), set(speeds)
     for c in constraints:
         symbols = symbols_of(c.expression)
-        given = sorted(str(s) for s in symbols if isinstance(s, Input) or s in states)
+        used = sorted((s for s in symbols if s in rates or isinstance(s, Rate) or of_speeds(s)), key=str)
+        # Equations are derived by time until accelerations stand in them, and there is no third derivative of a motion.
+        known = (GivenMotion, GivenRate) if used else GivenMotion
+        given = sorted(str(s) for s in symbols if (isinstance(s, Input) and not isinstance(s, known)) or s in states)
         if given:
-            faults.append(f"{c.name} uses {', '.join(given)}; a constraint may use coordinates, speeds, t and parameters")
+            faults.append(f"{c.name} uses {', '.join(given)}; a constraint may use coordinates, motions, t and parameters, and "
+                          "one of speeds also speeds and rates of motions")
         if not symbols & moving and not any(isinstance(s, (Coordinate, Rate, Acceleration, Quantity)) for s in symbols):
             faults.append(f"{c.name}, {c.expression} = 0, has no coordinate or speed in it, so that it constrains nothing; use "
                           "coordinates of the system, or remove it")
-        used = sorted((s for s in symbols if s in rates or isinstance(s, Rate) or of_speeds(s)), key=str)
         for k, first in enumerate(used):
             if any(sp.diff(c.expression, first, other) != 0 for other in used[k:]):
                 faults.append(f"{c.name}, {c.expression} = 0, is not linear in the speed {first}; pass a constraint of the form "

@@ -13,7 +13,7 @@ from symdyn.model.joints import Joint
 from symdyn.model.loop_check import constraint_faults
 from symdyn.model.quantity import Quantity
 from symdyn.model.record import joint_speeds
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, described, symbols_of, time
+from symdyn.model.symbols import Acceleration, Coordinate, GivenMotion, Input, Rate, described, symbols_of, time, with_rates
 from symdyn.model.uses import Scope, uses
 from symdyn.shown import shown
 
@@ -112,15 +112,16 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
     for joint in joints:
         for q in joint.coordinates:
             rates = [] if isinstance(q, Coordinate) else [
-                a for a in symbols_in([q]) if a in speeds or a in states or isinstance(a, (Rate, Input))]
+                a for a in symbols_in([q]) if a in speeds or a in states or isinstance(a, Rate) or _no_position(a)]
             if rates:
                 faults.append(f"joint {shown(joint.name)}: its coordinate {q} uses {', '.join(map(str, rates))}; "
-                              "a dependent coordinate may use coordinates, t and parameters")
+                              "a dependent coordinate may use coordinates, motions, t and parameters")
     if s.ground_motion is not None:
-        free = [a for a in symbols_in(s.ground_motion.coordinates) if a in moving - {time} or isinstance(a, Input)]
+        free = [a for a in symbols_in(s.ground_motion.coordinates) if a in moving - {time} or _no_position(a)]
         if free:
-            faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t and parameters")
-    everything = dict.fromkeys([*coordinates, *speeds, *[z.symbol for z in s.states], *parameters, *inputs])
+            faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t, motions and parameters")
+    given = with_rates(inputs)
+    everything = dict.fromkeys([*coordinates, *speeds, *[z.symbol for z in s.states], *parameters, *given])
     names = Counter(a.name for a in everything)
     for name, count in names.items():
         if count > 1:
@@ -134,7 +135,12 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
             faults.append(f"the name {shown(u.name + '_dot')} stands for the derivative of the speed {u}; "
                           "give the other symbol of this name another one")
     spelling(faults, "the symbols", names)
-    return tuple(parameters), tuple(inputs)
+    return tuple(parameters), given
+
+
+def _no_position(symbol: sp.Symbol) -> bool:
+    """Whether a symbol is an input that a position cannot follow, because its rate is not known: any but a motion."""
+    return isinstance(symbol, Input) and not isinstance(symbol, GivenMotion)
 
 
 def _quantity_faults(quantity: Quantity, where: str, scope: Scope, planar: bool) -> list[str]:

@@ -6,6 +6,7 @@ All are SymPy symbols, so that expressions print and differentiate as anywhere e
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,55 @@ class Input(Timed):
     _rank = 2
 
 
+class GivenMotion(Input):
+    """A coordinate that follows an input; `.dot` and `.ddot` are its rate and acceleration, which are given with it."""
+
+    __slots__ = ()
+
+    @property
+    def dot(self) -> GivenRate:
+        return GivenRate(f"{self.name}_dot", **_of_derivative(self))
+
+    @property
+    def ddot(self) -> GivenAcceleration:
+        return GivenAcceleration(f"{self.name}_ddot", **_of_derivative(self))
+
+
+class GivenRate(Input):
+    """The rate of a motion that is given as an input."""
+
+    __slots__ = ()
+    _rank = 3
+
+    @property
+    def dot(self) -> GivenAcceleration:
+        return GivenAcceleration(f"{self.name.removesuffix('_dot')}_ddot", **_of_derivative(self))
+
+    def _latex(self, printer: Any) -> str:
+        return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_dot"))), r"\dot")
+
+
+class GivenAcceleration(Input):
+    """The acceleration of a motion that is given as an input."""
+
+    __slots__ = ()
+    _rank = 4
+
+    def _latex(self, printer: Any) -> str:
+        return _dotted(printer.doprint(sp.Symbol(self.name.removesuffix("_ddot"))), r"\ddot")
+
+
+def with_rates(inputs: Iterable[Input]) -> tuple[Input, ...]:
+    """Inputs in their order, each motion among them together with its rate and acceleration, whichever of them is used."""
+    found: dict[Input, None] = {}
+    for symbol in inputs:
+        if isinstance(symbol, (GivenRate, GivenAcceleration)):
+            name = symbol.name.removesuffix("_dot" if isinstance(symbol, GivenRate) else "_ddot")
+            symbol = GivenMotion(name, **symbol._assumptions_orig)
+        found.update(dict.fromkeys([symbol, symbol.dot, symbol.ddot] if isinstance(symbol, GivenMotion) else [symbol]))
+    return tuple(found)
+
+
 def _make(kind: type, names: str, assumptions: dict) -> Any:
     if not isinstance(names, str) or not names.strip() or not names.isprintable():
         raise ModelError([f"names of symbols are {shown(names)}; pass text such as 'q1 q2' or 'm1:4'"])
@@ -145,6 +195,23 @@ def inputs(names: str, **assumptions: Any) -> Any:
     return _make(Input, names, assumptions)
 
 
+def motions(names: str, **assumptions: Any) -> Any:
+    """Coordinates that follow inputs: value, rate and acceleration are given at run time, and no equation is solved for them.
+
+    names   as for sympy.symbols: `z = sd.motions("z")`
+    They stand where an expression in t may stand: as `coordinate=` of a joint, in constraints, in the motion of the ground, in
+    loads and outputs; `z.dot` and `z.ddot` are the rate and the acceleration. `module.simulate(inputs={z: ...})` takes a
+    function of (t, x) that returns the three, a spline of SciPy, a table, or a number.
+    Raises ModelError for what is no name.
+
+    >>> import symdyn as sd
+    >>> z = sd.motions("z")
+    >>> (z**2).diff(sd.t)
+    2*z*z_dot
+    """
+    return _make(GivenMotion, names, assumptions)
+
+
 def symbols_of(expression: Any) -> set[Any]:
     """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
     free: set[Any] = expression.free_symbols
@@ -153,8 +220,9 @@ def symbols_of(expression: Any) -> set[Any]:
 
 def described(symbol: sp.Symbol) -> str:
     """What a symbol is and with which assumptions it was made, to keep apart those of one name in messages."""
-    kinds = {Coordinate: "a coordinate", Speed: "a speed", Input: "an input", Rate: "the derivative of a coordinate or speed",
-             Acceleration: "a second derivative"}
+    kinds = {Coordinate: "a coordinate", Speed: "a speed", Input: "an input", GivenMotion: "a motion",
+             GivenRate: "the rate of a motion", GivenAcceleration: "the acceleration of a motion",
+             Rate: "the derivative of a coordinate or speed", Acceleration: "a second derivative"}
     assumptions = ", ".join(f"{name}={value}" for name, value in symbol._assumptions_orig.items())
     return f"{kinds.get(type(symbol), 'a parameter')} {f'with {assumptions}' if assumptions else 'without assumptions'}"
 

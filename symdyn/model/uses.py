@@ -15,7 +15,7 @@ from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, To
 from symdyn.model.points import Point
 from symdyn.model.quantity import quantities_in
 from symdyn.model.record import joint_speeds
-from symdyn.model.symbols import Coordinate, time
+from symdyn.model.symbols import Coordinate, GivenMotion, time
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -94,8 +94,10 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
     s = system
     for joint in joints:
         for q, unit in zip(joint.coordinates, joint.coordinate_units, strict=True):
-            if isinstance(q, Coordinate):
+            if isinstance(q, (Coordinate, GivenMotion)):
                 units[q] = unit
+            if isinstance(q, GivenMotion):
+                units.update({q.dot: f"{unit}/s", q.ddot: f"{unit}/s^2"})
         for speed, unit in zip(joint_speeds(joint), joint.speed_units, strict=True):
             if speed is not None:
                 units[speed] = unit

@@ -21,6 +21,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.arguments import some, take
 from symdyn.runtime.consistent import NotConsistent, check_start, closest, normalised, number, smallest_acceleration
 from symdyn.runtime.constraints import CONSISTENT, counted, listed, names, unique
+from symdyn.runtime.inputs import RATES
 from symdyn.runtime.labelled import Labelled
 from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.statics.manifold import natural_length, natural_scales
@@ -134,6 +135,7 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
     given, guess = _inputs(module, inputs, "inputs"), _inputs(module, start, "start")
     values = np.array([given.get(n, guess.get(n, metadata["initial"].get(n, 0.0))) for n in metadata["inputs"]], dtype=float)
     x = normalised(module, np.concatenate(groups))
+    module = module.following(values)
     kept = list(named(keep, [*metadata["q"], *metadata["u"]], "keep", module.name)) if project or len(keep) else []
     if kept and not project:
         raise ArgumentError(f"{module.name}: keep names what stays in a projection; pass project=True, too, or leave it out")
@@ -147,8 +149,9 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
         place = place.at(ud=smallest_acceleration(module, time, x, p, rates, -gaps, kept))
     else:
         _demand_accelerations(place, gaps)
-    free = [k for k, n in enumerate(metadata["inputs"]) if n not in given]
-    return _Balance(place, free).solved(tuple(given))
+    motions = [f"{n}{end}" for n in metadata.get("motions", ()) for end in ("", *RATES)]
+    free = [k for k, n in enumerate(metadata["inputs"]) if n not in {*given, *motions}]
+    return _Balance(place, free).solved((*given, *motions))
 
 
 def input_matrix(module: Module, t: Any, x: Any, params: Any, inputs: Any) -> Labelled:

@@ -83,7 +83,8 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
     starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
-    along = take_inputs(inputs, metadata["inputs"], initial, module.name, span, interpolation, extend) if by_time else None
+    along = take_inputs(inputs, metadata["inputs"], initial, module.name, span, interpolation, extend,
+                        metadata.get("motions", ())) if by_time else None
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),

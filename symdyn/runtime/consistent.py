@@ -26,6 +26,7 @@ from symdyn.runtime.constraints import (
     position_residual,
     velocity_residual,
 )
+from symdyn.runtime.inputs import inputs_at
 from symdyn.shown import name_of, shown
 from symdyn.tape.kernels import MASSLESS
 
@@ -75,11 +76,12 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
             faults.append(f"the initial {what} violate {listed(module, residual, CONSISTENT)} ({unit})")
     if faults:
         raise NotConsistent(f"{module.name}: {'; '.join(faults)}", "begin with the nearest consistent state: "
-                            f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''})")
+                            f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''}"
+                            f"{', inputs=inputs' if module.metadata.get('motions') else ''})")
 
 
 def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
-               keep: Collection[Any] | None = ()) -> tuple[np.ndarray, np.ndarray]:
+               keep: Collection[Any] | None = (), inputs: Any = None) -> tuple[np.ndarray, np.ndarray]:
     """The consistent state near a guess: q (n_q,) and u (n_u,); see Module.consistent."""
     metadata = module.metadata
     p = module.parameters(params)
@@ -105,6 +107,8 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     x = normalised(module, x)
     if not names(module):
         return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
+    if inputs is not None:
+        module = module.following(inputs_at(inputs, t, metadata["inputs"], initial, module.name, metadata["motions"]))
     search = _Search(module, t, p, kept)
     x = search.speeds(search.positions(x))
     return x[:len(q0)], x[len(q0):len(q0) + len(u0)]

@@ -13,10 +13,14 @@ import numpy as np
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, number, real
 from symdyn.runtime.arguments import take
+from symdyn.runtime.following import Followed, Motions, take_motion
 from symdyn.runtime.raised import InputRaised, called
 from symdyn.runtime.sampled import Record, Sampled, Sampler
 from symdyn.runtime.tables import Pieces, Table, joined
 from symdyn.shown import name_of, shown
+
+# What the names of a motion's rate and acceleration end in.
+RATES = ("_dot", "_ddot")
 
 
 @dataclass(frozen=True)
@@ -50,11 +54,13 @@ class Mixed:
     """The function of inputs that are given one by one: constant (n_in,), or by tables, but for what has a function of its own.
 
     functions   place of the input, its name, its function of (t, x)
+    followed    motions by functions of t
     """
 
     constant: np.ndarray
     pieces: Pieces | None
     functions: tuple[tuple[int, str, Callable[[float, np.ndarray], Any]], ...]
+    followed: tuple[Followed, ...] = ()
 
     def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
         values = self.constant.copy() if self.pieces is None else self.pieces.at(t)
@@ -65,6 +71,8 @@ class Mixed:
             except NotReal as error:
                 raise ArgumentError(f"the function of input {name} returned {shown(value)} at t = {t:.6g}; needed is a "
                                     f"number: {error}") from None
+        for motion in self.followed:
+            values[motion.places] = motion.at(t)
         return values
 
 
@@ -77,6 +85,7 @@ class Inputs:
     smooth  whether all that is given as functions is declared to be smooth
     samplers   controllers that set some of the constants at instants; until then these have their initial values
     record     the values of these as the controllers held them in a run, in place of samplers
+    motions    those that inputs follow; None: there are none, or they stand still
     """
 
     constant: np.ndarray
@@ -86,6 +95,7 @@ class Inputs:
     smooth: bool = False
     samplers: tuple[Sampler, ...] = ()
     record: Record | None = None
+    motions: Motions | None = None
 
     @property
     def has_kinks(self) -> bool:
@@ -130,6 +140,10 @@ class Inputs:
         values = self._without_record(t, x)
         return values if self.record is None else self.record.put(t, values)
 
+    def left_out(self, t: Any) -> np.ndarray:
+        """What inputs that are left out are in a run, (n_in,), or (n, n_in) for times (n,): motions alone depend on the time."""
+        return self.constant if self.motions is None else self.motions.at(t)
+
     def _without_record(self, t: float, x: np.ndarray) -> np.ndarray:
         if self.function is not None:
             given = self.function(t, x)
@@ -172,7 +186,8 @@ def not_finite(names: Sequence[str], values: Any, t: float) -> str:
 
 
 def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], owner: str,
-                span: tuple[float, float] | None = None, interpolation: str = "linear", extend: str = "error") -> Inputs:
+                span: tuple[float, float] | None = None, interpolation: str = "linear", extend: str = "error",
+                motions: Sequence[str] = ()) -> Inputs:
     """Inputs as the user gave them.
 
     given   None (defaults, else zero); numbers in order; a function of (t, x) or a Sampled controller for all; a pair (times,
@@ -180,6 +195,8 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
             Table, or a Sampled controller, which may also have several names as its key
     span    of the run, which tables must cover unless their ends are held; None: not asked
     interpolation, extend   of pairs, as of a Table
+    motions   names of those that are motions: also functions of t that return value, rate and acceleration, splines of SciPy and
+              tables, which become splines; a number holds one in its place
     Raises ArgumentError for what fits none of these.
     """
     zeros = {n: initial.get(n, 0.0) for n in names}
@@ -193,6 +210,9 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(start)
     if not names:
         raise ArgumentError(f"{owner}: inputs were given, but the system has none")
+    if motions and (isinstance(given, Sampled) or callable(given) or is_table(given)):
+        raise ArgumentError(f"{owner}: the inputs {', '.join(motions)} are motions, which need rates and accelerations; give "
+                            "inputs by name: inputs={...}")
     if isinstance(given, Sampled):
         return Inputs(start, samplers=(Sampler(given, tuple(range(len(names))), "the sampled controller"),))
     if callable(given):
@@ -201,25 +221,65 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         table = _table(given, for_pairs, names, owner, span)
         return Inputs(start, pieces=table.pieces, kinks=table.pieces.breaks)
     if not isinstance(given, Mapping):
-        return Inputs(take(given, names, "inputs", zeros, owner))
+        constant = take(given, names, "inputs", zeros, owner)
+        _demand_rest(constant, names, motions, owner)
+        return Inputs(constant)
     samplers, given = _samplers(given, names, owner)
     sampled = {names[place]: start[place] for sampler in samplers for place in sampler.places}
     parts = {name_of(key): value for key, value in given.items()}
+    places = {n: k for k, n in enumerate(names)}
     varying = {n: v for n, v in parts.items() if callable(v) or is_table(v) or isinstance(v, tuple)}
+    moving = {n: varying.pop(n) for n in motions if n in varying}
+    followed = [take_motion(_undeclared(v), n, places[n], owner, span, isinstance(v, Smooth)) for n, v in moving.items()]
+    _demand_known_rates(parts, sampled, motions, owner)
+    parts = {n: v for n, v in parts.items() if n not in moving}
     constant = take({n: v for n, v in parts.items() if n not in varying} | dict.fromkeys(varying, 0.0) | sampled, names, "inputs",
                     zeros, owner)
-    if not varying:
+    _demand_rest(constant, names, motions, owner)
+    if not varying and not followed:
         return Inputs(constant, samplers=samplers)
-    places = {n: k for k, n in enumerate(names)}
     functions = {n: partial(_asked, _undeclared(v), f"the function of input {n}") for n, v in varying.items() if callable(v)}
     tables = [([places[n]], _table(v, for_pairs, [n], owner, span).pieces) for n, v in varying.items() if n not in functions]
+    tables += [(m.places, m.pieces) for m in followed if m.pieces is not None]
     pieces = joined(tables, constant) if tables else None
-    kinks = pieces.breaks if pieces is not None else np.zeros(0)
-    if not functions:
-        return Inputs(constant, pieces=pieces, kinks=kinks, samplers=samplers)
-    mixed = Mixed(constant, pieces, tuple((places[n], n, f) for n, f in functions.items()))
-    smooth = all(isinstance(varying[n], Smooth) for n in functions)
-    return Inputs(constant, function=mixed, kinks=kinks, smooth=smooth, samplers=samplers)
+    along = Motions(constant, tuple(followed)) if followed else None
+    kinks = np.unique(np.concatenate([np.zeros(0) if pieces is None else pieces.breaks, *[np.array(m.breaks) for m in followed]]))
+    by_function = tuple(m for m in followed if m.pieces is None)
+    if not functions and not by_function:
+        return Inputs(constant, pieces=pieces, kinks=kinks, samplers=samplers, motions=along)
+    mixed = Mixed(constant, pieces, tuple((places[n], n, f) for n, f in functions.items()), by_function)
+    smooth = all(isinstance(varying[n], Smooth) for n in functions) and all(m.smooth or m.breaks for m in by_function)
+    return Inputs(constant, function=mixed, kinks=kinks, smooth=smooth, samplers=samplers, motions=along)
+
+
+def inputs_at(given: Any, t: float, names: Sequence[str], initial: Mapping[str, float], owner: str,
+              motions: Sequence[str]) -> np.ndarray:
+    """Inputs at a time, (n_in,): numbers, rates of motions among them; or motions as for a run. Raises ArgumentError as
+    `take_inputs`."""
+    if given is None or not varies_over_time(given):
+        return take(given, names, "inputs", {n: initial.get(n, 0.0) for n in names}, owner)
+    return take_inputs(given, names, initial, owner, motions=motions).left_out(t)
+
+
+def _demand_known_rates(parts: Mapping[str, Any], sampled: Mapping[str, float], motions: Sequence[str], owner: str) -> None:
+    """Raises ArgumentError for rates of motions that are given apart from these, and for motions that controllers hold."""
+    apart = [f"{n}{end}" for n in motions for end in RATES if f"{n}{end}" in parts or f"{n}{end}" in sampled]
+    if apart:
+        raise ArgumentError(f"{owner}: inputs: {', '.join(apart)} given apart from the motion; over time a motion is given as a "
+                            "whole: a function of t that returns value, rate and acceleration, a spline of SciPy, or a table")
+    held = [n for n in motions if n in sampled]
+    if held:
+        raise ArgumentError(f"{owner}: inputs: the motion {', '.join(held)} is given by a sampled controller, whose values jump, "
+                            "which takes an infinite force; pass a function of t, a spline of SciPy or a table")
+
+
+def _demand_rest(constant: np.ndarray, names: Sequence[str], motions: Sequence[str], owner: str) -> None:
+    """Raises ArgumentError for motions that are held in their place, but whose rate or acceleration is not zero."""
+    moving = [f"{n}{end}" for n in motions for end in RATES if constant[list(names).index(f"{n}{end}")] != 0]
+    if moving:
+        raise ArgumentError(f"{owner}: inputs: {', '.join(moving)} is not zero, but the motion itself does not change; over time "
+                            "give a motion as a function of t that returns value, rate and acceleration, as a spline of SciPy, "
+                            "or as a table")
 
 
 def _samplers(given: Mapping[Any, Any], names: Sequence[str], owner: str) -> tuple[tuple[Sampler, ...], dict[Any, Any]]:

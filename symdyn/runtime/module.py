@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import functools
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,6 +28,7 @@ from symdyn.shown import name_of, shown
 if TYPE_CHECKING:
     from symdyn.runtime.actuation import Actuation
     from symdyn.runtime.batch_solution import BatchSolution
+    from symdyn.runtime.inputs import Inputs
     from symdyn.runtime.labelled import Labelled
     from symdyn.runtime.solution import Solution
     from symdyn.runtime.statics.campbell import Campbell
@@ -77,6 +79,7 @@ class Module:
         self._reporter = reporter
         self._local, self._notes = threading.local(), threading.local()
         self._lock = threading.Lock()
+        self._left_out: Callable[[Any], np.ndarray] | None = None
         self._n_in: int = metadata["sizes"]["inputs"]
         self._one, self._free = (metadata["sizes"]["x"],), (self._n_in,)
         self._defaults = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
@@ -129,6 +132,8 @@ class Module:
         text(name, f"{self.name}: the name of a function", "mass_matrix")
         evaluator = self._evaluator(name, params)
         state = self._rows(x, "x", "x")
+        if self._left_out is not None and not np.size(inputs):
+            inputs = self._left_out(t)
         free = self._rows(inputs, "inputs", "inputs")
         acceleration = self._rows(ud, "ud", "ud", self._unit(name).metadata)
         times = real_of(t, self.name, "t must be a finite time, or one for each state")
@@ -143,18 +148,35 @@ class Module:
                                 "or the same number")
         return evaluator.many(*rows)
 
-    def mass_matrix(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+    def following(self, inputs: Inputs | np.ndarray) -> Module:
+        """The module whose motions are those of a run, or those of inputs (n_in,), wherever inputs are left out: constraints
+        depend on motions, too, though on no other inputs."""
+        if not self.metadata.get("motions"):
+            return self
+        other = copy.copy(self)
+        other._left_out = (lambda t: inputs) if isinstance(inputs, np.ndarray) else inputs.left_out
+        return other
+
+    def motions_at(self, t: float) -> np.ndarray | None:
+        """Inputs (n_in,) with the motions of a run; None where the module follows none."""
+        return None if self._left_out is None else self._left_out(t)
+
+    def mass_matrix(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None,
+                    inputs: Any = None) -> np.ndarray:
         """M_tilde (n_u, n_u): mass_matrix(t, x, params), where coordinates alone do for x, or mass_matrix(q, params, t=0).
 
         The two orders of arguments, by time and state as for `rhs`, or by parts of the state, hold for k_tilde, F_tilde, J,
         energy and inverse_dynamics, too; every argument can be named. Raises ArgumentError where what is given fits both.
         """
-        call = ordered(self, "mass_matrix", at, {"x": x, "q": q, "params": params, "t": t}, ("q", "params", "t"))
+        named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "mass_matrix", at, named, ("q", "params", "t", "inputs"))
         return self._called("mass_matrix", call)
 
-    def k_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+    def k_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
+                inputs: Any = None) -> np.ndarray:
         """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0)."""
-        call = ordered(self, "k_tilde", at, {"x": x, "q": q, "u": u, "params": params, "t": t}, ("q", "u", "params", "t"))
+        named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "k_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("k_tilde", call)
 
     def F_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
@@ -165,15 +187,19 @@ class Module:
         call = ordered(self, "F_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("F_tilde", call)
 
-    def J(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+    def J(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None,
+          inputs: Any = None) -> np.ndarray:
         """J (6 n_b, n_u), planar (3 n_b, n_u), with [v_G; omega] of every body = J u, n-frame: J(t, x, params) or
         J(q, params, t=0)."""
-        call = ordered(self, "J", at, {"x": x, "q": q, "params": params, "t": t}, ("q", "params", "t"))
+        named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "J", at, named, ("q", "params", "t", "inputs"))
         return self._called("J", call)
 
-    def energy(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None) -> np.ndarray:
+    def energy(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
+               inputs: Any = None) -> np.ndarray:
         """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0)."""
-        call = ordered(self, "energy", at, {"x": x, "q": q, "u": u, "params": params, "t": t}, ("q", "u", "params", "t"))
+        named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
+        call = ordered(self, "energy", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("energy", call)
 
     def inverse_dynamics(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, ud: Any = None, params: Any = None,
@@ -205,7 +231,7 @@ class Module:
         held = take(lam, constraints, "lam", dict.fromkeys(constraints, 0.0), self.name) if np.ndim(lam) < 2 else \
             np.asarray(lam, dtype=float)
         tau = self._called("inverse_dynamics", call)
-        return tau + np.einsum("...ij,...i->...j", self._called("C_r", call._replace(ud=None, inputs=None)), held)
+        return tau + np.einsum("...ij,...i->...j", self._called("C_r", call._replace(ud=None)), held)
 
     def _called(self, name: str, call: Call) -> np.ndarray:
         whole = call.x is not None and (isinstance(call.x, Mapping) or np.shape(call.x)[-1:] == self._one)
@@ -292,13 +318,14 @@ class Module:
 
     # -- constraints
 
-    def consistent(self, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
-                   keep: Sequence[Any] = ()) -> tuple[np.ndarray, np.ndarray]:
+    def consistent(self, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0, keep: Sequence[Any] = (), *,
+                   inputs: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """A state that fulfils the constraints: q (n_q,) and u (n_u,) near the guess, by the smallest change of both.
 
         q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. Of several
                 solutions (branches) the guess decides
         keep    coordinates and speeds, by name or symbol, that stay as given
+        inputs  values and rates of motions that the constraints follow, {z: 0.1, z.dot: 0.3}, or as for `simulate`, at t
         The change is the smallest in the metric of the mass matrix, as that of the projection in `simulate`: the speeds are
         those after an impact, without rebound, of a mechanism whose constraints begin to hold, exact to rounding also with
         redundant constraints; along motions that move no mass the smallest velocities are added. Raises ArgumentError with
@@ -306,22 +333,23 @@ class Module:
         """
         from symdyn.runtime.consistent import consistent
 
-        return consistent(self, q, u, params, t, keep)
+        return consistent(self, q, u, params, t, keep, inputs)
 
-    def rank(self, q: Any, params: Any = None, t: Any = 0.0) -> Any:
+    def rank(self, q: Any, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> Any:
         """Number of independent constraints: rank of the scaled Jacobian C_scale C_r, of one state or rows of states.
 
         Columns of angular velocities are divided by the mechanism's length; singular values below 1e-8 of the largest are zero.
+        inputs: values of motions, which constraints may follow.
         """
         from symdyn.runtime.constraints import rank
 
-        return rank(self, t, self._state(q), self.parameters(params))
+        return rank(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
 
-    def unique(self, q: Any, params: Any = None, t: Any = 0.0) -> np.ndarray:
+    def unique(self, q: Any, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> np.ndarray:
         """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`."""
         from symdyn.runtime.constraints import unique
 
-        return unique(self, t, self._state(q), self.parameters(params))
+        return unique(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
 
     # -- motion
 

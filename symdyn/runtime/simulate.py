@@ -61,7 +61,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                              for v, what in ((steps, "steps"), (progress, "progress"), (work, "work")))
     method = checked_method(module, method)
     times, span, every = checked_times(module, t, steps)
-    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name, span, interpolation, extend)
+    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name, span, interpolation, extend,
+                       metadata.get("motions", ()))
+    module = module.following(free)
     check_span(free.samplers, span, module.name)
     if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and 0 < max_steps <= MOST_STEPS)):
         raise ArgumentError(f"{module.name}: max_steps must be a number of steps from 1 on, {MOST_STEPS} at most, or None, "

@@ -165,7 +165,7 @@ class Projector:
     def _evaluate(self, name: str, t: float, x: np.ndarray) -> np.ndarray:
         self.n_evaluations += name != "violation"
         try:
-            return self._evaluators[name].one(t, x[:self.n_state])
+            return self._evaluators[name].one(t, x[:self.n_state], self.module.motions_at(t))
         except EvaluationError as error:
             raise ProjectionFailed(f"no way back onto the constraints: {error}") from None
 
@@ -183,7 +183,7 @@ class Watch:
     def __call__(self, t: float, x: np.ndarray) -> str:
         """What to say if a position is off by more than LOST, else nothing."""
         known = names(self.module)
-        rows = np.abs(self.evaluator.one(t, x[:self.n_state])[:len(known)]) / self.length
+        rows = np.abs(self.evaluator.one(t, x[:self.n_state], self.module.motions_at(t))[:len(known)]) / self.length
         worst = int(rows.argmax())
         if not rows[worst] > LOST:
             return ""

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 
 from symdyn.errors import EvaluationError
-from symdyn.model.symbols import time
+from symdyn.formulation.algebra import given_by_time
 from symdyn.tape.differentiate import forward
 from symdyn.tape.tape import Tape
 from symdyn.verification.sample import Sample, difference, relative
@@ -70,7 +70,7 @@ def energy_balance(s: Sample) -> float | None:
     eq = s.equations
     seeds = dict(zip([eq.leaves[q] for q in eq.symbols.coordinates], eq.quantity("rates"), strict=True))
     seeds.update(zip([eq.leaves[u] for u in eq.symbols.speeds], eq.quantity("accelerations"), strict=True))
-    seeds[eq.leaves[time]] = 1
+    seeds.update(given_by_time(eq.leaves))
     rates = forward(eq.recorder, eq.quantity("energy").ravel().tolist(), seeds)
     tape = Tape.of(eq.recorder, rates=rates, power=eq.quantity("power"))
     found = s.evaluate(tape)

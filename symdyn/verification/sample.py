@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 
 from symdyn.formulation.equations import Equations
+from symdyn.model.symbols import GivenMotion, GivenRate
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.tape import Tape
 
@@ -116,6 +117,7 @@ def moved(s: Sample, values: Mapping[str, Any], step: Any, accelerating: bool = 
     rates = dict(zip([q.name for q in symbols.coordinates], here["rates"], strict=True))
     if accelerating:
         rates.update(zip([u.name for u in symbols.speeds], here["accelerations"], strict=True))
+    rates.update({z.name: here.values[z.dot.name] for z in symbols.inputs if isinstance(z, (GivenMotion, GivenRate))})
     later = {name: mpmath.mpf(here.values[name]) + step * rate for name, rate in rates.items()}
     return {**values, **later, "t": mpmath.mpf(here.values["t"]) + step}
 

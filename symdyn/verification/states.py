@@ -99,7 +99,7 @@ class _Manifold:
         symbols = self.equations.symbols
         names = [q.name for q in symbols.coordinates]
         start = np.array([[float(symbols.initial.get(q, 0.0)) + spread * values[q.name] for q in symbols.coordinates]])
-        self.doubles.values["t"] = values["t"]
+        self.doubles.values.update({name: values[name] for name in ("t", *[s.name for s in symbols.inputs])})
         q, residual = self.doubles.nearest(start)
         if not residual[0] < 1e-11:
             return None

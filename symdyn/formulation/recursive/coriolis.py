@@ -11,7 +11,7 @@ from symdyn.formulation.recursive.composite_bodies import composite_bodies
 from symdyn.formulation.recursive.rates import apparent_rates
 from symdyn.formulation.recursive.velocities import named, velocities
 from symdyn.formulation.tree import GROUND, Tree
-from symdyn.model.symbols import symbols_of, time
+from symdyn.model.symbols import GivenMotion, symbols_of, time
 from symdyn.spatial.sixvectors import force_cross, force_cross_swapped, motion_cross
 from symdyn.spatial.vectors import zeros
 
@@ -77,4 +77,5 @@ def coriolis(tree: Tree) -> Coriolis:
 
 def given_motions(tree: Tree) -> list[str]:
     """Names of the joints that move by themselves as time goes on."""
-    return [link.joint.name for link in tree.links if any(time in symbols_of(q) for q in link.joint.coordinates)]
+    return [link.joint.name for link in tree.links
+            if any(time in symbols_of(q) or q.has(GivenMotion) for q in link.joint.coordinates)]

@@ -428,6 +428,6 @@ def _shifted(manifold: Manifold, change: np.ndarray) -> Manifold:
     x = place.x + along
     x[:n_q] = place.moved(v)
     if place.sizes[3]:
-        x = closest(place.module, place.t, x, place.p)
+        x = closest(place.bound, place.t, x, place.p)
     moved = in_motion(place.at(x=x), manifold.selection)
     return Manifold(moved, manifold.selection, partition=manifold.partition)

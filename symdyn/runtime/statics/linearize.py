@@ -345,10 +345,11 @@ def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any,
     x = selection.apply(place.x)
     if guess and place.sizes[3]:
         kept = [n for n in selection.values if n in module.metadata["q"] or n in module.metadata["u"]]
-        q, u = consistent(module, x[:place.sizes[0]], x[place.sizes[0]:place.sizes[0] + place.sizes[1]], place.p, place.t, kept)
+        n_q, n_u, *_ = place.sizes
+        q, u = consistent(place.bound, x[:n_q], x[n_q:n_q + n_u], place.p, place.t, kept)
         x = np.concatenate([q, u, x[len(q) + len(u):]])
     try:
-        check_start(module, place.t, x, place.p)
+        check_start(place.bound, place.t, x, place.p)
     except NotConsistent as error:
         result = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
         raise ArgumentError(f"{result}; linear equations exist at states that fulfil the constraints: take "

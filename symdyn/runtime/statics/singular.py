@@ -46,7 +46,7 @@ def singular_configuration(place: Place, selection: Selection) -> str:
         x = place.x.copy()
         x[:n_q] = place.moved(change)
         try:
-            most = max(most, _rank(place, on_constraints(module, place.t, x, place.p), held))
+            most = max(most, _rank(place, on_constraints(place.bound, place.t, x, place.p), held))
         except (ArgumentError, EvaluationError):
             continue
     if most == here:

@@ -48,6 +48,10 @@ class Steadiness:
 def steadiness(manifold: Manifold) -> Steadiness:
     """Whether the linear equations of a manifold are constant along the motion through its state."""
     place = manifold.place
+    if place.motion_rates:
+        name, value = next(iter(place.motion_rates.items()))
+        return Steadiness("", f"the input {name} is {value:.4g}: how the motion goes on is not known from one instant; "
+                              "write it as an expression in t, or take a coordinate with a prescribed speed in its place")
     moving = accelerating(place, manifold)
     if moving:
         return Steadiness("", moving)

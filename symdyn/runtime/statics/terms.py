@@ -15,6 +15,7 @@ import numpy as np
 
 from symdyn.runtime.arguments import fixed
 from symdyn.runtime.constraints import names as constraint_names
+from symdyn.runtime.inputs import RATES
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -42,6 +43,19 @@ class Place:
     def at(self, **changes: Any) -> Place:
         """The same with some of these replaced."""
         return replace(self, **changes)
+
+    @property
+    def bound(self) -> Module:
+        """The module with the motions of this place wherever inputs are left out."""
+        return self.module.following(self.inputs)
+
+    @property
+    def motion_rates(self) -> dict[str, float]:
+        """Rates and accelerations of motions that inputs follow, by name, as far as they are not zero."""
+        names = self.module.metadata["inputs"]
+        rates = [f"{motion}{end}" for motion in self.module.metadata.get("motions", ()) for end in RATES]
+        values = {name: float(self.inputs[names.index(name)]) for name in rates}
+        return {name: value for name, value in values.items() if value != 0}
 
     @property
     def sizes(self) -> tuple[int, int, int, int]:

@@ -1,0 +1,218 @@
+"""Motions that inputs follow: value, rate and acceleration over time, from functions, splines and tables."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.real_numbers import NotReal, real
+from symdyn.runtime.raised import called
+from symdyn.runtime.tables import ORDER, ROUNDING, Pieces, Table
+from symdyn.shown import shown
+
+# At so many instants within a run it is looked whether rates and accelerations are those of the values; a motion that has a kink
+# at one of them passes, one that is wrong at more than half of them does not.
+INSTANTS = 9
+# Steps of the differences, parts of the run, and by how much they may be off, relative to the motion's own size in the run.
+STEPS = (1e-4, 1e-6)
+MISMATCH = 1e-3
+# A spline whose value or rate jumps by more than this part of its size at a break has no acceleration there.
+JUMP = 1e-9
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A motion that an input follows.
+
+    name, place   of its value among the inputs; rate and acceleration come after it
+    pieces        as a piecewise polynomial of the three, where it is one of order three at most; else None
+    function      of t, which returns the three
+    breaks        times at which steps have to end
+    smooth        whether a function is declared to be smooth
+    """
+
+    name: str
+    place: int
+    pieces: Pieces | None = None
+    function: Callable[[float], Any] | None = None
+    breaks: tuple[float, ...] = ()
+    smooth: bool = False
+
+    @property
+    def places(self) -> list[int]:
+        """Of value, rate and acceleration."""
+        return [self.place, self.place + 1, self.place + 2]
+
+    def at(self, t: float) -> np.ndarray:
+        """Value, rate and acceleration, (3,). Raises InputRaised from what the function raises, ArgumentError for what it must
+        not return."""
+        if self.function is None:
+            assert self.pieces is not None
+            return self.pieces.at(t)
+        function = self.function
+        given = called(lambda t, x: function(t), t, np.zeros(0), f"the motion {self.name}")
+        try:
+            values = real(given).reshape(-1)
+        except NotReal:
+            values = np.zeros(0)
+        if len(values) != 3:
+            raise ArgumentError(f"the motion {self.name} returned {shown(given)} at t = {t:.6g}; needed are three numbers: "
+                                "value, rate and acceleration")
+        return values
+
+
+@dataclass(frozen=True)
+class Motions:
+    """All inputs over time where those that are no motions are constant, (n_in,)."""
+
+    constant: np.ndarray
+    followed: tuple[Followed, ...]
+
+    def at(self, t: Any) -> np.ndarray:
+        """Inputs at a time, (n_in,), or at times (n,), (n, n_in)."""
+        if np.ndim(t):
+            return np.array([self.at(one) for one in np.asarray(t, dtype=float)]).reshape(np.shape(t)[0], len(self.constant))
+        values = self.constant.copy()
+        for motion in self.followed:
+            values[motion.places] = motion.at(float(t))
+        return values
+
+
+def take_motion(given: Any, name: str, place: int, owner: str, span: tuple[float, float] | None, smooth: bool) -> Followed:
+    """A motion as the user gave it: a function of t that returns value, rate and acceleration, a spline of SciPy, or a table,
+    which becomes a cubic spline.
+
+    span     of the run, which splines and tables must cover; None: not asked
+    smooth   whether a function was declared to be so
+    Raises ArgumentError for what fits none of these, for splines whose rate jumps, and for functions whose rate or acceleration
+    is not the derivative of their value.
+    """
+    where = f"{owner}: inputs: the motion {name}"
+    spline = _spline(given, where)
+    if spline is not None:
+        return _of_spline(spline, name, place, where, span)
+    if hasattr(given, "derivative"):  # a spline of another kind, such as scipy.interpolate.UnivariateSpline
+        rate, acceleration = given.derivative(1), given.derivative(2)
+        knots = given.get_knots() if hasattr(given, "get_knots") else ()
+        return Followed(name, place, None, lambda t: (given(t), rate(t), acceleration(t)), tuple(map(float, knots)))
+    if not callable(given):
+        raise ArgumentError(f"{where} is {shown(given)}; pass a function of t that returns value, rate and acceleration, a "
+                            "spline of SciPy, a table (times, values), or a number to hold it")
+    if not _takes_time_alone(given):
+        raise ArgumentError(f"{where} is a function of more than t; a motion depends on the time alone: pass a function of t "
+                            "that returns value, rate and acceleration")
+    motion = Followed(name, place, None, given, (), smooth)
+    if span is not None:
+        _demand_derivatives(motion, where, span)
+    return motion
+
+
+def _spline(given: Any, where: str) -> Any:
+    """The piecewise polynomial of SciPy of a spline or a table; None of anything else."""
+    if isinstance(given, (tuple, Table)):
+        table = given if isinstance(given, Table) else Table(given[0], given[1])
+        times, values = table.times, table.values
+        if values.ndim != 1 or len(times) < 2:
+            raise ArgumentError(f"{where} has a table with times of shape {times.shape} and values of shape {values.shape}; give "
+                                "one value for each of two or more times")
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(times, values, extrapolate=False)
+    if not type(given).__module__.startswith("scipy.interpolate"):
+        return None
+    from scipy.interpolate import BSpline, PPoly
+
+    return PPoly.from_spline(given) if isinstance(given, BSpline) else given if isinstance(given, PPoly) else None
+
+
+def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float, float] | None) -> Followed:
+    breaks = np.asarray(spline.x, dtype=float)
+    kept = np.append(np.flatnonzero(np.diff(breaks) > 0), len(breaks) - 1)  # a spline in B-form repeats its end knots
+    breaks, c = breaks[kept], np.asarray(spline.c)[:, kept[:-1]]
+    if c.ndim != 2 or not np.isrealobj(c) or not np.isfinite(c).all():
+        raise ArgumentError(f"{where} is a spline with coefficients of shape {c.shape}; pass one of a single real, finite value")
+    if span is not None and spline.extrapolate != "periodic":
+        slack = ROUNDING * max(abs(breaks[0]), abs(breaks[-1]), *map(abs, span))
+        if not breaks[0] - slack <= min(span) or not max(span) <= breaks[-1] + slack:
+            raise ArgumentError(f"{where} holds from t = {breaks[0]:g} s to {breaks[-1]:g} s, and the run goes from "
+                                f"{min(span):g} s to {max(span):g} s; pass one of the whole run")
+    _demand_continuous(breaks, c, where)
+    if len(c) > ORDER or spline.extrapolate == "periodic":
+        rate, acceleration = spline.derivative(1), spline.derivative(2)
+        return Followed(name, place, None, lambda t: (spline(t), rate(t), acceleration(t)),
+                        _repeated(breaks, span) if spline.extrapolate == "periodic" else tuple(breaks.tolist()))
+    powers = np.zeros((ORDER, c.shape[1]))
+    powers[:len(c)] = c[::-1]
+    c0, c1, c2, c3 = powers
+    none = np.zeros_like(c0)
+    rows = [np.stack(r, axis=-1) for r in ((c0, c1, c2, c3), (c1, 2 * c2, 3 * c3, none), (2 * c2, 6 * c3, none, none))]
+    pieces = Pieces(breaks, np.stack(rows, axis=1))
+    return Followed(name, place, pieces, None, tuple(breaks.tolist()))
+
+
+def _repeated(breaks: np.ndarray, span: tuple[float, float] | None) -> tuple[float, ...]:
+    """The breaks of a periodic spline within a run."""
+    begin, end = (min(span), max(span)) if span is not None else (breaks[0], breaks[-1])
+    period = breaks[-1] - breaks[0]
+    turns = np.arange(np.floor((begin - breaks[0]) / period), np.ceil((end - breaks[0]) / period))
+    return tuple(np.unique((breaks[None, :-1] + turns[:, None] * period).ravel()).tolist())
+
+
+def _demand_continuous(breaks: np.ndarray, c: np.ndarray, where: str) -> None:
+    """Raises ArgumentError where the value or the rate of a spline with coefficients c (order, pieces) jumps."""
+    h = np.diff(breaks)
+    for what, derived in (("value", c), ("rate", c[:-1] * np.arange(len(c) - 1, 0, -1)[:, None])):
+        if not len(derived):
+            continue
+        ends = np.zeros_like(h)
+        for row in derived:
+            ends = ends * h + row
+        begins = derived[-1]
+        size = max(np.abs(ends).max(), np.abs(begins).max())
+        jumps = np.flatnonzero(np.abs(ends[:-1] - begins[1:]) > JUMP * size)
+        if len(jumps):
+            k = int(jumps[0])
+            jump = begins[k + 1] - ends[k]
+            raise ArgumentError(f"{where} has a {what} that jumps by {jump:.6g} at t = {breaks[k + 1]:g} s, which takes an "
+                                "infinite force; pass a spline with a continuous rate, or a table, which becomes one")
+
+
+def _takes_time_alone(function: Callable[..., Any]) -> bool:
+    """Whether a function can be called with one argument; where its signature is not known it is called and seen."""
+    try:
+        inspect.signature(function).bind(0.0)
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
+
+
+def _demand_derivatives(motion: Followed, where: str, span: tuple[float, float]) -> None:
+    """Raises ArgumentError where the second of the three is not the rate of the first, or the third not that of the second, at
+    most of a few instants within a run."""
+    begin, length = min(span), abs(span[1] - span[0])
+    instants = begin + length * (np.arange(INSTANTS) + 0.5) / INSTANTS
+    here = np.array([motion.at(float(t)) for t in instants])
+    misses = np.full((INSTANTS, 2), np.inf)
+    rates = np.zeros((INSTANTS, 2))
+    for h in (step * length for step in STEPS):
+        after, before = (np.array([motion.at(float(t + sign * h)) for t in instants]) for sign in (1, -1))
+        found = (after - before)[:, :2] / (2 * h)
+        rounding = 4 * np.finfo(float).eps * np.abs(here[:, :2]) / h
+        miss = np.maximum(np.abs(found - here[:, 1:]) - rounding, 0.0)
+        rates = np.where(miss < misses, found, rates)
+        misses = np.minimum(misses, miss)
+    size = np.maximum(np.abs(here[:, 1:]).max(axis=0), np.abs(rates).max(axis=0))
+    wrong = misses > MISMATCH * size
+    for k, (what, of) in enumerate((("rate", "value"), ("acceleration", "rate"))):
+        if wrong[:, k].sum() > INSTANTS // 2:
+            j = int(np.flatnonzero(wrong[:, k])[0])
+            raise ArgumentError(f"{where} returns the {what} {here[j, k + 1]:.6g} at t = {instants[j]:.6g} s, but its {of} "
+                                f"changes by {rates[j, k]:.6g} in a second there; return value, rate and acceleration of one "
+                                "motion, or pass a spline of SciPy, which has its derivatives")
