@@ -15,3 +15,8 @@ def turns(speed_unit: str | None) -> bool:
 def is_angle(coordinate_unit: str | None) -> bool:
     """Whether a coordinate in this unit becomes a length by a length: an angle, an Euler parameter, a number."""
     return coordinate_unit in ("rad", "1")
+
+
+def force_unit(speed_unit: str | None) -> str:
+    """The unit of what does work along a speed in this unit, "" where it is not known: a moment, a force."""
+    return "N m" if turns(speed_unit) else "N" if speed_unit == "m/s" else ""

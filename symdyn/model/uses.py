@@ -17,12 +17,10 @@ from symdyn.model.quantity import quantities_in
 from symdyn.model.record import joint_speeds
 from symdyn.model.symbols import Coordinate, GivenMotion, time
 from symdyn.shown import shown
+from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
-
-# Unit of the force along a speed, by the speed's: their product is a power.
-_FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
 class Scope(IntEnum):
@@ -121,8 +119,8 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
         elif isinstance(load, JointForce):
             driven = next((j for j in joints if load.joint in (j, j.name)), None)
             for value, unit in zip(load.values, () if driven is None else driven.speed_units, strict=False):
-                if unit in _FORCES:
-                    note([value], _FORCES[unit])
+                if force_unit(unit):
+                    note([value], force_unit(unit))
         elif isinstance(load, ForceBetween):
             note([load.force], "N")
             note([*load.point_a, *load.point_b], "m")

@@ -28,6 +28,7 @@ from symdyn.runtime.statics.manifold import natural_length, natural_scales
 from symdyn.runtime.statics.selection import listed as named
 from symdyn.runtime.statics.terms import Place, coordinate_names
 from symdyn.shown import name_of
+from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -42,7 +43,6 @@ ROUNDS, SMALLEST_STEP = 60, 1e-4
 STARTS = (1.0, 30.0, 1000.0)
 # Coordinates that a message names: those with this share of the square of a direction.
 SHARE = 0.05
-_FORCES = {"rad/s": "N m", "1/s": "N m", "m/s": "N"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ def input_matrix(module: Module, t: Any, x: Any, params: Any, inputs: Any) -> La
     metadata, units = module.metadata, module.metadata["units"]
     state = take(x, metadata["x"], "x", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
     given = module.evaluate("input_matrix", t, state, params, inputs) if metadata["inputs"] else np.zeros((len(metadata["u"]), 0))
-    forces = {u: _FORCES.get(units.get(u, ""), "") for u in metadata["u"]}
+    forces = {u: force_unit(units.get(u, "")) for u in metadata["u"]}
     return Labelled(given, metadata["u"], metadata["inputs"],
                     units={**forces, **{n: units.get(n, "") for n in metadata["inputs"]}})
 
@@ -240,7 +240,7 @@ class _Balance:
         return Actuation(module, place.t, place.q, place.u, place.ud,
                          Labelled(place.inputs, metadata["inputs"], units=metadata["units"]), kept, Labelled(lam, rows),
                          tuple(n for n, known in zip(rows, sure, strict=True) if known),
-                         Labelled(place.forces, metadata["u"], units={u: _FORCES.get(metadata["units"].get(u, ""), "")
+                         Labelled(place.forces, metadata["u"], units={u: force_unit(metadata["units"].get(u, ""))
                                                                       for u in metadata["u"]}),
                          self.Z.shape[1], drive.rank, drive.condition)
 
@@ -320,7 +320,7 @@ class _Balance:
         along = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SHARE]
         told = ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in along)
         if len(along) == 1 and shares[along[0]] > 1 - 1e-9:
-            unit = _FORCES.get(metadata["units"].get(metadata["u"][along[0]], ""), "")
+            unit = force_unit(metadata["units"].get(metadata["u"][along[0]], ""))
             amount = f"{np.linalg.norm(missing) / self.scales[along[0]]:.6g} {unit}".rstrip()
         else:
             amount = f"{np.linalg.norm(missing):.6g} N (moments divided by {natural_length(place):.3g} m)"

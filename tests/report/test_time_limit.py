@@ -85,7 +85,7 @@ def test_a_form_that_is_not_reached_in_time_names_the_alternatives(monkeypatch):
 
 
 def test_a_profiler_runs_after_it():
-    """An interruption that is called off, not awaited, stays pending in CPython 3.11, which then never returns under a profiler."""
+    """CPython 3.11 takes an interruption that is called off for pending, and never returns under a profiler then."""
     program = textwrap.dedent("""
         import sys
         from symdyn.report.limit import TimeUp, within

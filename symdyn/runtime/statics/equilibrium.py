@@ -27,6 +27,7 @@ from symdyn.runtime.statics.terms import Place, coordinate_names, rest
 from symdyn.runtime.statics.uniqueness import demand_stiffness
 from symdyn.runtime.watches import WATCHES, warn
 from symdyn.shown import name_of, shown
+from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -38,7 +39,6 @@ LISTED = 4
 # Forces are compared with those so many seconds later, for whether they depend on time.
 LATER = (0.37, 1.7, 7.3)
 AT_GIMBAL_LOCK = f"there forces along its angles do not decide whether it is at rest; {REMEDY}"
-_FORCES = {"rad/s": "N m", "m/s": "N", "1/s": "N m"}
 # Coordinates below this, rad or m, are printed as zero: they are the rounding of a search.
 ROUNDED = 1e-15
 
@@ -368,7 +368,7 @@ def _raise_without_balance(search: Search, reason: str) -> NoReturn:
     forces = _left(trial)
     weighed = np.abs(np.array(list(forces.values()))) * search.columns
     order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:LISTED]
-    left = ", ".join(f"{forces[labels[k]]:.6g} {_FORCES.get(metadata['units'].get(metadata['u'][k], ''), '')}".strip()
+    left = ", ".join(f"{forces[labels[k]]:.6g} {force_unit(metadata['units'].get(metadata['u'][k], ''))}".strip()
                      + f" along {labels[k]}" for k in order)
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"], *trial.selection.unknown],
                                                        [*trial.place.q, *trial.place.z, *trial.selection.amounts(trial.place)],
@@ -465,7 +465,7 @@ def _warn_of_validity(search: Search) -> None:
         return
     k = int(np.argmax((np.abs(changes) / np.maximum(allowed, 1e-300)).max(axis=0)))
     if (np.abs(changes[:, k]) > allowed[k]).any():
-        unit = _FORCES.get(place.module.metadata["units"].get(place.module.metadata["u"][k], ""), "")
+        unit = force_unit(place.module.metadata["units"].get(place.module.metadata["u"][k], ""))
         warnings.warn(f"{name}: in equilibrium: forces depend on time, which stands still at t = {place.t:g} s: that along "
                       f"{labels[k]} changes by {np.abs(changes[:, k]).max():.3g} {unit}".rstrip() + f" within {LATER[-1]:g} s; "
                       "this is no state that lasts", SimulationWarning, stacklevel=5)

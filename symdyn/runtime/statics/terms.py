@@ -164,11 +164,6 @@ class Place:
         """Of the statics by x, (n_u + n_c + n_z, n_x)."""
         return self.whole_x[:self._statics]
 
-    @property
-    def balance_inputs(self) -> np.ndarray:
-        """Of the statics by the inputs, (n_u + n_c + n_z, n_in)."""
-        return self.whole_inputs[:self._statics]
-
     @cached_property
     def M(self) -> np.ndarray:
         """Mass matrix, (n_u, n_u)."""
