@@ -317,7 +317,8 @@ class _Balance:
         direction = self.Z @ (missing / np.linalg.norm(missing))
         labels = coordinate_names(metadata)
         shares = direction**2
-        along = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SHARE]
+        # Equal shares in the order of the coordinates, whatever rounding says.
+        along = [k for k in np.argsort(-shares.round(6), kind="stable") if shares[k] >= SHARE]
         told = ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in along)
         if len(along) == 1 and shares[along[0]] > 1 - 1e-9:
             unit = force_unit(metadata["units"].get(metadata["u"][along[0]], ""))
