@@ -92,8 +92,8 @@ def make_reference(tapes: Mapping[str, Tape], groups: Mapping[str, Sequence[str]
     groups      leaf names in the groups q, u, z, ud, inputs, p
     otherwise   function name -> the tape for states where a check of the first one fails
     samples     random states at which all functions are evaluated
-    The tolerance of a result is 1e-12, or twenty times what the same tape loses in double precision, if that is more; a result
-    that loses all digits is left out.
+    The tolerance of a result is 1e-12, or the power of ten above twenty times what the same tape loses in double precision, if
+    that is more; a result that loses all digits is left out.
     States where something is not defined (the root of a negative number, a singular mass matrix) are drawn again; a
     function that is defined at none of them is left out.
     """
@@ -255,4 +255,6 @@ def _result(name: str, tape: Tape, values: Mapping[str, Any], call: str) -> Refe
     lost = max((abs(float(a - b)) / scale for found in (double, floats) for a, b in zip(exact, found, strict=True)), default=0.0)
     if not lost < 1.0:
         return None
-    return ReferenceResult(name, len(exact), tuple(repr(float(e)) for e in exact), f"{max(1e-12, 20 * lost):.3g}", call)
+    # A power of ten, since the digits of what is lost depend on the processor, and written modules must not.
+    tolerance = f"{10.0 ** max(-12, math.ceil(math.log10(20 * lost)) if lost else -12):.0e}"
+    return ReferenceResult(name, len(exact), tuple(repr(float(e)) for e in exact), tolerance, call)
