@@ -49,7 +49,8 @@ def test_a_checked_model_prints_as_a_summary(name):
     assert len(text.splitlines()) <= 12 and text.startswith(f"{model.name}: ") and repr(model) == text
     count = len(model.coordinates)
     assert f"  {count} coordinate{'' if count == 1 else 's'}: {model.coordinates[0]}" in text
-    assert all(f"    {p}: {value}" in model.details() for p, value in model.defaults.items())
+    details = model.details()
+    assert all(f"    {p}: {value}" in details for p, value in model.defaults.items())
 
 
 def test_the_summary_names_parameters_without_a_default():
