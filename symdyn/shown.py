@@ -22,9 +22,18 @@ def shown(value: Any, length: int = LENGTH) -> str:
 
 
 def name_of(value: Any) -> str:
-    """The name of a symbol or of anything else that has one, text as it is; of the rest what `shown` makes of it."""
+    """The name of a symbol or of anything else that has one, text as it is, that of a rate or acceleration for a derivative by
+    time of SymPy's q(t); of the rest what `shown` makes of it."""
     try:
-        name = getattr(value, "name", value)
+        name = _of_derivative(value) or getattr(value, "name", value)
     except Exception:  # of a user's own class
         name = value
     return str(name) if isinstance(name, str) else shown(name)
+
+
+def _of_derivative(value: Any) -> str:
+    """q_dot for Derivative(q(t), t), "" for anything that is none."""
+    if type(value).__name__ != "Derivative":
+        return ""
+    base, order = value.args[0], value.derivative_count
+    return f"{base.name}_{'d' * int(order)}ot" if order in (1, 2) and isinstance(getattr(base, "name", None), str) else ""

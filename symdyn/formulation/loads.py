@@ -24,6 +24,7 @@ from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, To
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import SEED, Node, exact, is_zero
+from symdyn.tape.tape import reachable
 
 # Deflection of a beam's free end, by its length, that is told to be far.
 FAR = 0.2
@@ -215,7 +216,11 @@ class Loads:
         tension = self.value(load.force)
         if not is_zero(tension):
             d, length, common = self._line(load)
-            self._pull(result, load, d * (tension / length), common)
+            apply = self.algebra.recorder.apply
+            # What pulls only is slack where its ends coincide, and has no direction there.
+            slack = isinstance(tension, Node) and any(node.op in ("max", "min", "select") for node in reachable([tension]))
+            per_length = apply("select", apply("eq", tension, 0), 0, tension / length) if slack else tension / length
+            self._pull(result, load, d * per_length, common)
 
     def _pull(self, result: Applied, load: SpringDamper | ForceBetween, pull: np.ndarray, common: int) -> None:
         """The force (3,) on the first point, in the axes of a link, and the opposite on the second."""

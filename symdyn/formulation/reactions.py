@@ -23,6 +23,7 @@ from symdyn.formulation.tree import GROUND, Pose, Tree
 from symdyn.model.elements import AddedMass
 from symdyn.model.joints import Fixed, Joint, Modal
 from symdyn.model.record import joint_speeds
+from symdyn.shown import name_of
 from symdyn.spatial.inertia import Inertia
 from symdyn.spatial.vectors import cross, zeros
 from symdyn.tape.node import is_zero
@@ -76,7 +77,7 @@ def _beyond_rigid(tree: Tree, kinematics: Kinematics, motions: Sequence[LinkMoti
     numbers = {body.name: k for k, body in enumerate(model.bodies)}
     for load in model.loads:
         if isinstance(load, AddedMass):
-            k = numbers[getattr(load.body, "name", load.body)]
+            k = numbers[name_of(load.body)]
             pose = tree.poses[k]
             if pose.link != GROUND:
                 added = water.of_load(algebra, load, pose.R, pose.point(algebra.constants(load.point)))
@@ -84,7 +85,7 @@ def _beyond_rigid(tree: Tree, kinematics: Kinematics, motions: Sequence[LinkMoti
                 yield k, water.inertial_wrench(added, motions[pose.link], kinematics.twists[pose.link][1], upwards)
     for body in tree.flexible:
         joint = tree.links[body.link].joint
-        k = numbers[getattr(joint.parent, "name", joint.parent)]
+        k = numbers[name_of(joint.parent)]
         motion = base_motion(a_0) if body.root == GROUND else motions[body.root]
         yield k, body.inertial_forces(motion, w_dot[body.speeds.start:body.speeds.stop])[0]
 

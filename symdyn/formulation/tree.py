@@ -26,6 +26,7 @@ from symdyn.model.joints.base import turn
 from symdyn.model.joints.modal import exactly
 from symdyn.model.record import Model, joint_speeds
 from symdyn.model.symbols import Coordinate
+from symdyn.shown import name_of
 from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import identity, vector, zeros
 from symdyn.tape.differentiate import forward
@@ -341,7 +342,7 @@ class _Builder:
         found: dict[int, ArticulatedInertia] = {}
         for load in self.model.loads:
             if isinstance(load, AddedMass):
-                pose = poses[numbers[getattr(load.body, "name", load.body)]]
+                pose = poses[numbers[name_of(load.body)]]
                 if pose.link == GROUND:
                     continue
                 with a.section(f"load {load.label}"):

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from symdyn.model.faults import Faults
 from symdyn.model.joints.base import Joint
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, JointOrName, Scalar, Vector
 
 
 class Rod(Joint):
@@ -20,8 +23,8 @@ class Rod(Joint):
 
     kind = "rod"
 
-    def __init__(self, name: str, parent: Any, child: Any, length: Any, parent_point: Any = (0, 0, 0),
-                 child_point: Any = (0, 0, 0)) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, length: Scalar, parent_point: Vector = (0, 0, 0),
+                 child_point: Vector = (0, 0, 0)) -> None:
         super().__init__(name, parent, child, (), None, parent_point, child_point, None, None)
         self.length = self.faults.expression(length, f"rod {shown(name)}: length (m)")
         if not self.faults and self.length.is_number and not self.length > 0:
@@ -43,7 +46,7 @@ class Gear:
 
     kind = "gear"
 
-    def __init__(self, name: str, joint_a: Any, joint_b: Any, ratio: Any, offset: Any = 0) -> None:
+    def __init__(self, name: str, joint_a: JointOrName, joint_b: JointOrName, ratio: Scalar, offset: Scalar = 0) -> None:
         self.name = name
         self.joint_a, self.joint_b = joint_a, joint_b
         self.faults = Faults()

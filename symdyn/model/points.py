@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from symdyn.model.bodies import Body
 from symdyn.model.quantity import Quantity, component
+
+if TYPE_CHECKING:
+    from symdyn.given import Vector
 
 
 @dataclass(frozen=True)
@@ -27,23 +30,23 @@ class Point:
         return component(self.body, self.at, self.quantity, index)
 
 
-def position(body: Body, at: Any = (0, 0, 0)) -> Point:
+def position(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """The position of a point of a body in the n-frame, m; an output, and `[i]` a scalar for every expression."""
     return Point(body, at, "position")
 
 
-def velocity(body: Body, at: Any = (0, 0, 0)) -> Point:
+def velocity(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """The velocity of a point of a body in the n-frame, m/s; an output, and `[i]` a scalar for every expression."""
     return Point(body, at, "velocity")
 
 
-def acceleration(body: Body, at: Any = (0, 0, 0)) -> Point:
+def acceleration(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """The acceleration of a point of a body in the n-frame, under all loads, m/s^2; an output, and `[i]` a scalar for outputs,
     events and loads."""
     return Point(body, at, "acceleration")
 
 
-def jacobian(body: Body, at: Any = (0, 0, 0)) -> Point:
+def jacobian(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """J of a point of a body, (6, n_u), for `System.add_output`: [v; omega] = J u, and what given motion adds, n-frame.
 
     Rows: velocity of the point, then angular velocity of the body; in a planar system v_x, v_y, omega_z, (3, n_u).
@@ -51,7 +54,7 @@ def jacobian(body: Body, at: Any = (0, 0, 0)) -> Point:
     return Point(body, at, "jacobian")
 
 
-def bias_acceleration(body: Body, at: Any = (0, 0, 0)) -> Point:
+def bias_acceleration(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """J_dot u of a point of a body, (6,), for `System.add_output`: [a; alpha] = J u_dot + J_dot u, rows as in `jacobian`.
 
     What is left of the accelerations when u_dot = 0; given motion is part of it. m/s^2 and rad/s^2.

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
 from symdyn.model.symbols import Timed
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, JointOrName, Vector
 
 Place = tuple[sp.Expr, ...]
 
@@ -131,7 +134,7 @@ def _text(m: Measure) -> str:
     return f"{m.kind}({m.of[0]}{frame}){component}{'.' + 'd' * m.order + 'ot' if m.order else ''}"
 
 
-def component(body: Any, at: Any, quantity: str, index: int) -> Quantity:
+def component(body: BodyOrName, at: Any, quantity: str, index: int) -> Quantity:
     """A component of the position, velocity or acceleration of a point of a body, n-frame. Raises ModelError, IndexError."""
     if index not in range(3):
         raise IndexError(f"component {index!r} of a point's {quantity}; there are 0, 1 and 2 for x, y and z")
@@ -143,7 +146,7 @@ def component(body: Any, at: Any, quantity: str, index: int) -> Quantity:
                             _OF_POINTS.index(quantity)))
 
 
-def rotation_matrix(body: Any) -> sp.ImmutableMatrix:
+def rotation_matrix(body: BodyOrName) -> sp.ImmutableMatrix:
     """The rotation matrix R of a body, (3, 3): n components are R times components in body axes.
 
     Its entries are scalars that may stand in every expression, with `.dot`. Raises ModelError.
@@ -152,7 +155,7 @@ def rotation_matrix(body: Any) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix(3, 3, lambda i, j: Quantity(Measure("rotation_matrix", (name,), index=(int(i), int(j)))))
 
 
-def angular_velocity(body: Any) -> sp.ImmutableMatrix:
+def angular_velocity(body: BodyOrName) -> sp.ImmutableMatrix:
     """The angular velocity of a body, (3, 1), n-frame, rad/s; in planar systems only its third component is not zero.
 
     Its entries are scalars that may stand in every expression, with `.dot`, the angular acceleration, in outputs and events.
@@ -162,7 +165,7 @@ def angular_velocity(body: Any) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix(3, 1, lambda i, _: Quantity(Measure("angular_velocity", (name,), index=(int(i),))))
 
 
-def distance(a: Any, b: Any, point_a: Any = None, point_b: Any = None) -> Quantity:
+def distance(a: BodyOrName, b: BodyOrName, point_a: Vector | None = None, point_b: Vector | None = None) -> Quantity:
     """The distance of a point of body a from a point of body b, m, at least 0; `.dot` is its rate.
 
     point_a, point_b   where they are on their bodies, body axes, m; default: the origins
@@ -182,7 +185,7 @@ def multiplier(name: str) -> Quantity:
     return Quantity(Measure("multiplier", (_name(name, "sd.multiplier"),)))
 
 
-def reaction(joint: Any, frame: Any = None) -> sp.ImmutableMatrix:
+def reaction(joint: JointOrName, frame: Any = None) -> sp.ImmutableMatrix:
     """What a joint transmits to its child, (6, 1): force (N), then moment about the joint's point on the child (N m).
 
     frame   a body in whose axes the components are taken; default: the n-frame

@@ -172,7 +172,11 @@ def with_rates(inputs: Iterable[Input]) -> tuple[Input, ...]:
 def _make(kind: type, names: str, assumptions: dict) -> Any:
     if not isinstance(names, str) or not names.strip() or not names.isprintable():
         raise ModelError([f"names of symbols are {shown(names)}; pass text such as 'q1 q2' or 'm1:4'"])
-    return sp.symbols(names, cls=kind, **assumptions)
+    made = sp.symbols(names, cls=kind, **assumptions)
+    if time in (made if isinstance(made, (tuple, list)) else (made,)):
+        raise ModelError([f"the symbols {shown(names)} were requested, and t is the time, symdyn.t; give what t stands for here "
+                          "another name"])
+    return made
 
 
 def coordinates(names: str, **assumptions: Any) -> Any:
@@ -201,7 +205,7 @@ def motions(names: str, **assumptions: Any) -> Any:
     names   as for sympy.symbols: `z = sd.motions("z")`
     They stand where an expression in t may stand: as `coordinate=` of a joint, in constraints, in the motion of the ground, in
     loads and outputs; `z.dot` and `z.ddot` are the rate and the acceleration. `module.simulate(inputs={z: ...})` takes a
-    function of (t, x) that returns the three, a spline of SciPy, a table, or a number.
+    function of t that returns the three, a spline of SciPy, a table, or a number.
     Raises ModelError for what is no name.
 
     >>> import symdyn as sd

@@ -23,12 +23,13 @@ from symdyn.model.faults import Faults
 from symdyn.model.flexible_body import FlexibleBody, flexible_body
 from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
-from symdyn.model.orientation import EulerAngles
+from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.points import Point
 from symdyn.model.record import Model, NamedOutput, State
 from symdyn.model.shapes import Drawn, drawn
 from symdyn.model.symbols import Coordinate, as_coordinate
 from symdyn.model.sympy_vectors import as_frame, frames_of, is_dyadic, is_sympy_vector
+from symdyn.real_numbers import length_of
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from symdyn.formulation.embedding import EmbeddedEquations
     from symdyn.formulation.motion_equations import MotionEquations
     from symdyn.formulation.recursion import RecursiveEquations
+    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Numbers, Scalar, Values, Vector
+    from symdyn.model.shapes import Shape
+    from symdyn.runtime.module import Module
 
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
@@ -60,8 +64,8 @@ class System:
     every formulation raise them all in one ModelError.
     """
 
-    def __init__(self, name: str, gravity: Any = None, planar: bool | None = None,
-                 parameters: Sequence[sp.Symbol] | None = None, frame: Any = None) -> None:
+    def __init__(self, name: str, gravity: Vector | None = None, planar: bool | None = None,
+                 parameters: Sequence[sp.Symbol] | None = None, frame: Frame | None = None) -> None:
         self.name = name
         self._faults = Faults()
         self._warned: set[str] = set()
@@ -70,7 +74,7 @@ class System:
             planar = None
         frame = self._frame(frame, "the system's frame")
         if planar is None:
-            planar = hasattr(gravity, "__len__") and len(gravity) == 2
+            planar = length_of(gravity) == 2
         self.planar = planar
         self.gravity = self._faults.vector(ZERO if gravity is None else gravity, "gravity", planar, frame)
         self.ground = Body("ground", sp.S.Zero, sp.ImmutableMatrix(sp.zeros(3, 3)), sp.ImmutableMatrix(sp.zeros(3, 1)), frame)
@@ -92,13 +96,14 @@ class System:
         self.units: dict[Any, str] = {}
 
     @property
-    def frame(self) -> Any:
+    def frame(self) -> Frame:
         """The n-frame as a ReferenceFrame of SymPy, for vectors such as `force=-k*x*system.frame.x`."""
         return self.ground.frame
 
     # -- bodies and joints
 
-    def add_body(self, name: str, mass: Any = 0, inertia: Any = None, com: Any = ZERO, frame: Any = None) -> Body:
+    def add_body(self, name: str, mass: Scalar = 0, inertia: Inertia | None = None, com: Vector = ZERO,
+                 frame: Frame | None = None) -> Body:
         """Add a rigid body, or a point mass where no inertia is given.
 
         mass      kg
@@ -129,8 +134,8 @@ class System:
             self.joints.append(joint)
         return joint
 
-    def add_flexible_body(self, name: str, beam: Beam | ModalBody, coordinates: Sequence[Any] | None = None,
-                          stiffness: Any = 1, damping: Any = 1, carries: bool = True) -> FlexibleBody:
+    def add_flexible_body(self, name: str, beam: Beam | ModalBody, coordinates: Sequence[sp.Symbol] | None = None,
+                          stiffness: Scalar = 1, damping: Scalar = 1, carries: bool = True) -> FlexibleBody:
         """Add a beam that bends in assumed modes; its clamped end is a body for joints, its free end another.
 
         beam          sd.Beam(...), or its integrals
@@ -162,7 +167,7 @@ class System:
             self.loops.append(joint)
         return joint
 
-    def add_coordinate(self, *coordinates: Any) -> None:
+    def add_coordinate(self, *coordinates: sp.Expr) -> None:
         """Coordinates that no joint has for its own, to be used in the expressions of joints: with an absolute angle phi,
         the joint after one with angle q takes coordinate=phi - q."""
         for given in coordinates:
@@ -174,8 +179,8 @@ class System:
                                     "them "
                                     "one by one")
 
-    def move_ground(self, position: Any = ZERO, angles: Sequence[Any] = ZERO, sequence: str = "ZYX") -> None:
-        """Give the ground a prescribed motion: position (m) and Euler angles (rad), functions of t and parameters."""
+    def move_ground(self, position: Vector = ZERO, angles: Sequence[Scalar] = ZERO, sequence: str = "ZYX") -> None:
+        """Give the ground a prescribed motion: position (m) and Euler angles (rad), of t, motions (sd.motions) and parameters."""
         p = self._faults.vector(position, "move_ground: position", self.planar)
         turned = self._faults.vector(angles, "move_ground: angles")
         moving = Free("ground_motion", "inertial", "ground", ZERO * 2, EulerAngles(sequence))
@@ -184,8 +189,8 @@ class System:
 
     # -- loads
 
-    def add_force(self, body: Any, force: Any, point: Any = None, frame: Any = None, reaction: Any = None,
-                  name: str = "") -> None:
+    def add_force(self, body: BodyOrName, force: Vector, point: Vector | None = None, frame: BodyOrName | None = None,
+                  reaction: BodyOrName | None = None, name: str = "") -> None:
         """A force (N) on a body.
 
         point     where it acts, body axes, m; default: the centre of mass
@@ -198,7 +203,8 @@ class System:
         frame, axes = self._written_in(force, frame, label)
         self.loads.append(Force(body, self._faults.vector(force, label, self.planar, axes), at, frame, reaction, label))
 
-    def add_torque(self, body: Any, torque: Any, frame: Any = None, reaction: Any = None, name: str = "") -> None:
+    def add_torque(self, body: BodyOrName, torque: Scalar | Vector, frame: BodyOrName | None = None,
+                   reaction: BodyOrName | None = None, name: str = "") -> None:
         """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force."""
         label = self._label(name, f"torque_{len(self.loads) + 1}")
         if self.planar and not hasattr(torque, "__len__") and not is_sympy_vector(torque):
@@ -206,13 +212,13 @@ class System:
         frame, axes = self._written_in(torque, frame, label)
         self.loads.append(Torque(body, self._faults.vector(torque, label, frame=axes), frame, reaction, label))
 
-    def add_joint_force(self, joint: Any, value: Any, name: str = "") -> None:
+    def add_joint_force(self, joint: JointOrName, value: Scalar | Sequence[Scalar], name: str = "") -> None:
         """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
         label = self._label(name, f"joint_force_{len(self.loads) + 1}")
         self.loads.append(JointForce(joint, self._faults.expressions(value, label), label))
 
-    def add_spring_damper(self, body_a: Any, body_b: Any, point_a: Any = ZERO, point_b: Any = ZERO, stiffness: Any = 0,
-                          damping: Any = 0, length: Any = 0, name: str = "") -> None:
+    def add_spring_damper(self, body_a: BodyOrName, body_b: BodyOrName, point_a: Vector = ZERO, point_b: Vector = ZERO,
+                          stiffness: Scalar = 0, damping: Scalar = 0, length: Scalar = 0, name: str = "") -> None:
         """A spring (N/m, unstretched length m) and damper (N s/m) between a point of body_a and one of body_b.
 
         Both ends are pulled by stiffness (distance - length) + damping times the rate of the distance. Stiffness, damping and
@@ -227,8 +233,8 @@ class System:
             f.expression(stiffness, f"{label}: stiffness"), f.expression(damping, f"{label}: damping"),
             f.expression(length, f"{label}: length"), label))
 
-    def add_force_between(self, body_a: Any, body_b: Any, force: Any, point_a: Any = None, point_b: Any = None,
-                          name: str = "") -> None:
+    def add_force_between(self, body_a: BodyOrName, body_b: BodyOrName, force: Scalar, point_a: Vector | None = None,
+                          point_b: Vector | None = None, name: str = "") -> None:
         """A force (N) along the line of a point of body_a and a point of body_b; positive where it draws them together.
 
         force   any expression, such as a law in d = sd.distance(body_a, body_b, point_a, point_b) and its rate d.dot: a rope
@@ -253,7 +259,7 @@ class System:
 
     # -- outputs, states, constraints
 
-    def add_output(self, name: str, value: Any) -> None:
+    def add_output(self, name: str, value: Scalar | Vector | Point) -> None:
         """A named output: an expression in coordinates, speeds, states, inputs, t and parameters, a list of them, or
         a point of a body: sd.position, sd.velocity, sd.acceleration, sd.jacobian, sd.bias_acceleration(body, point)."""
         if isinstance(value, Point):
@@ -265,7 +271,7 @@ class System:
             taken = self._faults.expression(value, f"output {shown(name)}")
         self.outputs.append(NamedOutput(name, taken))
 
-    def add_state(self, symbol: Any, rate: Any) -> None:
+    def add_state(self, symbol: sp.Expr, rate: Scalar) -> None:
         """An extra state z with z_dot = rate: of an actuator, a filter, a controller.
 
         symbol   what z is in the expressions of rates, loads and outputs: made by sd.coordinates("z"), or a symbol of SymPy's
@@ -278,8 +284,8 @@ class System:
             taken = Coordinate(f"state_{len(self.states) + 1}")
         self.states.append(State(taken, self._faults.expression(rate, f"rate of state {symbol}")))
 
-    def add_constraint(self, expression: Any, name: str = "") -> None:
-        """A constraint expression = 0 in coordinates and t; with speeds, linear in them, a velocity constraint."""
+    def add_constraint(self, expression: Scalar, name: str = "") -> None:
+        """A constraint expression = 0 in coordinates, motions and t; with speeds, linear in them, a velocity constraint."""
         unnamed = name is None or (isinstance(name, str) and not name)
         label = f"constraint_{len(self.constraints) + 1}" if unnamed else name
         faults = len(self._faults)
@@ -287,8 +293,8 @@ class System:
         if len(self._faults) == faults:
             self.constraints.append(Constraint(label, taken))
 
-    def add_event(self, name: str, value: Any, direction: int = 0, stop: bool = False,
-                  reset: Mapping[Any, Any] | None = None) -> None:
+    def add_event(self, name: str, value: Scalar, direction: int = 0, stop: bool = False,
+                  reset: Mapping[Any, Scalar] | None = None) -> None:
         """An event where a value passes zero: its time and state are found and recorded in every simulation.
 
         Within every step the value is sampled as finely as it varies, so that zeros close together are found as well (see
@@ -306,7 +312,7 @@ class System:
         """
         self.events.append(make_event(self._faults, name, value, direction, stop, reset))
 
-    def draw(self, body: Any, *shapes: Any, color: Any = None) -> None:
+    def draw(self, body: BodyOrName, *shapes: Shape, color: str | Sequence[float] | None = None) -> None:
         """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
 
         color   text such as '#3377aa', '0.8' or 'orange', or three numbers from 0 to 1; default: one for each body
@@ -353,7 +359,7 @@ class System:
 
         return recursive(self.check(), frames)
 
-    def augmented(self, coordinates: str = "relative", orientation: Any = None,
+    def augmented(self, coordinates: str = "relative", orientation: EulerAngles | EulerParameters | None = None,
                   frames: str = "parallel") -> AugmentedEquations:
         """The augmented equations M u_dot + C_r^T lam = F - k, C_r u_dot = F_d with multipliers lam.
 
@@ -370,7 +376,7 @@ class System:
 
         return augment(self.check(), coordinates, orientation, frames)
 
-    def diagnose(self, q: Any = None, params: Any = None, t: float = 0.0, coordinates: str = "relative",
+    def diagnose(self, q: Values | None = None, params: Values | None = None, t: float = 0.0, coordinates: str = "relative",
                  reach: float = math.pi) -> Diagnosis:
         """What the constraints do: freedoms, redundant and contradictory constraints, singular configurations, idle motions.
 
@@ -399,7 +405,7 @@ class System:
         return choose(self.check(), tune)
 
     def compile(self, backend: str | None = None, tune: bool = False, templates: str | os.PathLike[str] | None = None,
-                specialize: Mapping[Any, float] | None = None) -> Any:
+                specialize: Numbers | None = None) -> Module:
         """A numeric module of `equations(tune)`.
 
         backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
@@ -466,7 +472,7 @@ class System:
                   if things]
         return f"System({shown(self.name)}, {', '.join(parts)})"
 
-    def set_defaults(self, defaults: Mapping[Any, float]) -> System:
+    def set_defaults(self, defaults: Numbers) -> System:
         """Add numbers for parameters; returns the system."""
         self.defaults.update(defaults)
         return self

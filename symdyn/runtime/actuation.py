@@ -21,7 +21,7 @@ from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.arguments import some, take
 from symdyn.runtime.consistent import NotConsistent, check_start, closest, normalised, number, smallest_acceleration
 from symdyn.runtime.constraints import CONSISTENT, counted, listed, names, unique
-from symdyn.runtime.inputs import RATES
+from symdyn.runtime.following import motion_inputs
 from symdyn.runtime.labelled import Labelled
 from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.statics.manifold import natural_length, natural_scales
@@ -149,7 +149,7 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
         place = place.at(ud=smallest_acceleration(module, time, x, p, rates, -gaps, kept))
     else:
         _demand_accelerations(place, gaps)
-    motions = [f"{n}{end}" for n in metadata.get("motions", ()) for end in ("", *RATES)]
+    motions = motion_inputs(metadata)
     free = [k for k, n in enumerate(metadata["inputs"]) if n not in {*given, *motions}]
     return _Balance(place, free).solved((*given, *motions))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,18 +11,29 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, real
-from symdyn.runtime.raised import called
+from symdyn.runtime.raised import InputRaised, called
 from symdyn.runtime.tables import ORDER, ROUNDING, Pieces, Table
 from symdyn.shown import shown
 
-# At so many instants within a run it is looked whether rates and accelerations are those of the values; a motion that has a kink
-# at one of them passes, one that is wrong at more than half of them does not.
-INSTANTS = 9
+# At so many instants within a run differences of the values are compared with the rates, and so on.
+INSTANTS = 60
 # Steps of the differences, parts of the run, and by how much they may be off, relative to the motion's own size in the run.
-STEPS = (1e-4, 1e-6)
+STEPS = (1e-4, 1e-6, 1e-8, 1e-10)
 MISMATCH = 1e-3
+# So many intervals between the instants, those that fit worst, are halved so often in search of a jump, which is one if it is
+# more than this part of the motion's size.
+SEARCHED, HALVINGS, JUMPED = 8, 40, 1e-6
 # A spline whose value or rate jumps by more than this part of its size at a break has no acceleration there.
 JUMP = 1e-9
+NO_STATE = np.zeros(0)
+PARTS = ("value", "rate", "acceleration")
+# What the names of a motion's rate and acceleration end in.
+RATES = ("_dot", "_ddot")
+
+
+def motion_inputs(metadata: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the inputs that belong to motions: values, rates and accelerations."""
+    return tuple(f"{name}{end}" for name in metadata.get("motions", ()) for end in ("", *RATES))
 
 
 @dataclass(frozen=True)
@@ -48,21 +59,26 @@ class Followed:
         """Of value, rate and acceleration."""
         return [self.place, self.place + 1, self.place + 2]
 
-    def at(self, t: float) -> np.ndarray:
-        """Value, rate and acceleration, (3,). Raises InputRaised from what the function raises, ArgumentError for what it must
-        not return."""
+    def at(self, t: float, x: np.ndarray = NO_STATE) -> np.ndarray:
+        """Value, rate and acceleration, (3,); x: the state there, for messages.
+
+        Raises InputRaised from what the function raises and for what is not finite, ArgumentError for what it must not return.
+        """
         if self.function is None:
             assert self.pieces is not None
             return self.pieces.at(t)
         function = self.function
-        given = called(lambda t, x: function(t), t, np.zeros(0), f"the motion {self.name}")
+        given = called(function, t, x, f"the motion {self.name}", of_time=True)
         try:
-            values = real(given).reshape(-1)
-        except NotReal:
-            values = np.zeros(0)
+            values, why = real(given).reshape(-1), ""
+        except NotReal as error:
+            values, why = np.zeros(0), f": {error}"
         if len(values) != 3:
             raise ArgumentError(f"the motion {self.name} returned {shown(given)} at t = {t:.6g}; needed are three numbers: "
-                                "value, rate and acceleration")
+                                f"value, rate and acceleration{why}")
+        if not np.isfinite(values).all():
+            told = ", ".join(f"{what} {value:g}" for what, value in zip(PARTS, values, strict=True) if not np.isfinite(value))
+            raise InputRaised(f"the motion {self.name} has the {told} at t = {t:.6g}", t, x)
         return values
 
 
@@ -108,7 +124,7 @@ def take_motion(given: Any, name: str, place: int, owner: str, span: tuple[float
                             "that returns value, rate and acceleration")
     motion = Followed(name, place, None, given, (), smooth)
     if span is not None:
-        _demand_derivatives(motion, where, span)
+        _demand_motion(motion, where, span)
     return motion
 
 
@@ -139,8 +155,8 @@ def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float
     if span is not None and spline.extrapolate != "periodic":
         slack = ROUNDING * max(abs(breaks[0]), abs(breaks[-1]), *map(abs, span))
         if not breaks[0] - slack <= min(span) or not max(span) <= breaks[-1] + slack:
-            raise ArgumentError(f"{where} holds from t = {breaks[0]:g} s to {breaks[-1]:g} s, and the run goes from "
-                                f"{min(span):g} s to {max(span):g} s; pass one of the whole run")
+            raise ArgumentError(f"{where} holds from t = {breaks[0]:.9g} s to {breaks[-1]:.9g} s, and the run goes from "
+                                f"{min(span):.9g} s to {max(span):.9g} s; pass one of the whole run (its ends are not held)")
     _demand_continuous(breaks, c, where)
     if len(c) > ORDER or spline.extrapolate == "periodic":
         rate, acceleration = spline.derivative(1), spline.derivative(2)
@@ -193,26 +209,66 @@ def _takes_time_alone(function: Callable[..., Any]) -> bool:
     return True
 
 
-def _demand_derivatives(motion: Followed, where: str, span: tuple[float, float]) -> None:
-    """Raises ArgumentError where the second of the three is not the rate of the first, or the third not that of the second, at
-    most of a few instants within a run."""
+def _demand_motion(motion: Followed, where: str, span: tuple[float, float]) -> None:
+    """Raises ArgumentError where the second of the three is not the rate of the first, or the third not that of the second, and
+    where the value or the rate jumps, as far as instants within a run show it. What the function raises is left to the run."""
     begin, length = min(span), abs(span[1] - span[0])
-    instants = begin + length * (np.arange(INSTANTS) + 0.5) / INSTANTS
-    here = np.array([motion.at(float(t)) for t in instants])
-    misses = np.full((INSTANTS, 2), np.inf)
-    rates = np.zeros((INSTANTS, 2))
-    for h in (step * length for step in STEPS):
-        after, before = (np.array([motion.at(float(t + sign * h)) for t in instants]) for sign in (1, -1))
-        found = (after - before)[:, :2] / (2 * h)
-        rounding = 4 * np.finfo(float).eps * np.abs(here[:, :2]) / h
-        miss = np.maximum(np.abs(found - here[:, 1:]) - rounding, 0.0)
+    # Evenly spread, though off the round times at which motions are composed of pieces.
+    instants = begin + length * (np.arange(INSTANTS) + 0.5 * np.sqrt(np.arange(INSTANTS) % 7 / 7 + 0.1)) / INSTANTS
+    try:
+        rows = np.array([motion.at(float(t)) for t in instants])
+        _demand_derivatives(motion, where, instants, rows, length)
+        _demand_no_jump(motion, where, instants, rows)
+    except InputRaised:
+        return
+
+
+def _demand_derivatives(motion: Followed, where: str, instants: np.ndarray, rows: np.ndarray, length: float) -> None:
+    """Differences to either side, one of which may go over a kink, compared with what the function (n, 3) returns."""
+    size = np.abs(rows[:, 1:]).max(axis=0)
+    misses = np.full((len(instants), 2), np.inf)
+    rates = np.zeros((len(instants), 2))
+    for h in (sign * step * length for step in STEPS for sign in (1, -1)):
+        away = np.array([motion.at(float(t + h)) for t in instants])
+        # A step of Euler, half of it with the next derivative, which the rates know of themselves.
+        found = (away - rows)[:, :2] / h - np.column_stack([(away - rows)[:, 1] / 2, np.zeros(len(rows))])
+        rounding = 4 * np.finfo(float).eps * np.abs(rows[:, :2]) / abs(h)
+        miss = np.maximum(np.abs(found - rows[:, 1:]) - rounding, 0.0)
         rates = np.where(miss < misses, found, rates)
         misses = np.minimum(misses, miss)
-    size = np.maximum(np.abs(here[:, 1:]).max(axis=0), np.abs(rates).max(axis=0))
-    wrong = misses > MISMATCH * size
+    wrong = misses > MISMATCH * np.maximum(size, np.abs(rates).max(axis=0))
     for k, (what, of) in enumerate((("rate", "value"), ("acceleration", "rate"))):
-        if wrong[:, k].sum() > INSTANTS // 2:
+        if wrong[:, k].any():
             j = int(np.flatnonzero(wrong[:, k])[0])
-            raise ArgumentError(f"{where} returns the {what} {here[j, k + 1]:.6g} at t = {instants[j]:.6g} s, but its {of} "
+            raise ArgumentError(f"{where} returns the {what} {rows[j, k + 1]:.6g} at t = {instants[j]:.6g} s, but its {of} "
                                 f"changes by {rates[j, k]:.6g} in a second there; return value, rate and acceleration of one "
                                 "motion, or pass a spline of SciPy, which has its derivatives")
+
+
+def _demand_no_jump(motion: Followed, where: str, instants: np.ndarray, rows: np.ndarray) -> None:
+    """Looks for jumps of value and rate between instants: there the change is not that by the derivative at both ends, however
+    short the interval."""
+    sizes = np.ptp(rows[:, :2], axis=0) + np.abs(np.diff(instants)).max() * np.abs(rows[:, 1:]).max(axis=0)
+
+    def gaps(t: np.ndarray, at: np.ndarray) -> np.ndarray:
+        missing: np.ndarray = np.abs(np.diff(at[:, :2], axis=0) - np.diff(t)[:, None] * (at[1:, 1:] + at[:-1, 1:]) / 2)
+        return missing
+
+    worst = gaps(instants, rows)
+    for part, what in enumerate(PARTS[:2]):
+        for j in np.argsort(-worst[:, part])[:SEARCHED]:
+            if not worst[j, part] > JUMPED * sizes[part]:
+                break
+            t, at = instants[j:j + 2], rows[j:j + 2]
+            for _ in range(HALVINGS):
+                middle = t.mean()
+                t, at = np.insert(t, 1, middle), np.insert(at, 1, motion.at(float(middle)), axis=0)
+                left = gaps(t, at)[:, part]
+                half = int(left.argmax())
+                if not left[half] > JUMPED * sizes[part]:  # the motion only varies quickly here
+                    break
+                t, at = t[half:half + 2], at[half:half + 2]
+            else:
+                jump = float(at[1, part] - at[0, part])
+                raise ArgumentError(f"{where} has a {what} that jumps by {jump:.6g} at t = {t[1]:.6g} s, which takes an infinite "
+                                    "force; return a motion with a continuous rate, such as a spline through its points")

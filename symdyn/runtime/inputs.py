@@ -13,14 +13,11 @@ import numpy as np
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, number, real
 from symdyn.runtime.arguments import take
-from symdyn.runtime.following import Followed, Motions, take_motion
+from symdyn.runtime.following import RATES, Followed, Motions, take_motion
 from symdyn.runtime.raised import InputRaised, called
 from symdyn.runtime.sampled import Record, Sampled, Sampler
 from symdyn.runtime.tables import Pieces, Table, joined
 from symdyn.shown import name_of, shown
-
-# What the names of a motion's rate and acceleration end in.
-RATES = ("_dot", "_ddot")
 
 
 @dataclass(frozen=True)
@@ -72,7 +69,7 @@ class Mixed:
                 raise ArgumentError(f"the function of input {name} returned {shown(value)} at t = {t:.6g}; needed is a "
                                     f"number: {error}") from None
         for motion in self.followed:
-            values[motion.places] = motion.at(t)
+            values[motion.places] = motion.at(t, x)
         return values
 
 

@@ -367,7 +367,9 @@ class Module:
         q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
         params      as everywhere in Module
         inputs      numbers; a table: (times, values), or a symdyn.Table; a function of (t, x); sd.Sampled(function, period) for a
-                    controller whose value is held between its instants, at which steps end; or a mapping from names to these
+                    controller whose value is held between its instants, at which steps end; or a mapping from names to these.
+                    A motion (sd.motions): a function of t that returns value, rate and acceleration, a spline of SciPy, a
+                    table, or a number
         interpolation, extend   of tables that are pairs: "linear" or "cubic", a smooth spline (steps end at the times of both);
                     beyond the first and the last time "error", or "hold": the first value, and the last one
         rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol

@@ -28,10 +28,11 @@ class InputRaised(EvaluationError):
         return str(self.args[0])
 
 
-def called(function: Callable[[float, np.ndarray], Any], t: float, x: np.ndarray, what: str) -> Any:
-    """What a function of inputs returns; what: how messages call it. Raises InputRaised from whatever the function raises."""
+def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, of_time: bool = False) -> Any:
+    """What a function of inputs returns; what: how messages call it; of_time: it takes t alone. Raises InputRaised from whatever
+    the function raises."""
     try:
-        return function(t, x)
+        return function(t) if of_time else function(t, x)
     except InputRaised:
         raise
     except Exception as error:  # whatever it is, it is the user's

@@ -28,6 +28,7 @@ from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.memory import demand
 from symdyn.runtime.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
 from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.sampled import check_span
 from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.solution import Solution
@@ -79,7 +80,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if bar is not None:
             stack.callback(bar.close)
             stack.enter_context(module.noting(lambda name: bar.set_description(_underway(module, name))))
-        check_start(module, span[0], start, p)
+        with contextlib.suppress(InputRaised):  # the run ends with it, as with what raises later
+            check_start(module, span[0], start, p)
         why = ""
         if isinstance(method, str) and method == "auto":
             blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())

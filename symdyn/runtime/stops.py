@@ -65,7 +65,7 @@ def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.nda
 
 def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:
     """When, where and why a run stopped."""
-    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=True))
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=False))
     return f"{metadata['name']}: stopped at t = {t:.9g}: {reason}; the state there: {state}"
 
 

@@ -71,8 +71,9 @@ class Table:
         if times.ndim != 1 or len(times) == 0 or values.ndim not in (1, 2) or len(values) != len(times):
             raise ArgumentError(f"a table of inputs has times of shape {times.shape} and values of shape {values.shape}; give "
                                 "one row of values for each time")
-        if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
-            raise ArgumentError("the times of a table of inputs must increase, and all of it be finite")
+        wrong = _first_wrong(times, values)
+        if wrong:
+            raise ArgumentError(f"the times of a table of inputs must increase, and all of it be finite, found {wrong}")
         object.__setattr__(self, "times", fixed(times))
         object.__setattr__(self, "values", fixed(values))
 
@@ -99,6 +100,16 @@ class Table:
         if self.extend == "hold" or (first - slack <= begin and end <= last + slack):
             return ""
         return f"holds from t = {first:g} s to {last:g} s, and the run goes from {begin:g} s to {end:g} s"
+
+
+def _first_wrong(times: np.ndarray, values: np.ndarray) -> str:
+    """The first entry that is not finite, or the first time that does not come after the one before; "" if there is none."""
+    for what, array in (("time", times), ("value", values)):
+        rows = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(axis=1))
+        if len(rows):
+            return f"the {what} {array[rows[0]]} in row {rows[0]}"
+    late = np.flatnonzero(np.diff(times) <= 0)
+    return f"the time {times[late[0] + 1]:g} after {times[late[0]]:g} in row {late[0] + 1}" if len(late) else ""
 
 
 def joined(parts: Sequence[tuple[Sequence[int], Pieces]], constant: np.ndarray) -> Pieces:

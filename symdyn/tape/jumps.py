@@ -41,6 +41,10 @@ def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
             surface, smooth = node.args[0], "tanh(({s})/eps) in place of sign({s})"
         elif node.op in _COMPARED:
             surface, smooth = recorder.sub(*node.args), "(1 + tanh(({s})/eps))/2 as the weight of the two sides"
+        elif node.op == "atan2":  # by a full turn, where the second argument is negative or zero
+            surface, smooth = node.args[0], "an angle that does not pass pi"
+        elif node.op == "div" and (factor := _direction(node.args[1])) is not None:
+            surface, smooth = factor, "sqrt(({s})**2 + eps**2) in the denominator"
         elif node.op in _ROUNDED:
             nearest = recorder.apply("floor", recorder.add(node.args[0], _ROUNDED[node.op]))
             surface, smooth = recorder.sub(node.args[0], nearest), "a smooth step within eps of each whole number"
@@ -51,6 +55,24 @@ def jumps(recorder: Recorder, entries: Sequence[Any]) -> list[Jump]:
             if surface not in found and opposite not in found:
                 found[surface] = Jump(surface, node, smooth)
     return list(found.values())
+
+
+def _direction(denominator: Any) -> Any:
+    """The v of a denominator with |v| or sqrt(v^2) as a factor, by which v/|v| jumps like a sign; None without one."""
+    for factor in _factors(denominator):
+        if factor.op == "abs":
+            return factor.args[0]
+        if factor.op == "sqrt" and isinstance(factor.args[0], Node) and factor.args[0].op == "mul":
+            first, second = factor.args[0].args
+            if first is second:
+                return first
+    return None
+
+
+def _factors(value: Any) -> list[Node]:
+    if not isinstance(value, Node):
+        return []
+    return [f for part in value.args for f in _factors(part)] if value.op in ("mul", "neg") else [value]
 
 
 def description(jump: Jump, symbols: Any) -> dict[str, str]:

@@ -388,7 +388,7 @@ def test_typeset_as_one_matrix():
     (([x, y], [m, m], None, [x.dot * y.dot]), ["constraint_1, x_dot*y_dot = 0, is not linear in the speed x_dot"]),
     (([x, y], [m, m], None, [x, x.dot**2 - 1]), ["constraint_2", "not linear in the speed x_dot"]),
     (([x, y], [m, m], None, [x, l - a]), ["constraint_2, -a + l = 0, has no coordinate or speed in it"]),
-    (([x, y], [m, m], None, [x - F_x]), ["constraint_1 uses F_x; a constraint may use coordinates, speeds, t and parameters"]),
+    (([x, y], [m, m], None, [x - F_x]), ["constraint_1 uses F_x; a constraint may use coordinates, motions, t and parameters"]),
     (([x, y], [m * x, m], None, [x]), ["mass depends on x, but must be constant"]),
     (([x, y], [m, F_x], None, [x]), ["mass uses the input F_x; it may use parameters only"]),
     (([x, y], [-1, m], None, [x]), ["mass[1, 1] is -1"]),

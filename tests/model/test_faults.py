@@ -139,7 +139,7 @@ SPATIAL: dict[str, Case] = {
     "coordinate driven by nobody": (lambda s: joined(s, sd.Revolute, 2 * q9),
                                     "joint 'wrist': coordinates uses q9, which no joint|coordinates: q1, q2"),
     "coordinate of a rate": (lambda s: joined(s, sd.Revolute, 2 * q1.dot), "joint 'wrist': its coordinate 2*q1_dot uses q1_dot|"
-                             "may use coordinates, t and parameters"),
+                             "may use coordinates, motions, t and parameters"),
     "coordinate an input": (lambda s: joined(s, sd.Revolute, tau), "joint 'wrist': its coordinate tau uses tau"),
     "Euler parameters given": (lambda s: joined(s, sd.Spherical, [1, 0, 0, sp.sin(sd.t)], sd.EulerParameters()),
                                "joint 'wrist': with Euler parameters every coordinate must be a symbol|use Euler angles"),

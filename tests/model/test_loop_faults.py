@@ -151,7 +151,7 @@ CHECKED: dict[str, Case] = {
     "product of speeds": (lambda s: s.add_constraint(q1.dot * q2.dot), "is not linear in the speed q1_dot"),
     "function of a speed": (lambda s: s.add_constraint(q1 + sp.sin(q2.dot)), "is not linear in the speed q2_dot"),
     "input": (lambda s: s.add_constraint(q1 - tau),
-              "constraint_1 uses tau; a constraint may use coordinates, speeds, t and parameters"),
+              "constraint_1 uses tau; a constraint may use coordinates, motions, t and parameters"),
     "state": (lambda s: [s.add_state(w, 1), s.add_constraint(q1 - w)], "constraint_1 uses w; a constraint may use coordinates"),
     "text": (lambda s: s.add_constraint(EVIL), "constraint_1 is the text|never evaluated"),
     "equation": (lambda s: s.add_constraint(sp.Eq(q1, q2)), "constraint_1 is Eq(q1, q2)|pass a scalar expression"),

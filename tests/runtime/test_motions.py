@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline, UnivariateSpline, make_interp_spline
 import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError
 from symdyn.formulation.equations import Equations
+from symdyn.runtime.following import take_motion
 
 z = sd.motions("z")
 q, q2 = sd.coordinates("q q2")
@@ -246,6 +247,10 @@ def test_equations_by_hand_take_motions() -> None:
     (lambda t: (np.sin(t), np.cos(t), np.sin(t)), "returns the acceleration .* but its rate changes by"),
     (lambda t: np.sin(t), "needed are three numbers: value, rate and acceleration"),
     (lambda t, x: (0, 0, 0), "is a function of more than t"),
+    (lambda t: (np.sin(t), np.cos(t), -np.sin(t) if t < 3.7 else 0.0), "returns the acceleration 0 at t = "),
+    (lambda t: (t, 1, 0) if t < 1.03 else (1.03, 0, 0), "has a rate that jumps by -1 at t = 1.03 s"),
+    (lambda t: (np.sin(t) + 5 * (t > 3.9), np.cos(t), -np.sin(t)), "has a value that jumps by 5 at t = 3.9 s"),
+    (lambda t: (1j, 0, 0), "needed are three numbers: value, rate and acceleration: .*complex"),
     (make_interp_spline([0, 1, 4], [0, 1, 0], k=1), "has a rate that jumps by -1.33333 at t = 1 s"),
     (CubicSpline([0, 1, 2], [0, 1, 0]), "holds from t = 0 s to 2 s, and the run goes from 0 s to 4 s"),
     (sd.Table([0, 1, 2], [0, 1, 0]), "holds from t = 0 s to 2 s"),
@@ -267,6 +272,50 @@ def test_what_is_no_motion(cart: tuple, given, message: str) -> None:
 def test_inputs_that_contradict_a_motion(cart: tuple, inputs, message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
         cart[0].simulate((0, 4), [0.3], [1.1], inputs=inputs)
+
+
+def test_what_a_function_raises_ends_the_motion(cart: tuple) -> None:
+    def broken(t: float) -> tuple[float, float, float]:
+        return {}["road"], 0.0, 0.0
+
+    message = r"the motion z \(broken\) raised KeyError: 'road', in line \d+ of test_motions.py"
+    with pytest.warns(sd.SimulationWarning, match=message):
+        sol = cart[0].simulate((0, 1), [0.3], [1.1], inputs={z: broken})
+    assert not sol.success and isinstance(sol.cause, KeyError)
+    with pytest.warns(sd.SimulationWarning, match="the motion z has the value nan at t = "):
+        sol = cart[0].simulate((0, 1), [0.3], [1.1], inputs={z: lambda t: (t if t < 0.5 else np.nan, 1.0, 0.0)})
+    assert not sol.success and 0 < sol.t[-1] < 0.6
+
+
+@pytest.mark.parametrize("motion", [
+    lambda t: (np.sin(500 * t), 500 * np.cos(500 * t), -250000 * np.sin(500 * t)),
+    lambda t: (t**2 / 2, t, 1) if t < 1.03 else (1.03**2 / 2 + 1.03 * (t - 1.03), 1.03, 0),
+    lambda t: (0, 0, 0) if t < 0.5 else ((t - 0.5)**3, 3 * (t - 0.5)**2, 6 * (t - 0.5)),
+    lambda t: (1e6 + np.sin(t), np.cos(t), -np.sin(t)), lambda t: (1e-9 * np.sin(t), 1e-9 * np.cos(t), -1e-9 * np.sin(t))])
+def test_motions_that_are_right_pass(motion) -> None:
+    for span in ((0.0, 2.0), (0.0, 400.0), (3.0, 0.0)):
+        assert take_motion(motion, "z", 0, "cart", span, False).name == "z"
+
+
+def test_a_regulator_drives_other_inputs_than_motions() -> None:
+    force, x = sd.inputs("F"), sd.coordinates("x")
+    system = sd.System("quarter", gravity=[0, 0])
+    body = system.add_body("body", 1)
+    system.add_joint(sd.Prismatic("slide", "ground", body, x, axis=[1, 0]))
+    system.add_joint_force("slide", force - 10 * (x - z) - 0.5 * (x.dot - z.dot))
+    module = system.compile(backend="numpy")
+    linear = module.linearize(module.equilibrium())
+    regulator = linear.lqr({x: 1}, {force: 1})
+    assert regulator.driven == ("F",) and regulator.K.shape == (1, 2)
+    sol = module.simulate((0, 1), inputs={force: regulator[force], z: as_function}, rtol=1e-6)
+    held = module.simulate((0, 1), inputs={force: sd.Sampled(regulator["F"], 1e-3), z: as_function}, rtol=1e-6)
+    assert np.abs(sol.x[-1] - held.x[-1]).max() < 1e-3 and np.ptp(sol.inputs[:, 0]) > 0
+    with pytest.raises(ArgumentError, match="R has weights of z, which belong to a motion"):
+        linear.lqr({x: 1}, {force: 1, z: 1})
+    with pytest.raises(ArgumentError, match="R has no weights, so there is nothing to drive; give weights of inputs: F"):
+        linear.lqr({x: 1}, {})
+    with pytest.raises(ArgumentError, match="the regulator does not drive 'z'; it drives F"):
+        regulator[z]
 
 
 def test_what_may_not_follow_rates_of_motions() -> None:

@@ -94,7 +94,8 @@ def test_arguments_that_fit_no_order_are_reported(double: Any) -> None:
         module.mass_matrix(0.1, [2.0])
     np.testing.assert_allclose(module.mass_matrix(q=0.1, params=[2.0]), [[1.0]])
     for call, message in (
-            (lambda: double.mass_matrix(X[:2], None, 0.0, 1.0), r"takes 3 arguments at most, found 4; call mass_matrix\(t, x"),
+            (lambda: double.mass_matrix(X[:2], None, 0.0, None, 1.0),
+             r"takes 4 arguments at most, found 5; call mass_matrix\(t, x"),
             (lambda: double.energy(X[:2], X[2:], u=X[2:]), "energy got u twice, with a name and by place"),
             (lambda: double.energy(params=None), "energy needs a state; call energy"),
             (lambda: double.energy(0.0, X, q=X[:2]), "energy got the state x and its parts, too")):

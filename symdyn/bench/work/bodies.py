@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symdyn import rotation
+from symdyn.model.bodies import Body
 from symdyn.model.joints import Spherical
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.symbols import coordinates, parameters, speeds
@@ -82,7 +83,7 @@ def heavy_top(orientation: str = "angles") -> System:
     return system
 
 
-def _hold(system: System, body: object, orientation: str, sequence: str, angles: Sequence[float], rates: Sequence[float],
+def _hold(system: System, body: Body, orientation: str, sequence: str, angles: Sequence[float], rates: Sequence[float],
           omega: Sequence[float]) -> None:
     """Hold a body at its origin, and start it: Euler angles with their rates, or Euler parameters with the angular velocity in
     body axes."""

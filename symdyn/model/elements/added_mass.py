@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from symdyn.model.elements.checks import least_eigenvalue
 from symdyn.model.faults import Faults
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Vector
 
 
 class AddedMass:
@@ -26,7 +29,7 @@ class AddedMass:
 
     kind = "added mass"
 
-    def __init__(self, body: Any, A: Any, point: Any = (0, 0, 0), name: str = "") -> None:
+    def __init__(self, body: BodyOrName, A: Matrix, point: Vector = (0, 0, 0), name: str = "") -> None:
         self.body = body
         self.label = name
         self.faults = Faults()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from symdyn.model.elements.site import Action, Site
 from symdyn.model.faults import Faults
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName
 
 
 class Element:
@@ -21,7 +24,7 @@ class Element:
 
     kind = "load"
 
-    def __init__(self, body: Any, name: str = "") -> None:
+    def __init__(self, body: BodyOrName, name: str = "") -> None:
         self.body = body
         self.label = name
         self.faults = Faults()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -18,6 +18,9 @@ from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.cube import Cube
 from symdyn.tape.node import is_zero
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar
 
 # Of the whole volume: less is rounding.
 LEAST = 1e-9
@@ -48,8 +51,8 @@ class Buoyancy(Element):
 
     kind = "buoyancy"
 
-    def __init__(self, body: Any, boxes: Sequence[Any], density: Any, without: Sequence[Any] = (), gravity: Any = None,
-                 name: str = "") -> None:
+    def __init__(self, body: BodyOrName, boxes: Sequence[Any], density: Scalar, without: Sequence[Any] = (),
+                 gravity: Scalar | None = None, name: str = "") -> None:
         super().__init__(body, name)
         self.boxes = self._boxes(boxes, "boxes")
         self.without = self._boxes(without, "without")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -15,6 +15,9 @@ from symdyn.model.elements.checks import least_eigenvalue, six
 from symdyn.model.elements.site import Action, Site, Watch
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, dot, inner, vector
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Vector
 
 ANGLES = ("auto", "ZYX", "rotation vector")
 # Tilt, in degrees, up to which a linear stiffness is meant; turn up to which it is safe that its angles do not jump.
@@ -47,7 +50,7 @@ class LinearStiffness(Element):
 
     kind = "linear stiffness"
 
-    def __init__(self, body: Any, K: Any, force: Any = (0,) * 6, point: Any = (0, 0, 0), reference: Any = (0,) * 6,
+    def __init__(self, body: BodyOrName, K: Matrix, force: Any = (0,) * 6, point: Vector = (0, 0, 0), reference: Any = (0,) * 6,
                  angles: str = "auto", name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
@@ -152,7 +155,7 @@ class LinearDamping(Element):
 
     kind = "linear damping"
 
-    def __init__(self, body: Any, B: Any, point: Any = (0, 0, 0), name: str = "") -> None:
+    def __init__(self, body: BodyOrName, B: Matrix, point: Vector = (0, 0, 0), name: str = "") -> None:
         super().__init__(body, name)
         self.B = self.faults.square(B, 6, f"{self.where}: B")
         self.point = self.faults.vector(point, f"{self.where}: point")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -14,6 +14,9 @@ from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, vector
 from symdyn.tape.catenary import NEAREST, Catenary, potential
 from symdyn.tape.node import is_zero
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar, Vector
 
 # Largest strain that is meant: steel is torn at less, and ropes of fibres do not follow Hooke's law as far.
 STRAIN = 0.05
@@ -41,8 +44,8 @@ class MooringLine(Element):
 
     kind = "mooring line"
 
-    def __init__(self, body: Any, fairlead: Any, anchor: Any, length: Any, weight: Any, stiffness: Any, seabed: bool = True,
-                 friction: Any = 0, name: str = "") -> None:
+    def __init__(self, body: BodyOrName, fairlead: Vector, anchor: Vector, length: Scalar, weight: Scalar, stiffness: Scalar,
+                 seabed: bool = True, friction: Scalar = 0, name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.fairlead = faults.vector(fairlead, f"{where}: fairlead")

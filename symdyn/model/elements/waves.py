@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -12,6 +12,9 @@ from symdyn.model.elements.checks import positive, six
 from symdyn.model.elements.site import Action, Site
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import cross
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar, Vector
 
 
 class WaveExcitation(Element):
@@ -25,8 +28,8 @@ class WaveExcitation(Element):
 
     kind = "wave excitation"
 
-    def __init__(self, body: Any, amplitude: Any, phase: Any, frequency: Any, point: Any = (0, 0, 0), ramp: Any = None,
-                 name: str = "") -> None:
+    def __init__(self, body: BodyOrName, amplitude: Vector, phase: Vector, frequency: Scalar, point: Vector = (0, 0, 0),
+                 ramp: Scalar | None = None, name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.amplitude = six(faults, amplitude, f"{where}: amplitude")

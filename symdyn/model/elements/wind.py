@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -14,6 +14,9 @@ from symdyn.model.elements.checks import not_negative
 from symdyn.model.elements.site import Action, Site
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import cross, dot
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar, Vector
 
 # m^2/s^2: below this the air is at rest; a root of zero would have no derivative.
 CALM = Fraction(1, 10**30)
@@ -29,8 +32,8 @@ class Drag(Element):
 
     kind = "drag"
 
-    def __init__(self, body: Any, area: Any, coefficient: Any, density: Any, wind: Any = (0, 0, 0), point: Any = (0, 0, 0),
-                 name: str = "") -> None:
+    def __init__(self, body: BodyOrName, area: Scalar, coefficient: Scalar, density: Scalar, wind: Any = (0, 0, 0),
+                 point: Vector = (0, 0, 0), name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.area = not_negative(faults, area, f"{where}: area", "m^2")
@@ -74,8 +77,8 @@ class Thrust(Element):
 
     kind = "thrust"
 
-    def __init__(self, body: Any, force: Callable[[sp.Symbol], Any] | Any, axis: Any = (1, 0, 0), point: Any = (0, 0, 0),
-                 wind: Any = (0, 0, 0), name: str = "") -> None:
+    def __init__(self, body: BodyOrName, force: Callable[[sp.Symbol], Any] | Any, axis: Vector = (1, 0, 0),
+                 point: Vector = (0, 0, 0), wind: Any = (0, 0, 0), name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.speed = sp.Dummy("v_r", real=True)

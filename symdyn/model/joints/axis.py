@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from symdyn.model.joints.base import Joint
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class AxisJoint(Joint):
@@ -12,9 +17,9 @@ class AxisJoint(Joint):
 
     default_axis: tuple[int, int, int] = (0, 0, 1)
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any = None, axis: Any = ..., speed: Any = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinate: Scalar | None = None, axis: Vector = ...,
+                 speed: sp.Symbol | None = None, parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0),
+                 parent_rotation: Matrix | None = None, child_rotation: Matrix | None = None) -> None:
         coordinates, speeds = (None if value is None else (value,) for value in (coordinate, speed))
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)

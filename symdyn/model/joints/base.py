@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -15,6 +15,9 @@ from symdyn.model.symbols import Coordinate, as_coordinate, symbols_of
 from symdyn.model.sympy_vectors import frames_of, is_sympy_vector
 from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import Vector
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Scalar
 
 IDENTITY = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
@@ -60,8 +63,9 @@ class Joint:
     # Whether the derivation has made it, so that the user knows nothing of it.
     inner = False
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None, speeds: Sequence[Any] | None,
-                 parent_point: Any, child_point: Any, parent_rotation: Any, child_rotation: Any) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None,
+                 speeds: Sequence[sp.Symbol] | None, parent_point: Vector, child_point: Vector, parent_rotation: Matrix,
+                 child_rotation: Matrix) -> None:
         self.name = name
         self.parent = parent
         self.child = child

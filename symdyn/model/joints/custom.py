@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -14,6 +14,9 @@ from symdyn.model.joints.transform import Transform
 from symdyn.model.symbols import Coordinate, as_coordinate, symbols_of
 from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class Custom(Joint):
@@ -33,10 +36,10 @@ class Custom(Joint):
 
     kind = "custom"
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any], rotation: Any = None,
-                 position: Any = (0, 0, 0), units: Sequence[str] | None = None, speeds: Sequence[Any] | None = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar],
+                 rotation: Matrix | None = None, position: Vector = (0, 0, 0), units: Sequence[str] | None = None,
+                 speeds: Sequence[sp.Symbol] | None = None, parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0),
+                 parent_rotation: Matrix | None = None, child_rotation: Matrix | None = None) -> None:
         given = tuple(coordinates) if listed(coordinates) else coordinates
         super().__init__(name, parent, child, given, speeds, parent_point, child_point, parent_rotation, child_rotation)
         self._where = where = f"joint {shown(name)} (custom)"

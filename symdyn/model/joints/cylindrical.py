@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from symdyn.model.joints.base import Joint, JointMotion, turn
 from symdyn.spatial.vectors import zeros
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class Cylindrical(Joint):
@@ -15,9 +20,10 @@ class Cylindrical(Joint):
     kind = "cylindrical"
     coordinate_units = ("rad", "m")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None, axis: Any = (0, 0, 1),
-                 speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
-                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None = None,
+                 axis: Vector = (0, 0, 1), speeds: Sequence[sp.Symbol] | None = None, parent_point: Vector = (0, 0, 0),
+                 child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
         self.axis = self._axis(axis)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.model.joints.base import IDENTITY, Joint, JointMotion
 from symdyn.spatial.vectors import zeros
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Vector
 
 
 class Fixed(Joint):
@@ -16,8 +19,9 @@ class Fixed(Joint):
 
     kind = "fixed"
 
-    def __init__(self, name: str, parent: Any, child: Any, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
-                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, parent_point: Vector = (0, 0, 0),
+                 child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None) -> None:
         super().__init__(name, parent, child, (), None, parent_point, child_point, parent_rotation, child_rotation)
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:

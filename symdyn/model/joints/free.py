@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -23,6 +23,9 @@ from symdyn.model.orientation import EulerAngles
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, identity, vector, zeros
 
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
+
 
 class Free(Joint):
     """coordinates = [x, y, z (m, parent axes), then the rotation's: Euler angles or Euler parameters].
@@ -38,10 +41,10 @@ class Free(Joint):
 
     kind = "free"
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
-                 orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None, velocity: str = "parent") -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None = None,
+                 orientation: Orientation | None = None, speeds: Sequence[sp.Symbol] | None = None,
+                 parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None, velocity: str = "parent") -> None:
         self.body_velocity = isinstance(velocity, str) and velocity == "body"
         default = EulerAngles("ZYX", "body" if self.body_velocity else "rates")
         self.orientation, faults = taken_orientation(name, orientation, default)

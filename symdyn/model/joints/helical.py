@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -11,6 +11,9 @@ from symdyn.model.joints.axis import AxisJoint
 from symdyn.model.joints.base import JointMotion, turn
 from symdyn.shown import shown
 from symdyn.spatial.vectors import zeros
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class Helical(AxisJoint):
@@ -26,9 +29,10 @@ class Helical(AxisJoint):
     coordinate_units = ("rad",)
     default_axis = (0, 0, 1)
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinate: Any = None, axis: Any = ..., pitch: Any = None,
-                 speed: Any = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinate: Scalar | None = None, axis: Vector = ...,
+                 pitch: Scalar | None = None, speed: sp.Symbol | None = None, parent_point: Vector = (0, 0, 0),
+                 child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None) -> None:
         super().__init__(name, parent, child, coordinate, axis, speed, parent_point, child_point, parent_rotation,
                          child_rotation)
         self.pitch = self.faults.expression(pitch, f"joint {shown(name)}: pitch (m/rad)")

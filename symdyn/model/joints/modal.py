@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -16,6 +16,9 @@ from symdyn.spatial.sixvectors import skew
 from symdyn.spatial.vectors import dot, identity, inner, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import exact
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar
 
 
 class Modal(Joint):
@@ -34,8 +37,9 @@ class Modal(Joint):
     # Its frames differ at eta = 0 by the length of the body.
     identity_at_zero = False
 
-    def __init__(self, name: str, parent: Any, child: Any, beam: ModalBody, coordinates: Sequence[Any] | None = None,
-                 speeds: Sequence[Any] | None = None, stiffness: Any = 1, damping: Any = 1, carries: bool = True) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, beam: ModalBody,
+                 coordinates: Sequence[Scalar] | None = None, speeds: Sequence[sp.Symbol] | None = None, stiffness: Scalar = 1,
+                 damping: Scalar = 1, carries: bool = True) -> None:
         self.beam = beam
         self.carries = carries
         self.coordinate_units = ("m",) * beam.n

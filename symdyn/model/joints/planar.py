@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion, turn
 from symdyn.spatial.vectors import zeros
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class Planar(Joint):
@@ -20,9 +25,9 @@ class Planar(Joint):
     kind = "planar"
     coordinate_units = ("m", "m", "rad")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
-                 speeds: Sequence[Any] | None = None, parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0),
-                 parent_rotation: Any = None, child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None = None,
+                 speeds: Sequence[sp.Symbol] | None = None, parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0),
+                 parent_rotation: Matrix | None = None, child_rotation: Matrix | None = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
 

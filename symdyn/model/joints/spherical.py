@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -20,6 +20,9 @@ from symdyn.model.joints.rotation import (
 from symdyn.model.orientation import EulerAngles
 from symdyn.spatial.vectors import zeros
 
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
+
 
 class Spherical(Joint):
     """coordinates = the three Euler angles (rad) in the order of the sequence, or the four Euler parameters.
@@ -32,10 +35,10 @@ class Spherical(Joint):
 
     kind = "spherical"
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
-                 orientation: Orientation | None = None, speeds: Sequence[Any] | None = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None = None,
+                 orientation: Orientation | None = None, speeds: Sequence[sp.Symbol] | None = None,
+                 parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None) -> None:
         self.orientation, faults = taken_orientation(name, orientation, EulerAngles("ZYX"))
         self.coordinate_units = orientation_units(self.orientation)
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,

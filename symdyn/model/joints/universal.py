@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symdyn.model.joints.base import Joint, JointMotion, numeric, turn
 from symdyn.shown import shown
 from symdyn.spatial.vectors import cross, zeros
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from symdyn.given import BodyOrName, Matrix, Scalar, Vector
 
 
 class Universal(Joint):
@@ -21,10 +26,10 @@ class Universal(Joint):
     kind = "universal"
     coordinate_units = ("rad", "rad")
 
-    def __init__(self, name: str, parent: Any, child: Any, coordinates: Sequence[Any] | None = None,
-                 axes: Sequence[Any] = ((1, 0, 0), (0, 1, 0)), speeds: Sequence[Any] | None = None,
-                 parent_point: Any = (0, 0, 0), child_point: Any = (0, 0, 0), parent_rotation: Any = None,
-                 child_rotation: Any = None) -> None:
+    def __init__(self, name: str, parent: BodyOrName, child: BodyOrName, coordinates: Sequence[Scalar] | None = None,
+                 axes: Sequence[Vector] = ((1, 0, 0), (0, 1, 0)), speeds: Sequence[sp.Symbol] | None = None,
+                 parent_point: Vector = (0, 0, 0), child_point: Vector = (0, 0, 0), parent_rotation: Matrix | None = None,
+                 child_rotation: Matrix | None = None) -> None:
         super().__init__(name, parent, child, coordinates, speeds, parent_point, child_point, parent_rotation,
                          child_rotation)
         if not isinstance(axes, (list, tuple, np.ndarray)) or len(np.shape(axes) if isinstance(axes, np.ndarray) else axes) != 2 \

@@ -167,10 +167,11 @@ class Linearization:
 
         Q   weights of the states x' (see `states`): a matrix (m, m), its diagonal (m,), or numbers by name or symbol, 0 where
             left out; symmetric and positive semidefinite
-        R   weights of the inputs, (n_in, n_in), (n_in,), or by name or symbol, of all inputs; symmetric and positive definite
+        R   weights of the inputs, (k, k), (k,), symmetric and positive definite; by name or symbol those that have one are
+            driven, the others are disturbances and stay as they are. In order: of all inputs but motions (sd.motions)
         Under constraints, and with held coordinates, the states are the independent ones that the linearization has. The result
         is also the function of (t, x) that applies the gain to the mechanism: inputs=linear.lqr(Q, R), or
-        inputs=sd.Sampled(linear.lqr(Q, R), period=0.01).
+        inputs=sd.Sampled(linear.lqr(Q, R), period=0.01); with other inputs that are given by name, inputs={F: regulator[F], ...}.
 
         Raises ArgumentError for weights that are not definite, with the direction; where the equations are not stabilizable, with
         the mode that no input reaches; where Q gives no weight to a mode that neither decays nor grows; and where A is not

@@ -8,7 +8,7 @@ eigenstructure problem in linear system theory, IEEE Trans. Automatic Control 26
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,9 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.arguments import take
+from symdyn.runtime.following import motion_inputs
 from symdyn.runtime.labelled import Labelled
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.statics.linearize import Linearization
@@ -36,13 +38,16 @@ SHARE = 0.05
 class Regulator:
     """The gain of least cost about a linearization, and the function of (t, x) that applies it.
 
-    K            (n_in, m): in' = -K x', indexed by the names of inputs and states, too
+    K            (k, m): in' = -K x' of the k inputs that have weights, indexed by the names of inputs and states, too
     S            (m, m): the least cost from x' on is x'^T S x'
     eigenvalues  (m,) of A - B K, 1/s, all with negative real parts
-    Q, R         the weights (m, m), (n_in, n_in)
+    Q, R         the weights (m, m), (k, k)
+    driven       names of the inputs that have weights
 
-    `regulator(t, x)` are the inputs (n_in,) at a state x = [q; u; z] of the mechanism: those of the linearization - K x'. Pass it
-    to `simulate` as inputs=regulator, or inputs=sd.Sampled(regulator, period=0.01).
+    `regulator(t, x)` are the inputs (n_in,) at a state x = [q; u; z] of the mechanism: those of the linearization - K x', others
+    as they are there. Pass it to `simulate` as inputs=regulator, or inputs=sd.Sampled(regulator, period=0.01). `regulator[F]` is
+    the function of (t, x) of one input, `regulator[F, M]` that of several, to be passed with what others have:
+    inputs={F: regulator[F], road: table}, or inputs={(F, M): sd.Sampled(regulator[F, M], period=0.01), road: table}.
     """
 
     linear: Linearization
@@ -51,10 +56,25 @@ class Regulator:
     eigenvalues: np.ndarray
     Q: np.ndarray
     R: np.ndarray
+    driven: tuple[str, ...]
 
     def __call__(self, t: float, x: Any) -> np.ndarray:
-        found: np.ndarray = self.linear.inputs - np.asarray(self.K) @ self.linear.deviation(t, x)
+        found: np.ndarray = self.linear.inputs.copy()
+        names = self.linear.module.metadata["inputs"]
+        found[[names.index(n) for n in self.driven]] -= np.asarray(self.K) @ self.linear.deviation(t, x)
         return found
+
+    def __getitem__(self, inputs: Any) -> Callable[[float, np.ndarray], Any]:
+        """The function of (t, x) of one input, which returns a number, or of a tuple of them. Raises ArgumentError for inputs
+        that have no weights."""
+        wanted = [name_of(i) for i in (inputs if isinstance(inputs, tuple) else (inputs,))]
+        wrong = [n for n in wanted if n not in self.driven]
+        if wrong:
+            raise ArgumentError(f"{self.linear.module.name}: the regulator does not drive {', '.join(map(shown, wrong))}; it "
+                                f"drives {', '.join(self.driven)}")
+        places = [self.linear.module.metadata["inputs"].index(n) for n in wanted]
+        index: Any = places if isinstance(inputs, tuple) else places[0]
+        return lambda t, x: self(t, x)[index]
 
     def describe(self) -> str:
         """The gain with names and units, and the eigenvalues of the closed loop."""
@@ -73,15 +93,28 @@ def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
     owner, inputs = module.name, tuple(module.metadata["inputs"])
     if not inputs:
         raise ArgumentError(f"{owner}: a regulator was requested, but the system has no inputs; add loads with sd.inputs(...)")
+    free = tuple(n for n in inputs if n not in motion_inputs(module.metadata))
+    if isinstance(R, Mapping):
+        weighted = {name_of(key) for key in R}
+        driven = tuple(n for n in inputs if n in weighted)
+        follow = [n for n in driven if n not in free]
+        if follow:
+            raise ArgumentError(f"{owner}: R has weights of {', '.join(follow)}, which belong to a motion: what inputs follow, a "
+                                "regulator does not drive; leave them out")
+        take(R, inputs, "R", dict.fromkeys(inputs, 0.0), owner)  # names that there are not
+    else:
+        driven = free
+    if not driven:
+        raise ArgumentError(f"{owner}: R has no weights, so there is nothing to drive; give weights of inputs: {', '.join(free)}")
     state_weights = _weights(Q, linear.states, "Q", owner, dict.fromkeys(linear.states, 0.0))
-    input_weights = _weights(R, inputs, "R", owner, {})
+    input_weights = _weights(R, driven, "R", owner, {})
     _demand_definite(state_weights, linear.states, "Q", owner, strictly=False)
-    _demand_definite(input_weights, inputs, "R", owner, strictly=True)
-    A, B = linear.A, linear.B
+    _demand_definite(input_weights, driven, "R", owner, strictly=True)
+    A, B = linear.A, linear.B[:, [inputs.index(n) for n in driven]]
     for value, shares in _out_of_reach(A, B):
         if value.real > -NEUTRAL * np.linalg.norm(A):
             raise ArgumentError(f"{owner}: the linear equations are not stabilizable: the mode {_told(shares, linear.states)} "
-                                f"with the eigenvalue {_number(value)} 1/s does not decay, and no input ({', '.join(inputs)}) "
+                                f"with the eigenvalue {_number(value)} 1/s does not decay, and no input ({', '.join(driven)}) "
                                 "reaches it; add an input, or hold what it moves (hold=[...] of linearize)")
     root = _root(state_weights)
     for value, shares in _out_of_reach(A.T, root):
@@ -102,8 +135,8 @@ def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
         raise ArgumentError(f"{owner}: Riccati's equation is solved to {left / size:.2g} of its terms only, the largest real "
                             f"part of the closed loop is {closed.real.max():.3g} 1/s; change the weights by less extreme ratios")
     order = np.lexsort((closed.imag, np.abs(closed)))
-    gain = Labelled(K, inputs, linear.states, units=linear.units)
-    return Regulator(linear, gain, S, closed[order], state_weights, input_weights)
+    gain = Labelled(K, driven, linear.states, units=linear.units)
+    return Regulator(linear, gain, S, closed[order], state_weights, input_weights, driven)
 
 
 def _weights(values: Any, names: Sequence[str], what: str, owner: str, left_out: Mapping[str, float]) -> np.ndarray:

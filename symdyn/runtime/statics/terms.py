@@ -15,7 +15,7 @@ import numpy as np
 
 from symdyn.runtime.arguments import fixed
 from symdyn.runtime.constraints import names as constraint_names
-from symdyn.runtime.inputs import RATES
+from symdyn.runtime.following import RATES
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
