@@ -205,7 +205,7 @@ def test_what_has_no_weight_and_does_not_decay_is_named() -> None:
     ([1, -1, 0, 0], [1], r"Q is not positive semidefinite: along phi \(1.00\) it is -1; give it 0 or more there"),
     ([1, 1, 1, 1], [0], r"R is not positive definite: along F \(1.00\) it is 0; give it more than 0 there"),
     ([1, 1], [1], r"Q has the shape \(2,\); needed are 4 numbers, a matrix \(4, 4\), or weights by name: x, phi, x_dot, phi_dot"),
-    ([1, 1, 1, 1], {}, "R: R has no weights, so there is nothing to drive; give weights of inputs: F"),
+    ([1, 1, 1, 1], {}, "R has no weights, so there is nothing to drive; give weights of inputs: F"),
     ({"y": 1}, [1], "Q: there is no 'y'"),
     (np.triu(np.ones((4, 4))), [1], "Q is not symmetric: its entry of x by phi is 1, the other way 0"),
     ([1, 1, 1, np.nan], [1], "Q must be finite"),
