@@ -1,4 +1,5 @@
-"""The branches of the Piecewise expressions in formulas: which of them a point lies in, and points that lie in the others."""
+"""The branches of formulas, those of Piecewise, Max, Min, Abs, sign and Heaviside: which of them a point lies in, and points that
+lie in the others."""
 
 from __future__ import annotations
 
@@ -23,6 +24,10 @@ ROUNDS = 2
 EXPONENTS = range(-20, 15)
 
 
+# Functions that have one branch above zero and another below, or one for each argument.
+_SIDES = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min)
+
+
 @dataclass(frozen=True)
 class Branch:
     """A branch: what must hold in it, from the outermost Piecewise inwards, and the words of it."""
@@ -41,9 +46,12 @@ def branches(expressions: Iterable[sp.Expr]) -> list[Branch]:
     found: dict[tuple[Any, ...], str] = {}
 
     def walk(e: sp.Basic, around: tuple[Any, ...]) -> None:
-        if not e.has(sp.Piecewise):
+        if not e.has(sp.Piecewise, *_SIDES):
             return
         if not isinstance(e, sp.Piecewise):
+            for condition in _sides(e):
+                if condition is not sp.S.true and condition is not sp.S.false:
+                    found.setdefault((*around, condition), str(condition))
             for part in e.args:
                 walk(part, around)
             return
@@ -58,6 +66,16 @@ def branches(expressions: Iterable[sp.Expr]) -> list[Branch]:
     for expression in expressions:
         walk(expression, ())
     return [Branch(*item) for item in found.items()]
+
+
+def _sides(e: sp.Basic) -> list[Any]:
+    """Conditions of the branches of a function that has several without being a Piecewise."""
+    if isinstance(e, (sp.Max, sp.Min)):
+        first = sp.Ge if isinstance(e, sp.Max) else sp.Le
+        return [sp.And(*[first(a, b) for b in e.args if b != a]) for a in e.args]
+    if isinstance(e, _SIDES):
+        return [sp.Gt(e.args[0], 0), sp.Lt(e.args[0], 0)]
+    return []
 
 
 class Visits:
@@ -95,7 +113,8 @@ class Visits:
         return point if self.hold(point) >= wanted else None
 
     def _cells(self, branch: Branch, name: str, point: Mapping[str, Any]) -> Iterator[Any]:
-        """Values of one symbol, the others held: zero, every root of a condition's difference, one value in each gap."""
+        """Values of one symbol, the others held: one in each gap between zero and the roots of the conditions' differences, then
+        these themselves, where a number with decimals does not decide on which side the point lies."""
         relations = {r for c in branch.conditions for r in c.atoms(Relational) if name in {s.name for s in symbols_of(r)}}
         differences = Expressions([r.lhs - r.rhs for r in sorted(relations, key=str)])
         roots: set[Any] = set()
@@ -104,7 +123,7 @@ class Visits:
         positive = self.symbols[name].is_positive
         edges = sorted(roots | {self.own.zero})
         gaps = [(a + b) / 2 for a, b in pairwise(edges)]
-        for value in (*edges, *gaps, edges[0] - 1 - abs(edges[0]), edges[-1] + 1 + abs(edges[-1])):
+        for value in (*gaps, edges[0] - 1 - abs(edges[0]), edges[-1] + 1 + abs(edges[-1]), *edges):
             if value > 0 or not positive:
                 yield value
 

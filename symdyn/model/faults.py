@@ -88,7 +88,7 @@ class Faults(list[str]):
     def _written(self, value: Any, frame: Any, what: str, harmless: sp.Matrix) -> sp.Matrix:
         try:
             known = frame.frame if isinstance(frame, Body) and isinstance(frame.name, str) else frame
-            return components(value, known if is_frame(known) else None, what)
+            return components(value, known if is_frame(known) or isinstance(known, str) else None, what)
         except ModelError as error:
             self.extend(error.faults)
             return harmless

@@ -10,7 +10,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
-from symdyn.model.symbols import Timed
+from symdyn.model.symbols import Timed, time
 
 if TYPE_CHECKING:
     from symdyn.given import BodyOrName, JointOrName, Vector
@@ -84,6 +84,17 @@ class Quantity(Timed):
             raise ModelError([f"the derivative of {self} by time is requested; accelerations, multipliers and reactions have "
                               "none"])
         return Quantity(replace(self.measure, order=self.measure.order + 1))
+
+    def diff(self, *symbols: Any, **assumptions: Any) -> Any:
+        """The derivative by time, or by itself. Raises ModelError for that by a coordinate, which is not known before the
+        equations are derived; SymPy takes it for zero within compound expressions, without asking."""
+        for s in symbols:
+            if isinstance(s, sp.Symbol) and s not in (time, self) and not isinstance(s, (Quantity, sp.Dummy)):
+                raise ModelError([f"the derivative of {self} by {s} is requested, which is not known before the equations are "
+                                  "derived; write the component as an expression of coordinates, take sd.jacobian(body, point) "
+                                  "as an output, or add a spring (add_spring_damper, add_force_between) in place of the gradient "
+                                  "of an energy"])
+        return super().diff(*symbols, **assumptions)
 
     @property
     def ddot(self) -> Quantity:

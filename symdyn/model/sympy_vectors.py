@@ -47,7 +47,8 @@ def frames_of(value: Any) -> list[Any]:
 def components(value: Any, frame: Any, what: str) -> sp.Matrix:
     """Components in a frame: (3, 1) of a vector, (3, 3) of a dyadic.
 
-    Raises ModelError, which documents what to write, where no frame is known (None) and for what is written in other frames.
+    Raises ModelError, which documents what to write, where no frame is known (None, or the name of a body) and for what is
+    written in other frames.
     """
     kind = "vector" if is_sympy_vector(value) else "dyadic"
     written = frames_of(value)
@@ -57,6 +58,10 @@ def components(value: Any, frame: Any, what: str) -> sp.Matrix:
         return value.to_matrix(frame)
     names = " and ".join(str(f) for f in written)
     one = written[0]
+    if isinstance(frame, str):
+        itself = "system.ground" if frame == "ground" else "what add_body returned"
+        raise ModelError([f"{what} is the SymPy {kind} {value} in the frame {names}, and of {frame!r} only the name is known "
+                          f"here, not its frame; pass the body itself, {itself}, in place of its name"])
     if frame is None:
         matrix = f"{kind}.to_matrix({one})"
         raise ModelError([f"{what} is the SymPy {kind} {value} in the frame {names}, and no frame is known here; pass its "

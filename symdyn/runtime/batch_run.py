@@ -19,7 +19,7 @@ from symdyn.runtime.batch_watches import outside
 from symdyn.runtime.charts import CHARTS, locked
 from symdyn.runtime.chatter import SWITCHES
 from symdyn.runtime.events import wanted
-from symdyn.runtime.inputs import take_inputs, varies_over_time
+from symdyn.runtime.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.memory import demand
 from symdyn.runtime.sampled import check_span
@@ -74,6 +74,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
               for what, values in (("q", q), ("u", u), ("z", z))]
     by_time = varies_over_time(inputs)
     fixed = input_rows(module, None if by_time else inputs, initial)
+    demand_rest(fixed, metadata["inputs"], metadata.get("motions", ()), module.name)
     rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
     n = together(rows, module.name)
     times, span = _times(module, t)

@@ -219,7 +219,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(start, pieces=table.pieces, kinks=table.pieces.breaks)
     if not isinstance(given, Mapping):
         constant = take(given, names, "inputs", zeros, owner)
-        _demand_rest(constant, names, motions, owner)
+        demand_rest(constant, names, motions, owner)
         return Inputs(constant)
     samplers, given = _samplers(given, names, owner)
     sampled = {names[place]: start[place] for sampler in samplers for place in sampler.places}
@@ -232,7 +232,7 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     parts = {n: v for n, v in parts.items() if n not in moving}
     constant = take({n: v for n, v in parts.items() if n not in varying} | dict.fromkeys(varying, 0.0) | sampled, names, "inputs",
                     zeros, owner)
-    _demand_rest(constant, names, motions, owner)
+    demand_rest(constant, names, motions, owner)
     if not varying and not followed:
         return Inputs(constant, samplers=samplers)
     functions = {n: partial(_asked, _undeclared(v), f"the function of input {n}") for n, v in varying.items() if callable(v)}
@@ -270,9 +270,10 @@ def _demand_known_rates(parts: Mapping[str, Any], sampled: Mapping[str, float], 
                             "which takes an infinite force; pass a function of t, a spline of SciPy or a table")
 
 
-def _demand_rest(constant: np.ndarray, names: Sequence[str], motions: Sequence[str], owner: str) -> None:
-    """Raises ArgumentError for motions that are held in their place, but whose rate or acceleration is not zero."""
-    moving = [f"{n}{end}" for n in motions for end in RATES if constant[list(names).index(f"{n}{end}")] != 0]
+def demand_rest(constant: np.ndarray, names: Sequence[str], motions: Sequence[str], owner: str) -> None:
+    """Raises ArgumentError for motions that are held in their place, but whose rate or acceleration is not zero; constant: inputs
+    (n_in,), or rows of them."""
+    moving = [f"{n}{end}" for n in motions for end in RATES if constant[..., list(names).index(f"{n}{end}")].any()]
     if moving:
         raise ArgumentError(f"{owner}: inputs: {', '.join(moving)} is not zero, but the motion itself does not change; over time "
                             "give a motion as a function of t that returns value, rate and acceleration, as a spline of SciPy, "

@@ -167,3 +167,11 @@ def test_equality_can_hold_on_certain_states_only():
     assert sd.compare(sd.Case("norm", formulas=[sd.Formula("p.p", **formula)])).counts[Verdict.DIFFERENT] == 1
     on = sd.Formula("p.p", **formula, where={p[0]: sp.sqrt(1 - p[1] ** 2)})
     assert sd.compare(sd.Case("norm", formulas=[on])).counts[Verdict.EQUAL] == 1
+
+
+@pytest.mark.parametrize("printed", [
+    lambda x: sp.Piecewise((x, x < 1e6), (2 * x, True)), lambda x: sp.Piecewise((x, x < 1e12), (2 * x, True)),
+    lambda x: sp.Max(x, 10**7) - 10**7 + x, lambda x: x + sp.Max(0, sp.Abs(x) - 1e8), lambda x: x + sp.Heaviside(x - 10**9)])
+def test_branches_far_away_are_visited(printed):
+    x = sp.Symbol("x")
+    assert "different" in str(sd.compare(sd.Case("far", printed={"a": [printed(x)]}, derived={"a": [x]})))

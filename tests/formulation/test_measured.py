@@ -313,3 +313,10 @@ def test_points_that_coincide_have_no_distance():
 def test_explicit_descriptions_take_no_quantities():
     with pytest.raises(ModelError, match="there are no bodies"):
         sd.embedding([q1], [l * q1], [m], [sd.position("a")[0]])
+
+
+def test_a_derivative_by_a_coordinate_is_rejected():
+    height = sd.position("bob", [0.1, 0])[1]
+    with pytest.raises(ModelError, match=r"the derivative of position\(bob.*\)\[1\] by q1 is requested, which is not known"):
+        height.diff(q1)
+    assert (height**2).diff(sd.t) == 2 * height * height.dot and height.diff(height) == 1

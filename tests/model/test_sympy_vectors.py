@@ -86,7 +86,10 @@ FAULTS: dict[str, tuple[Callable[[sd.System, Any], Any], str]] = {
     "axis in a strange frame": (lambda s, b: s.close_loop(sd.Revolute("l", s.ground, b, axis=B.z)),
                                 "joint 'l': axis is the SymPy vector B.z in the frame B; here the frame N is known"),
     "point of a named body": (lambda s, b: s.close_loop(sd.Fixed("l", s.ground, "arm", child_point=b.frame.x)),
-                              "joint 'l': child_point is the SymPy vector arm.x in the frame arm, and no frame is known here"),
+                              "joint 'l': child_point is the SymPy vector arm.x in the frame arm, and of 'arm' only the name is "
+                              "known here, not its frame; pass the body itself, what add_body returned"),
+    "axis of the ground by name": (lambda s, b: s.close_loop(sd.Revolute("l", "ground", b, axis=s.frame.x)),
+                                   "of 'ground' only the name is known here, not its frame; pass the body itself, system.ground"),
     "no frame": (lambda s, b: s.add_body("c", mass=1, frame="A"), "body 'c': frame is 'A'; pass a ReferenceFrame of sympy.phy"),
 }
 

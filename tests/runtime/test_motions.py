@@ -338,3 +338,10 @@ def test_what_may_not_follow_rates_of_motions() -> None:
     system.add_joint(sd.Prismatic("base", "ground", system.add_body("b", mass=1, inertia=sp.eye(3)), z, axis=[1, 0, 0]))
     with pytest.raises(ModelError, match="so nothing can move"):
         system.embedding()
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_a_batch_takes_no_rates_apart_from_the_motion(backend: str) -> None:
+    module = hung(z, "Prismatic").embedding().compile(backend)
+    with pytest.raises(ArgumentError, match="z_ddot is not zero, but the motion itself does not change"):
+        module.simulate_batch({"q": [0.4, 0.5]}, t=(0, 1), inputs={z.ddot: 5.0})
