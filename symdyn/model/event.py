@@ -39,10 +39,12 @@ class Event:
         return [self.value, *[e for _, e in self.reset]]
 
 
-def make_event(faults: Faults, name: Any, value: Any, direction: Any, stop: Any, reset: Any) -> Event:
-    """An event as it was asked for; what is wrong with it alone is added to the faults."""
+def make_event(faults: Faults, name: Any, value: Any, direction: Any, stop: Any, reset: Any) -> Event | None:
+    """An event as it was requested; what is wrong with it alone is added to the faults. None where its value is no expression."""
     where = f"event {shown(name)}"
+    before = len(faults)
     taken = faults.expression(value, where)
+    usable = len(faults) == before
     if isinstance(direction, bool) or not isinstance(direction, (int, float, sp.Integer, np.integer)) \
             or direction not in _DIRECTIONS:
         faults.append(f"{where}: direction is {shown(direction)}; pass 1 (upwards through zero), -1 (downwards) or 0 (either "
@@ -60,7 +62,7 @@ def make_event(faults: Faults, name: Any, value: Any, direction: Any, stop: Any,
     for key, becomes in (reset or {}).items():
         symbol = take_over(key) if isinstance(key, sp.Basic) else sp.Symbol(name_of(key))
         changed.append((symbol, faults.expression(becomes, f"{where}: reset of {key}")))
-    return Event(name, taken, int(direction), bool(stop), tuple(changed))
+    return Event(name, taken, int(direction), bool(stop), tuple(changed)) if usable else None
 
 
 def check_events(events: Sequence[Event], state: Iterable[sp.Symbol], moving: Iterable[sp.Symbol],

@@ -98,7 +98,8 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
             elif isinstance(symbol, (Coordinate, Rate)):
                 found = ", ".join(map(str, coordinates)) or "none"
                 faults.append(f"{where} uses {symbol}, which no joint and no state drives; coordinates: {found}; "
-                              f"give {symbol} a joint, or use a parameter or input in its place")
+                              f"give {symbol} a joint, or system.add_coordinate({symbol}) where it stands in expressions of "
+                              "joints alone, or use a parameter or input in its place")
             elif isinstance(symbol, Input):
                 inputs[symbol] = None
             elif s.declared is not None and symbol not in s.declared:

@@ -310,7 +310,9 @@ class System:
                    event: {v: -e*v} for a ball that bounces. Events at the same time make their resets in the order in which
                    they were added, each from the state before all of them: of two for one speed the later counts
         """
-        self.events.append(make_event(self._faults, name, value, direction, stop, reset))
+        made = make_event(self._faults, name, value, direction, stop, reset)
+        if made is not None:
+            self.events.append(made)
 
     def draw(self, body: BodyOrName, *shapes: Shape, color: str | Sequence[float] | None = None) -> None:
         """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).

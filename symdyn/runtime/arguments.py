@@ -70,6 +70,10 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
             given[name] = number(value)
         except NotReal as error:
             why = "" if isinstance(value, str) else f": {error}"
+            if np.shape(value) != () and len(np.shape(value)) == 2 and np.shape(value)[1] == 2 and what == "inputs":
+                why += "; pass a table over time as a pair (times, values)"
+            elif callable(value):
+                why += "; functions of time are for simulate and simulate_batch"
             faults.append(f"the value of {name} is {shown(value)}, not a number{why}")
     missing = [n for n in names if n not in given and defaults.get(n) is None]
     missing = [n for n in missing if not any(n in f for f in faults)]

@@ -45,3 +45,15 @@ def test_third_component_of_space() -> None:
     s.add_event("aside", sd.position(body, [0, 0, 1])[2] - sd.t)
     eq = s.embedding()
     assert eq.explicit("events").tolist() == [[1 - sd.t]]
+
+
+def test_what_is_no_expression_is_one_fault() -> None:
+    x = sd.coordinates("x")
+    for value in (x > 1, "x"):
+        system = sd.System("ball", gravity=[0, -9.81])
+        body = system.add_body("ball", 1)
+        system.add_joint(sd.Prismatic("fall", "ground", body, x, axis=[0, 1]))
+        system.add_event("e", value)
+        with pytest.raises(sd.ModelError) as caught:
+            system.check()
+        assert len(caught.value.faults) == 1
