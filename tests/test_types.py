@@ -1,0 +1,84 @@
+"""What editors and type checkers see of the public names."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import symdyn as sd
+
+STUB = Path(sd.__file__).with_name("__init__.pyi")
+USER = """
+import symdyn as sd
+
+x, theta = sd.coordinates("x theta")
+m, l, g = sd.parameters("m l g")
+F = sd.inputs("F")
+system = sd.System("crane", gravity=[0, -g])
+cart = system.add_body("cart", mass=m)
+load = system.add_body("load", mass=m, com=[0, -l])
+system.add_joint(sd.Prismatic("rail", system.ground, cart, x, axis=[1, 0]))
+system.add_joint(sd.Revolute("hook", cart, "load", theta))
+system.add_force(cart, [F - 2 * x.dot, 0])
+system.add_event("passes", theta, stop=True)
+system.defaults = {m: 1.0, l: 2.0, g: 9.81}
+equations = system.embedding()
+module = equations.compile(backend="numpy")
+solution = module.simulate((0, 1), q={"x": 0.1}, inputs={"F": 1.0})
+linear = module.linearize(module.equilibrium(), hold=None)
+"""
+# Expression -> the class that is revealed.
+REVEALED = {
+    "system": "System", "cart": "Body", "system.check()": "Model", "equations": "EmbeddedEquations",
+    "system.augmented()": "AugmentedEquations", "system.recursive()": "RecursiveEquations", "module": "Module",
+    "system.compile()": "Module", "solution": "Solution", "solution.t": "ndarray", "solution.energy": "ndarray",
+    "module.rhs(0.0, [0.0, 0.0, 0.0, 0.0])": "ndarray", "module.equilibrium()": "Equilibrium", "linear": "Linearization",
+    'linear.lqr({"x": 1}, {"F": 1})': "Regulator", "module.stability()": "Stability", "equations.verify()": "Verification",
+    "equations.base_parameters()": "BaseParameters", "sd.Table([0, 1], [0, 1])": "Table",
+    'module.simulate_batch({"x": [0.1, 0.2]})': "BatchSolution", "module.actuation(0, [0, 0], [0, 0], [0, 0])": "Actuation"}
+
+
+def test_the_stub_has_the_public_names_and_where_they_are() -> None:
+    tree = ast.parse(STUB.read_text(encoding="utf-8"))
+    listed = {(node.module, alias.name) for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    for module, names in sd._HOME.items():
+        assert {name for home, name in listed if home == module} >= set(names), module
+    public = {alias.asname for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names if alias.asname}
+    assert public | {"t"} == set(sd.__all__)
+
+
+def test_mypy_in_strict_mode_reveals_the_classes(tmp_path: Path) -> None:
+    file = tmp_path / "user.py"
+    file.write_text(USER + "".join(f"reveal_type({expression})\n" for expression in REVEALED), encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--cache-dir", str(tmp_path), str(file)]
+    found = subprocess.run(command, capture_output=True, text=True, cwd=STUB.parent.parent, check=False)
+    assert found.returncode == 0, found.stdout
+    revealed = [re.search(r"(\w+)(?:\[.*)?\"$", line)[1] for line in found.stdout.splitlines() if "Revealed type" in line]
+    assert dict(zip(REVEALED, revealed, strict=True)) == REVEALED
+
+
+@pytest.mark.parametrize(("after", "names"), [
+    ("sd.", {"System", "Revolute", "coordinates", "motions", "Table", "compare"}),
+    ("system.", {"add_body", "add_joint", "add_force", "embedding", "augmented", "defaults"}),
+    ("equations.", {"M_tilde", "compile", "verify", "write", "latex"}),
+    ("module.", {"simulate", "rhs", "linearize", "equilibrium", "stability"}),
+    ("solution.", {"t", "x", "plot", "energy", "reactions"})])
+def test_an_editor_completes_names(after: str, names: set[str]) -> None:
+    jedi = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
+    text = USER + after
+    lines = text.split("\n")
+    offered = {c.name for c in jedi.Script(text).complete(len(lines), len(lines[-1]))}
+    assert names <= offered, names - offered
+
+
+def test_an_editor_shows_signatures_with_defaults() -> None:
+    jedi = pytest.importorskip("jedi", reason="no language server; run: pip install jedi")
+    text = USER + "module.simulate("
+    lines = text.split("\n")
+    [signature] = jedi.Script(text).get_signatures(len(lines), len(lines[-1]))
+    assert {"t", "q", "u", "params", "inputs", "rtol", "method", "events"} <= {p.name for p in signature.params}
