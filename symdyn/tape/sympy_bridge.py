@@ -157,7 +157,7 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
         elif node.op == "guard":
             done[node] = done[node.args[0]] if isinstance(node.args[0], Node) else number(node.args[0])
         else:
-            done[node] = _expression(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
+            done[node] = applied(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
     entries = [done[e] if isinstance(e, Node) else number(e) for e in output.entries]
     if output.shape == ():
         return entries[0]
@@ -170,12 +170,19 @@ def number(value: Any) -> Any:
     if isinstance(value, bool):
         return sp.true if value else sp.false
     value = Fraction(value)
-    if value.denominator > 10**6 or (value.denominator > 1000 and value.denominator & (value.denominator - 1) == 0):
+    if printed_as_decimal(value):
         return sp.Float(repr(float(value)))
     return sp.Rational(value.numerator, value.denominator)
 
 
-def _expression(op: str, a: list) -> Any:
+def printed_as_decimal(value: Fraction) -> bool:
+    """Whether a number stands on the tape for a decimal one, and is printed as such."""
+    below = value.denominator
+    return below > 1000 and (below > 10**6 or below & (below - 1) == 0)
+
+
+def applied(op: str, a: list) -> Any:
+    """An operation of the tape with these arguments in SymPy."""
     arithmetic = {"add": lambda: a[0] + a[1], "sub": lambda: a[0] - a[1], "mul": lambda: a[0] * a[1],
                   "div": lambda: a[0] / a[1], "neg": lambda: -a[0], "pow": lambda: a[0] ** a[1],
                   "pi": lambda: sp.pi, "select": lambda: sp.Piecewise((a[1], a[0]), (a[2], True))}

@@ -1,0 +1,159 @@
+"""Angles of sines and cosines as integer combinations of a few base angles.
+
+The argument of a sine is a sum of terms with rational factors: coordinates, products such as Omega t, multiples of pi, numbers.
+Each term is divided by a number that makes all its factors integers, so that half angles are covered, and arguments that occur
+are taken as base angles before single terms: for links with parallel axes these are the sums in which equations are short.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any
+
+from symdyn.tape.node import Node
+
+# A product of nodes, in order of recording: what stands in a term of an argument.
+Term = tuple[Node, ...]
+Linear = dict[Term, Fraction]
+# Arguments with more terms than this are one angle each; the same for multiples above it.
+TERMS, MULTIPLES = 12, 8
+
+
+def arguments(steps: Sequence[Node]) -> dict[Node, Linear]:
+    """Every argument of a sine or cosine as sum of terms; () is the term of a number."""
+    forms: dict[Node, Linear] = {}
+
+    def form(value: Any) -> Linear:
+        return forms[value] if isinstance(value, Node) else {(): Fraction(value)} if value else {}
+
+    wanted = {node.args[0] for node in steps if node.op in ("sin", "cos") and isinstance(node.args[0], Node)}
+    needed = set(wanted)
+    for node in reversed(steps):
+        if node in needed and node.op in ("add", "sub", "mul", "neg", "div", "guard"):
+            needed.update(a for a in node.args if isinstance(a, Node))
+    for node in steps:
+        if node not in needed:
+            continue
+        op, args = node.op, node.args
+        result: Linear | None = None
+        if op in ("add", "sub"):
+            result = dict(form(args[0]))
+            for term, factor in form(args[1]).items():
+                result[term] = result.get(term, Fraction(0)) + (factor if op == "add" else -factor)
+        elif op == "mul":
+            result = {}
+            for one, a in form(args[0]).items():
+                for two, b in form(args[1]).items():
+                    term = tuple(sorted(one + two, key=lambda n: n.index))
+                    result[term] = result.get(term, Fraction(0)) + a * b
+        elif op == "neg":
+            result = {term: -factor for term, factor in form(args[0]).items()}
+        elif op == "guard":
+            result = form(args[0])
+        if result is not None:
+            result = {term: factor for term, factor in result.items() if factor}
+        forms[node] = {(node,): Fraction(1)} if result is None or len(result) > TERMS else result
+    return {node: forms[node] for node in wanted}
+
+
+class Angles:
+    """Base angles of the arguments.
+
+    bases   (n,) the base angles, each a sum of terms; vectors: argument -> integers (n,) that combine them
+    quarter argument -> quarter turns to be added to the combination
+    """
+
+    def __init__(self, found: dict[Node, Linear]) -> None:
+        self.quarter: dict[Node, int] = {}
+        units: list[tuple[Term, Fraction]] = []
+        rows: dict[Node, dict[int, int]] = {}
+        factors: dict[Term, list[Fraction]] = {}
+        forms: dict[Node, Linear] = {}
+        for node in sorted(found, key=lambda n: n.index):
+            form = dict(found[node])
+            turns = 0
+            for term in list(form):
+                if len(term) == 1 and term[0].op == "pi" and (2 * form[term]).denominator == 1:
+                    turns = int(2 * form.pop(term))
+            self.quarter[node] = turns % 4
+            forms[node] = form
+            for term, factor in form.items():
+                factors.setdefault(term, []).append(factor)
+        places: dict[tuple[Term, Fraction], tuple[int, int]] = {}
+        for term, values in factors.items():
+            below = lcm(*[v.denominator for v in values])
+            common = Fraction(gcd(*[int(v * below) for v in values]), below)
+            whole = all(abs(v / common) <= MULTIPLES for v in values)
+            for v in values:
+                unit = common if whole else abs(v)
+                if (term, unit) not in units:
+                    units.append((term, unit))
+                places[term, v] = units.index((term, unit)), int(v / unit)
+        for node, form in forms.items():
+            rows[node] = dict(places[term, factor] for term, factor in form.items())
+        self.units = units
+        vectors = {node: tuple(row.get(k, 0) for k in range(len(units))) for node, row in rows.items()}
+        self.matrix = _basis(list(vectors.values()), len(units))
+        self.vectors = {node: combined(vector, self.matrix) for node, vector in vectors.items()}
+
+    @property
+    def bases(self) -> list[Linear]:
+        """The base angles, each as a sum of terms."""
+        return [{self.units[k][0]: n * self.units[k][1] for k, n in enumerate(row) if n} for row in self.matrix]
+
+
+def _basis(vectors: Iterable[tuple[int, ...]], n: int) -> list[tuple[int, ...]]:
+    """Vectors that all others, and all unit vectors that they reach, are integer combinations of; those that occur first."""
+    units = [tuple(int(i == k) for i in range(n)) for k in range(n)]
+    chosen: list[tuple[int, ...]] = []
+    for vector in sorted(set(vectors), key=lambda v: (sum(map(abs, v)), [-abs(i) for i in v])):
+        leading = next((i for i in vector if i), 0)
+        vector = tuple(-i for i in vector) if leading < 0 else vector
+        if leading and vector not in chosen and _independent([*chosen, vector]):
+            chosen.append(vector)
+    for unit in units:
+        if len(chosen) < n and _independent([*chosen, unit]):
+            chosen.append(unit)
+    return chosen if all(combined(v, chosen) is not None for v in [*vectors, *units]) else units
+
+
+def _independent(rows: Sequence[Sequence[int]]) -> bool:
+    return _eliminated(rows) == len(rows)
+
+
+def _eliminated(rows: Sequence[Sequence[int]]) -> int:
+    """Rank."""
+    left = [[Fraction(i) for i in row] for row in rows]
+    rank = 0
+    for column in range(len(left[0]) if left else 0):
+        pivot = next((k for k in range(rank, len(left)) if left[k][column]), None)
+        if pivot is None:
+            continue
+        left[rank], left[pivot] = left[pivot], left[rank]
+        for k in range(rank + 1, len(left)):
+            factor = left[k][column] / left[rank][column]
+            left[k] = [a - factor * b for a, b in zip(left[k], left[rank])]
+        rank += 1
+    return rank
+
+
+def combined(vector: Sequence[int], basis: Sequence[Sequence[int]]) -> Any:
+    """Integers that combine the rows of a square basis to the vector; None where they are no integers."""
+    n = len(basis)
+    left = [[Fraction(basis[j][i]) for j in range(n)] + [Fraction(vector[i])] for i in range(len(vector))]
+    row = 0
+    for column in range(n):
+        pivot = next((k for k in range(row, len(left)) if left[k][column]), None)
+        if pivot is None:
+            return None
+        left[row], left[pivot] = left[pivot], left[row]
+        left[row] = [a / left[row][column] for a in left[row]]
+        for k in range(len(left)):
+            if k != row and left[k][column]:
+                factor = left[k][column]
+                left[k] = [a - factor * b for a, b in zip(left[k], left[row])]
+        row += 1
+    values = [left[k][n] for k in range(n)]
+    return tuple(int(v) for v in values) if all(v.denominator == 1 for v in values) else None

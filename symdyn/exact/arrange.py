@@ -1,0 +1,358 @@
+"""Plain polynomials arranged to be read: factored, grouped by what multiplies what, nested; the shortest by one cost.
+
+A polynomial is a dict from monomials to fractions; a monomial is a sorted tuple of (letter, power). What comes out is a sum or a
+product: Product(number, ((letter or Sum, power), ...)) and Sum((Product, ...)). No relations between letters are used here.
+The cost counts what is written: an operation for each sign between terms, product, fraction bar, power and function, as
+sympy.count_ops does; of equal ones the fewer letters and digits.
+Source of the nesting: Ceberio and Kreinovich, Greedy algorithms for optimizing multivariate Horner schemes, SIGSAM Bulletin 38
+(2004).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any
+
+from flint import fmpq_mpoly_ctx
+
+from symdyn.exact.ring import fraction
+from symdyn.tape.sympy_bridge import printed_as_decimal
+
+Monomial = tuple[tuple[int, int], ...]
+# Integers where they can be: fractions take ten times as long.
+Polynomial = dict[Monomial, int | Fraction]
+Cost = tuple[int, int]
+
+# Longer polynomials are not given to the factorization; up to SEARCHED terms the best grouping is tried at each level, up to ALL
+# every one. A grouping must leave fewer terms than WORTH times those that there are.
+FACTORED, SEARCHED, ALL, WORTH = 120, 1000, 16, 1.0
+_KINDS = (("motion",), ("parameter",), ("position",))
+ONE = Fraction(1)
+
+
+@dataclass(frozen=True)
+class Letter:
+    """What a letter is written as: operations and length of its name, and the kind by which terms are grouped.
+
+    kind   "parameter", "position" (coordinates, functions of them, t) or "motion" (speeds, accelerations, inputs)
+    """
+
+    operations: int
+    length: int
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sum:
+    """Two or more terms."""
+
+    terms: tuple[Product, ...]
+    cost: Cost
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """number * factors."""
+
+    number: Fraction
+    factors: tuple[tuple[int | Sum, int], ...]
+    cost: Cost  # without its sign
+
+
+Tree = Sum | Product
+
+
+def total(tree: Tree) -> Cost:
+    """The cost with the sign."""
+    if isinstance(tree, Product) and tree.number < 0:
+        return tree.cost[0] + 1, tree.cost[1] + 1
+    return tree.cost
+
+
+class _Members(dict[int, bool]):
+    """Whether a letter is of these kinds."""
+
+    def __init__(self, letters: Sequence[Letter], kinds: tuple[str, ...]) -> None:
+        super().__init__()
+        self.letters, self.kinds = letters, kinds
+
+    def __missing__(self, letter: int) -> bool:
+        self[letter] = self.letters[letter].kind in self.kinds
+        return self[letter]
+
+
+class Arranger:
+    """Arranges polynomials in these letters."""
+
+    def __init__(self, letters: Sequence[Letter]) -> None:
+        self.letters = letters
+        self._known: dict[frozenset, Tree] = {}
+        self._split: dict[frozenset, Any] = {}
+        self._members: dict[tuple[str, ...], _Members] = {}
+
+    # -- making trees
+
+    def product(self, number: int | Fraction, factors: Iterable[tuple[int | Sum, int]]) -> Product:
+        """number * factors, without factors to the power zero."""
+        number = Fraction(number)
+        kept = tuple((base, power) for base, power in factors if power)
+        operations, length = max(len(kept) - 1, 0), 0
+        for base, power in kept:
+            cost = base.cost if isinstance(base, Sum) else (self.letters[base].operations, self.letters[base].length)
+            operations += cost[0] + (power > 1)
+            length += cost[1] + (power > 1) + 2 * isinstance(base, Sum)
+        above, below = abs(number.numerator), number.denominator
+        if below != 1 and printed_as_decimal(number):
+            above, below = 2, 1
+            length += 4
+        if above != 1 and kept:
+            operations += 1
+        operations += below != 1
+        length += (len(str(above)) if above != 1 or not kept else 0) + (len(str(below)) if below != 1 else 0)
+        return Product(number, kept, (operations, length))
+
+    def sum(self, terms: Sequence[Tree]) -> Tree:
+        """The sum of trees; sums among them are taken apart."""
+        flat: list[Product] = []
+        for term in terms:
+            if isinstance(term, Sum):
+                flat += term.terms
+            elif term.number:
+                flat.append(term)
+        if not flat:
+            return self.product(Fraction(0), ())
+        if len(flat) == 1:
+            return flat[0]
+        signs = len(flat) - 1 + all(term.number < 0 for term in flat)
+        return Sum(tuple(flat), (signs + sum(t.cost[0] for t in flat), signs + sum(t.cost[1] for t in flat)))
+
+    def times(self, number: Fraction, factors: Sequence[tuple[int, int]], trees: Sequence[tuple[Tree, int]]) -> Product:
+        """number * letters * trees to their powers."""
+        parts: dict[Any, int] = dict(factors)
+        for tree, power in trees:
+            if isinstance(tree, Sum):
+                parts[tree] = parts.get(tree, 0) + power
+            else:
+                number *= tree.number ** power
+                for base, n in tree.factors:
+                    parts[base] = parts.get(base, 0) + n * power
+        letters = sorted(item for item in parts.items() if isinstance(item[0], int))
+        return self.product(number, [*letters, *[item for item in parts.items() if not isinstance(item[0], int)]])
+
+    # -- forms
+
+    def expanded(self, p: Polynomial) -> Tree:
+        """Term by term."""
+        return self.sum([self.product(c, m) for m, c in sorted(p.items())])
+
+    def factored(self, p: Polynomial) -> Tree:
+        """Factors over the rational numbers, each multiplied out."""
+        number, common, q = stripped(p)
+        parts = self._factors(q) or [(q, 1)]
+        return self.times(number, common, [(self.expanded(part), power) for part, power in parts])
+
+    def grouped(self, p: Polynomial, kinds: tuple[str, ...], inner: Callable[[Polynomial], Tree] | None = None) -> Tree | None:
+        """Gathered by the monomials in letters of these kinds; those with the same factor stand together.
+
+        None where there is nothing to gather."""
+        groups = self._groups(p, kinds)
+        return None if groups is None else self._gathered(groups, inner or self.nested)
+
+    def _groups(self, p: Polynomial, kinds: tuple[str, ...]) -> list[tuple[Polynomial, Polynomial]] | None:
+        """Pairs of polynomials whose products add up: letters of these kinds with what is common, and all others."""
+        rows: dict[Monomial, Polynomial] = {}
+        members = self._members.setdefault(kinds, _Members(self.letters, kinds))
+        for m, c in p.items():
+            own = tuple([item for item in m if members[item[0]]])
+            rest = tuple([item for item in m if not members[item[0]]]) if own else m
+            rows.setdefault(own, {})[rest] = c
+        if len(rows) == 1:
+            return None
+        merged: dict[frozenset, tuple[Polynomial, Polynomial]] = {}
+        for own, row in sorted(rows.items()):
+            number, common, q = stripped(row)
+            # What is common goes with the group; what is left tells which groups belong together.
+            left, _ = merged.setdefault(frozenset(q.items()), ({}, q))
+            left[multiplied(own, common)] = integer(number)
+        return None if len(merged) == 1 or len(merged) == len(p) else list(merged.values())
+
+    def _gathered(self, groups: Sequence[tuple[Polynomial, Polynomial]], arrange: Callable[[Polynomial], Tree]) -> Tree:
+        return self.sum([self._both(arrange(left), arrange(right)) for left, right in groups])
+
+    def _both(self, a: Tree, b: Tree) -> Tree:
+        """a b."""
+        if isinstance(a, Product) and not a.factors and a.number == 1:
+            return b
+        if isinstance(b, Product) and not b.factors and b.number == 1:
+            return a
+        return self.times(ONE, (), [(a, 1), (b, 1)])
+
+    def nested(self, p: Polynomial) -> Tree:
+        """The shortest that factoring, grouping and Horner's scheme lead to, each applied to what the other leaves."""
+        if len(p) == 1:
+            (m, c), = p.items()
+            return self.product(c, m)
+        if not p:
+            return self.product(Fraction(0), ())
+        number, common, q = stripped(p)
+        tree = self._nested(q)
+        if number == 1 and not common:
+            return tree
+        if number == -1 and not common and isinstance(tree, Sum):
+            return Sum(tuple(Product(-t.number, t.factors, t.cost) for t in tree.terms),
+                       _resigned(tree))
+        return self.times(number, common, [(tree, 1)])
+
+    def _nested(self, q: Polynomial) -> Tree:
+        key = frozenset(q.items())
+        tree = self._known.get(key)
+        if tree is None:
+            tree = self._known[key] = self._arranged(q)
+        return tree
+
+    def _arranged(self, q: Polynomial) -> Tree:
+        if len(q) <= 1:
+            return self.expanded(q)
+        if len(q) == 2:
+            parts = self._factors(q)
+            return self.expanded(q) if parts is None else self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
+        parts = self._factors(q)
+        if parts is not None:
+            return self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
+        found: list[Tree] = [self.horner(q)]
+        if len(q) <= SEARCHED:
+            groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
+            # Terms that are left to arrange tell which of them are worth it.
+            left = [sum(len(a) + len(b) for a, b in g) for g in groups]
+            if len(q) > ALL and groups:
+                groups = [groups[left.index(min(left))]] if min(left) < WORTH * len(q) else []
+            found += [self._gathered(g, self.nested) for g in groups]
+        return min(found, key=total)
+
+    def horner(self, p: Polynomial) -> Tree:
+        """The letter in most terms is taken out of them, again and again."""
+        counts: dict[int, int] = {}
+        for m in p:
+            for letter, _ in m:
+                counts[letter] = counts.get(letter, 0) + 1
+        letter, most = max(counts.items(), key=lambda item: (item[1], self.letters[item[0]].operations, -item[0]))
+        if most < 2:
+            return self.expanded(p)
+        inside: Polynomial = {}
+        outside: Polynomial = {}
+        for m, c in p.items():
+            for k, (own, power) in enumerate(m):
+                if own == letter:
+                    inside[(*m[:k], (own, power - 1), *m[k + 1:]) if power > 1 else (*m[:k], *m[k + 1:])] = c
+                    break
+            else:
+                outside[m] = c
+        first = self.times(ONE, ((letter, 1),), [(self.nested(inside), 1)])
+        if not outside:
+            return first
+        return self.sum([first, self.nested(outside)])
+
+    def _factors(self, q: Polynomial) -> list[tuple[Polynomial, int]] | None:
+        """Factors of a polynomial without common number and letters; None if there is but one, or if it is too long."""
+        if len(q) > FACTORED or len(q) < 2 or _irreducible(q) or any(type(c) is not int for c in q.values()):
+            return None
+        key = frozenset(q.items())
+        if key in self._split:
+            return self._split[key]
+        used = sorted({letter for m in q for letter, _ in m})
+        place = {letter: k for k, letter in enumerate(used)}
+        context = fmpq_mpoly_ctx.get(("x", len(used)), "lex")
+        rows = {}
+        for m, c in q.items():
+            exponents = [0] * len(used)
+            for letter, power in m:
+                exponents[place[letter]] = power
+            rows[tuple(exponents)] = c
+        unit, parts = context.from_dict(rows).factor()
+        if len(parts) == 1 and parts[0][1] == 1:
+            self._split[key] = None
+            return None
+        result: list[tuple[Polynomial, int]] = []
+        number = fraction(unit)
+        for part, power in parts:
+            poly: Polynomial = {tuple((used[k], int(n)) for k, n in enumerate(exponents) if n): integer(fraction(c))
+                                for exponents, c in part.terms()}
+            scale, _, poly = stripped(poly)
+            number *= scale ** int(power)
+            result.append((poly, int(power)))
+        if number != 1:  # the sign, at most: contents are taken out before
+            poly, power = next(((f, n) for f, n in result if n % 2), result[0])
+            result = [({m: integer(number * c) for m, c in f.items()}, n) if f is poly else (f, n) for f, n in result]
+        self._split[key] = result
+        return result
+
+
+def _resigned(tree: Sum) -> Cost:
+    """The cost of a sum with all signs changed."""
+    negative = sum(t.number < 0 for t in tree.terms)
+    change = (negative == 0) - (negative == len(tree.terms))
+    return tree.cost[0] + change, tree.cost[1] + change
+
+
+def stripped(p: Polynomial) -> tuple[Fraction, Monomial, Polynomial]:
+    """Number and letters common to all terms, and what is left, in which most terms are positive."""
+    numbers = list(p.values())
+    number: Any = 1
+    if all(type(c) is int for c in numbers):
+        number = gcd(*numbers)
+    elif any(printed_as_decimal(Fraction(c)) for c in numbers):
+        size = abs(numbers[0])
+        number = size if all(abs(c) == size for c in numbers) else 1
+    else:
+        number = Fraction(gcd(*[c.numerator for c in numbers]), lcm(*[c.denominator for c in numbers]))
+    negative = sum(c < 0 for c in numbers)
+    if 2 * negative > len(numbers) or (2 * negative == len(numbers) and p[min(p)] < 0):
+        number = -number
+    common = dict(next(iter(p)))
+    for m in p:
+        if not common:
+            break
+        powers = dict(m)
+        common = {letter: min(n, powers[letter]) for letter, n in common.items() if letter in powers}
+    if number == 1 and not common:
+        return ONE, (), p
+    if common:
+        p = {tuple([(letter, n - common.get(letter, 0)) for letter, n in m if n != common.get(letter, 0)]): c
+             for m, c in p.items()}
+    if number != 1:
+        p = {m: _divided(c, number) for m, c in p.items()}
+    return Fraction(number), tuple(sorted(common.items())), p
+
+
+def integer(value: Fraction) -> int | Fraction:
+    """An integer as one."""
+    return value.numerator if value.denominator == 1 else value
+
+
+def _divided(c: Any, number: Any) -> int | Fraction:
+    """c / number, an integer where it is one."""
+    if type(c) is int and type(number) is int:
+        return c // number
+    return integer(Fraction(c) / number)
+
+
+def multiplied(a: Monomial, b: Monomial) -> Monomial:
+    """The product of two monomials."""
+    if not a or not b:
+        return a or b
+    powers = dict(a)
+    for letter, n in b:
+        powers[letter] = powers.get(letter, 0) + n
+    return tuple(sorted(powers.items()))
+
+
+def _irreducible(q: Mapping[Monomial, Fraction]) -> bool:
+    """Whether a letter stands in one term only, to the first power: then nothing but letters could be a factor."""
+    counts: dict[int, list[int]] = {}
+    for m in q:
+        for letter, n in m:
+            counts.setdefault(letter, []).append(n)
+    return any(powers == [1] for powers in counts.values())

@@ -1,0 +1,289 @@
+"""One value in several sets of letters: sines and cosines of base angles, of sums of angles, Fourier form.
+
+The polynomial in sines and cosines of base angles is a normal form, but not the shortest: c1 c2 - s1 s2 is cos(q1 + q2), and of
+s^2 and c^2 either may be written by the other. What leaves here is a plain polynomial in letters, for symdyn.exact.arrange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Any
+
+from symdyn.exact.angles import combined
+from symdyn.exact.arrange import Monomial, Polynomial, integer, multiplied
+from symdyn.exact.ring import fraction
+from symdyn.exact.walk import Exact
+
+Vector = tuple[int, ...]
+# Fourier forms with this many times the terms of the polynomial are not made; products of more sines neither.
+GROWTH, DEGREE = 4, 8
+# Sums of angles that are tried as base angles.
+TRIED = 6
+
+
+class Letters:
+    """Numbers of letters: generators of plain symbols and functions keep theirs, sines and cosines of sums get new ones.
+
+    turns   letter -> ("sin" or "cos", vector of integers over the base angles)
+    opposite   vector -> whether its opposite is the one to write
+    """
+
+    def __init__(self, exact: Exact, opposite: Callable[[Vector], bool]) -> None:
+        n = len(exact.bases)
+        self.opposite = opposite
+        self.first = len(exact.ring.generators)
+        self.turns: dict[int, tuple[str, Vector]] = {}
+        self._numbers: dict[tuple[str, Vector], int] = {}
+        self.sines = exact.sines
+        self.units: dict[int, int] = {}
+        for k, (s, c) in enumerate(exact.sines):
+            unit = tuple(int(i == k) for i in range(n))
+            for name, g in (("sin", s), ("cos", c)):
+                self.turns[g] = name, unit
+                self._numbers[name, unit] = g
+
+    def of(self, name: str, vector: Vector) -> tuple[int, int]:
+        """Letter and sign of the sine or cosine of a combination of base angles; the vector is not zero."""
+        sign = 1
+        if (name, vector) not in self._numbers and (
+                (name, tuple(-i for i in vector)) in self._numbers or self.opposite(vector)):
+            vector = tuple(-i for i in vector)
+            sign = -1 if name == "sin" else 1
+        letter = self._numbers.setdefault((name, vector), self.first + len(self._numbers))
+        self.turns[letter] = name, vector
+        return letter, sign
+
+
+def plain(num: Any) -> Polynomial:
+    """A polynomial of FLINT as a dict."""
+    return {tuple([(k, int(n)) for k, n in enumerate(exponents) if n]): integer(fraction(c)) for exponents, c in num.terms()}
+
+
+class Basis:
+    """Other base angles: generator pair k of the polynomial stands for the angle rows[k], a combination of the first ones."""
+
+    def __init__(self, exact: Exact, rows: tuple[Vector, ...]) -> None:
+        self.exact, self.rows = exact, rows
+        ring = exact.ring
+        taken = list(ring.generators)
+        for k, (s, c) in enumerate(exact.sines):
+            unit = tuple(int(i == k) for i in range(len(rows)))
+            if unit not in rows or rows.index(unit) != k:
+                combination = combined(unit, rows)
+                sine, cosine = exact.of_sum(combination)
+                taken[s], taken[c] = sine.num, cosine.num
+        self._taken = taken
+
+    def of(self, num: Any) -> Any:
+        """The polynomial in sines and cosines of these angles, with c^2 or s^2 replaced, whichever is shorter."""
+        ring = self.exact.ring
+        if any(a is not b for a, b in zip(self._taken, ring.generators)):
+            num = ring.reduced(num.compose(*self._taken, ctx=ring.context))
+        degrees = num.degrees() if len(num) else ()
+        for k, (s, c) in enumerate(self.exact.sines):
+            if not degrees or degrees[c] < 2:
+                continue
+            swapped = list(ring.generators)
+            swapped[s], swapped[c] = swapped[c], swapped[s]
+            other = ring.reduced(num.compose(*swapped, ctx=ring.context)).compose(*swapped, ctx=ring.context)
+            if len(other) < len(num):
+                num = other
+        return num
+
+    def plain(self, num: Any, letters: Letters) -> Polynomial:
+        """A polynomial in sines and cosines of these angles as a dict in letters."""
+        p = plain(num)
+        new: dict[int, tuple[int, int]] = {}
+        for k, (s, c) in enumerate(self.exact.sines):
+            for name, g in (("sin", s), ("cos", c)):
+                letter = letters.of(name, self.rows[k])
+                if letter != (g, 1):
+                    new[g] = letter
+        if not new:
+            return p
+        result = {}
+        for m, c in p.items():
+            sign = 1
+            for g, n in m:
+                if g in new and n % 2:
+                    sign *= new[g][1]
+            result[tuple(sorted([(new[g][0] if g in new else g, n) for g, n in m]))] = sign * c
+        return result
+
+
+def better_basis(exact: Exact, letters: Letters, num: Any) -> Basis | None:
+    """Base angles in which a long polynomial has fewer terms: sums that its contraction shows."""
+    n = len(exact.bases)
+    rows = tuple(tuple(int(i == k) for i in range(n)) for k in range(n))
+    first = Basis(exact, rows)
+    start = first.of(num)
+    counts: dict[Vector, int] = {}
+    for m in contracted(first.plain(start, letters), letters):
+        for letter, _ in m:
+            if letter in letters.turns:
+                vector = letters.turns[letter][1]
+                if sum(map(abs, vector)) > 1:
+                    counts[vector] = counts.get(vector, 0) + 1
+    best, length = None, len(start)
+    for vector in sorted(counts, key=lambda v: (-counts[v], v))[:TRIED]:
+        for k in range(n):
+            if abs(vector[k]) != 1:
+                continue
+            other = Basis(exact, (*rows[:k], vector, *rows[k + 1:])) if _regular(rows, k, vector) else None
+            if other is not None and len(other.of(num)) < length:
+                best, length = other, len(other.of(num))
+        rows = best.rows if best else rows
+    return best
+
+
+def _regular(rows: tuple[Vector, ...], k: int, vector: Vector) -> bool:
+    """Whether the rows with another one in place of row k still reach every combination."""
+    combination = combined(vector, rows)
+    return combination is not None and abs(combination[k]) == 1
+
+
+def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
+    """Sums of sines and cosines of combinations of the base angles; None where that is much longer."""
+    most = GROWTH * len(p) + 20
+    groups: dict[Monomial, list[tuple[Monomial, Fraction]]] = {}
+    turns = letters.turns
+    for m, c in p.items():
+        own = tuple(item for item in m if item[0] in turns)
+        rest = tuple(item for item in m if item[0] not in turns)
+        groups.setdefault(own, []).append((rest, c))
+    result: Polynomial = {}
+    for own, row in groups.items():
+        if sum(n for _, n in own) > DEGREE:
+            return None
+        for trig, factor in _series(own, letters):
+            for rest, c in row:
+                m = multiplied(rest, trig)
+                value = result.get(m, 0) + factor * c
+                if value:
+                    result[m] = value
+                else:
+                    result.pop(m, None)
+        if len(result) > most:
+            return None
+    return {m: integer(Fraction(c)) for m, c in result.items()}
+
+
+def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, Fraction]]:
+    """A product of sines and cosines as a sum of them: letter (or none) and number."""
+    n = len(letters.sines)
+    zero = (0,) * n
+    parts: dict[tuple[str, Vector], Fraction] = {("cos", zero): Fraction(1)}
+    half = Fraction(1, 2)
+    for letter, power in own:
+        name, unit = letters.turns[letter]
+        for _ in range(power):
+            after: dict[tuple[str, Vector], Fraction] = {}
+            for (kind, vector), c in parts.items():
+                up = tuple(a + b for a, b in zip(vector, unit))
+                down = tuple(a - b for a, b in zip(vector, unit))
+                # kind(vector) * name(unit) as half a sum.
+                if kind == name == "cos":
+                    made = (("cos", up, 1), ("cos", down, 1))
+                elif kind == name:
+                    made = (("cos", down, 1), ("cos", up, -1))
+                elif kind == "sin":
+                    made = (("sin", up, 1), ("sin", down, 1))
+                else:
+                    made = (("sin", up, 1), ("sin", down, -1))
+                for what, v, sign in made:
+                    after[what, v] = after.get((what, v), Fraction(0)) + sign * half * c
+            parts = after
+    found: dict[Monomial, Fraction] = {}
+    for (kind, vector), c in parts.items():
+        if not any(vector):
+            m: Monomial = ()
+            if kind == "sin":
+                continue
+        else:
+            letter, sign = letters.of(kind, vector)
+            m, c = ((letter, 1),), sign * c
+        found[m] = found.get(m, Fraction(0)) + c
+    return [(m, c) for m, c in found.items() if c]
+
+
+def contracted(p: Polynomial, letters: Letters) -> Polynomial:
+    """Pairs of terms that are one by a theorem of sums, x - x c^2 = x s^2 or x s^2 + x c^2 = x, the most frequent kind first."""
+    p = dict(p)
+    while True:
+        kinds: dict[tuple[int, int], list[tuple[Monomial, Monomial, Monomial, int]]] = {}
+        for kind, *pair in _matches(p, letters):
+            kinds.setdefault(kind, []).append(tuple(pair))
+        if not kinds:
+            return p
+        for kind in sorted(kinds, key=lambda k: (-len(kinds[k]), k)):
+            for one, two, m, factor in kinds[kind]:
+                a, b = p.get(one), p.get(two)
+                if a is None or b is None or abs(a) != abs(b):
+                    continue
+                del p[one], p[two]
+                value = p.get(m, 0) + factor * a
+                if value:
+                    p[m] = value
+                else:
+                    p.pop(m, None)
+
+
+def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int], Monomial, Monomial, Monomial, int]]:
+    """Pairs of terms: the cosines of the angles that they stand for, both terms, what they become together, and its number as a
+    multiple of the first one's."""
+    turns, of = letters.turns, letters.of
+    pairs: dict[tuple[int, int], tuple[int, int, tuple[int, int], tuple[int, int]] | None] = {}
+
+    def partner(x: int, y: int) -> tuple[int, int, tuple[int, int], tuple[int, int]] | None:
+        """Letters that stand in the other term, and what both are with letters and sign: for the same number and the opposite."""
+        name, v = turns[x]
+        second, w = turns[y]
+        if v == w or (name == "sin" and second == "sin"):
+            return None
+        up = of(name, tuple([i + j for i, j in zip(v, w)]))
+        down = of(name, tuple([i - j for i, j in zip(v, w)]))
+        other = "cos" if name == "sin" else "sin"
+        a, b = of(other, v)[0], of("sin", w)[0]
+        if name == "sin":
+            return a, b, up, down
+        return (a, b, down, up) if second == "cos" else None
+
+    for m, a in list(p.items()):
+        trig = [item for item in m if item[0] in turns]
+        for x, n in trig:
+            if n >= 2:
+                name, v = turns[x]
+                rest = _less(m, x, 2)
+                other = of("sin" if name == "cos" else "cos", v)[0]
+                squared = multiplied(rest, ((other, 2),))
+                if p.get(rest) == -a:
+                    yield (x, x), m, rest, squared, -1
+                elif name == "cos" and p.get(squared) == a:
+                    yield (x, x), m, squared, rest, 1
+        for x, _ in trig:
+            for y, _ in trig:
+                # Cosines once a pair; a sine first.
+                if x == y or (x > y and turns[x][0] == "cos"):
+                    continue
+                if (x, y) not in pairs:
+                    pairs[x, y] = partner(x, y)
+                found = pairs[x, y]
+                if found is None:
+                    continue
+                one, two, same, opposite = found
+                rest = _less(_less(m, x, 1), y, 1)
+                other_term = multiplied(rest, ((one, 1), (two, 1)) if one < two else ((two, 1), (one, 1)))
+                b = p.get(other_term)
+                if b is None or abs(b) != abs(a):
+                    continue
+                letter, sign = same if b == a else opposite
+                yield (x, y), m, other_term, multiplied(rest, ((letter, 1),)), sign
+
+
+def _less(m: Monomial, letter: int, power: int) -> Monomial:
+    """The monomial without so many factors of a letter."""
+    for k, (own, n) in enumerate(m):
+        if own == letter:
+            return (*m[:k], (own, n - power), *m[k + 1:]) if n > power else (*m[:k], *m[k + 1:])
+    raise ValueError(f"{letter} does not stand in {m}")
