@@ -21,15 +21,15 @@ Linear = dict[Term, Fraction]
 TERMS, MULTIPLES = 12, 8
 
 
-def arguments(steps: Sequence[Node]) -> dict[Node, Linear]:
+def arguments(steps: Sequence[Node]) -> dict[Any, Linear]:
     """Every argument of a sine or cosine as sum of terms; () is the term of a number."""
     forms: dict[Node, Linear] = {}
 
     def form(value: Any) -> Linear:
         return forms[value] if isinstance(value, Node) else {(): Fraction(value)} if value else {}
 
-    wanted = {node.args[0] for node in steps if node.op in ("sin", "cos") and isinstance(node.args[0], Node)}
-    needed = set(wanted)
+    wanted = {node.args[0] for node in steps if node.op in ("sin", "cos", "tan")}
+    needed = {a for a in wanted if isinstance(a, Node)}
     for node in reversed(steps):
         if node in needed and node.op in ("add", "sub", "mul", "neg", "div", "guard"):
             needed.update(a for a in node.args if isinstance(a, Node))
@@ -55,7 +55,7 @@ def arguments(steps: Sequence[Node]) -> dict[Node, Linear]:
         if result is not None:
             result = {term: factor for term, factor in result.items() if factor}
         forms[node] = {(node,): Fraction(1)} if result is None or len(result) > TERMS else result
-    return {node: forms[node] for node in wanted}
+    return {a: form(a) for a in sorted(wanted, key=lambda a: (isinstance(a, Node), a.index if isinstance(a, Node) else a))}
 
 
 class Angles:
@@ -65,14 +65,14 @@ class Angles:
     quarter argument -> quarter turns to be added to the combination
     """
 
-    def __init__(self, found: dict[Node, Linear]) -> None:
-        self.quarter: dict[Node, int] = {}
+    def __init__(self, found: dict[Any, Linear]) -> None:
+        self.quarter: dict[Any, int] = {}
         units: list[tuple[Term, Fraction]] = []
-        rows: dict[Node, dict[int, int]] = {}
+        rows: dict[Any, dict[int, int]] = {}
         factors: dict[Term, list[Fraction]] = {}
-        forms: dict[Node, Linear] = {}
-        for node in sorted(found, key=lambda n: n.index):
-            form = dict(found[node])
+        forms: dict[Any, Linear] = {}
+        for node, own in found.items():
+            form = dict(own)
             turns = 0
             for term in list(form):
                 if len(term) == 1 and term[0].op == "pi" and (2 * form[term]).denominator == 1:
@@ -143,8 +143,8 @@ def combined(vector: Sequence[int], basis: Sequence[Sequence[int]]) -> Any:
     """Integers that combine the rows of a square basis to the vector; None where they are no integers."""
     n = len(basis)
     left = [[Fraction(basis[j][i]) for j in range(n)] + [Fraction(vector[i])] for i in range(len(vector))]
-    row = 0
     for column in range(n):
+        row = column
         pivot = next((k for k in range(row, len(left)) if left[k][column]), None)
         if pivot is None:
             return None
@@ -154,6 +154,5 @@ def combined(vector: Sequence[int], basis: Sequence[Sequence[int]]) -> Any:
             if k != row and left[k][column]:
                 factor = left[k][column]
                 left[k] = [a - factor * b for a, b in zip(left[k], left[row])]
-        row += 1
     values = [left[k][n] for k in range(n)]
     return tuple(int(v) for v in values) if all(v.denominator == 1 for v in values) else None

@@ -10,7 +10,7 @@ Source of the nesting: Ceberio and Kreinovich, Greedy algorithms for optimizing 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -23,7 +23,8 @@ from symdyn.tape.sympy_bridge import printed_as_decimal
 
 Monomial = tuple[tuple[int, int], ...]
 # Integers where they can be: fractions take ten times as long.
-Polynomial = dict[Monomial, int | Fraction]
+Number = int | Fraction
+Polynomial = dict[Monomial, Number]
 Cost = tuple[int, int]
 
 # Longer polynomials are not given to the factorization; up to SEARCHED terms the best grouping is tried at each level, up to ALL
@@ -37,12 +38,14 @@ ONE = Fraction(1)
 class Letter:
     """What a letter is written as: operations and length of its name, and the kind by which terms are grouped.
 
-    kind   "parameter", "position" (coordinates, functions of them, t) or "motion" (speeds, accelerations, inputs)
+    kind     "parameter", "position" (coordinates, functions of them, t) or "motion" (speeds, accelerations, inputs)
+    below    whether it stands for what a fraction is divided by
     """
 
     operations: int
     length: int
     kind: str
+    below: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +113,8 @@ class Arranger:
             length += 4
         if above != 1 and kept:
             operations += 1
-        operations += below != 1
+        operations += below != 1 or (above == 1 and bool(kept) and all(
+            isinstance(base, int) and self.letters[base].below for base, _ in kept))
         length += (len(str(above)) if above != 1 or not kept else 0) + (len(str(below)) if below != 1 else 0)
         return Product(number, kept, (operations, length))
 
@@ -129,8 +133,9 @@ class Arranger:
         signs = len(flat) - 1 + all(term.number < 0 for term in flat)
         return Sum(tuple(flat), (signs + sum(t.cost[0] for t in flat), signs + sum(t.cost[1] for t in flat)))
 
-    def times(self, number: Fraction, factors: Sequence[tuple[int, int]], trees: Sequence[tuple[Tree, int]]) -> Product:
+    def times(self, number: int | Fraction, factors: Sequence[tuple[int, int]], trees: Sequence[tuple[Tree, int]]) -> Product:
         """number * letters * trees to their powers."""
+        number = Fraction(number)
         parts: dict[Any, int] = dict(factors)
         for tree, power in trees:
             if isinstance(tree, Sum):
@@ -139,8 +144,38 @@ class Arranger:
                 number *= tree.number ** power
                 for base, n in tree.factors:
                     parts[base] = parts.get(base, 0) + n * power
-        letters = sorted(item for item in parts.items() if isinstance(item[0], int))
-        return self.product(number, [*letters, *[item for item in parts.items() if not isinstance(item[0], int)]])
+        first = sorted(item for item in parts.items() if isinstance(item[0], int))
+        sums = [item for item in parts.items() if not isinstance(item[0], int)]
+        best = self.product(number, [*first, *sums])
+        size = abs(number)
+        if size != 1 and not printed_as_decimal(size):
+            # l (2 a + b) / 2 is l (a + b / 2).
+            for k, (base, power) in enumerate(sums):
+                if power == 1:
+                    inside = self.scaled(base, size)
+                    other = self.product(number / size, [*first, *sums[:k], (inside, 1), *sums[k + 1:]])
+                    best = min(best, other, key=lambda tree: tree.cost)
+        return best
+
+    def scaled(self, tree: Sum, number: Fraction) -> Sum:
+        """The sum with a number multiplied into its terms."""
+        scaled = self.sum([self.product(t.number * number, t.factors) for t in tree.terms])
+        assert isinstance(scaled, Sum)
+        return scaled
+
+    def signed(self, tree: Tree) -> Tree:
+        """-x (a - b) as x (b - a), where nothing stands before it that takes the sign."""
+        if isinstance(tree, Sum) and all(t.number < 0 for t in tree.terms):
+            for k, term in enumerate(tree.terms):
+                turned = self.signed(term)
+                if turned is not term:
+                    return self.sum([*tree.terms[:k], turned, *tree.terms[k + 1:]])
+        if isinstance(tree, Product) and tree.number < 0:
+            for k, (base, power) in enumerate(tree.factors):
+                if isinstance(base, Sum) and power % 2 and len({t.number < 0 for t in base.terms}) == 2:
+                    inside = self.scaled(base, -ONE)
+                    return self.product(-tree.number, [*tree.factors[:k], (inside, power), *tree.factors[k + 1:]])
+        return tree
 
     # -- forms
 
@@ -223,6 +258,9 @@ class Arranger:
         if parts is not None:
             return self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
         found: list[Tree] = [self.horner(q)]
+        squares = self._squares(q)
+        if squares is not None:
+            found.append(squares)
         if len(q) <= SEARCHED:
             groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
             # Terms that are left to arrange tell which of them are worth it.
@@ -255,6 +293,37 @@ class Arranger:
             return first
         return self.sum([first, self.nested(outside)])
 
+    def _squares(self, q: Polynomial) -> Tree | None:
+        """(a - b + ...)^2 for a^2 - 2 a b + b^2 + ..., and the rest; None without such terms."""
+        roots: list[tuple[Monomial, Number]] = []
+        for m, c in sorted(q.items()):
+            if m and all(n % 2 == 0 for _, n in m):
+                roots.append((tuple([(letter, n // 2) for letter, n in m]), c))
+        if len(roots) < 2:
+            return None
+        left = dict(q)
+        terms: list[Tree] = []
+        for k, (first, scale) in enumerate(roots):
+            if multiplied(first, first) not in left:
+                continue
+            chosen: list[tuple[Monomial, Number]] = [(first, 1)]
+            for other, c in roots[k + 1:]:
+                if c != scale or multiplied(other, other) not in left:
+                    continue
+                signs = {sign * (1 if left.get(multiplied(m, other)) == 2 * scale else
+                                 -1 if left.get(multiplied(m, other)) == -2 * scale else 0) for m, sign in chosen}
+                if signs in ({1}, {-1}):
+                    chosen.append((other, signs.pop()))
+            if len(chosen) > 1:
+                for i, (a, _) in enumerate(chosen):
+                    for b, _ in chosen[i:]:
+                        del left[multiplied(a, b)]
+                inside = self.nested(dict(chosen))
+                terms.append(self.times(scale, (), [(inside, 2)]))
+        if not terms:
+            return None
+        return self.sum([*terms, self.nested(left)])
+
     def _factors(self, q: Polynomial) -> list[tuple[Polynomial, int]] | None:
         """Factors of a polynomial without common number and letters; None if there is but one, or if it is too long."""
         if len(q) > FACTORED or len(q) < 2 or _irreducible(q) or any(type(c) is not int for c in q.values()):
@@ -265,7 +334,7 @@ class Arranger:
         used = sorted({letter for m in q for letter, _ in m})
         place = {letter: k for k, letter in enumerate(used)}
         context = fmpq_mpoly_ctx.get(("x", len(used)), "lex")
-        rows = {}
+        rows: dict[tuple[int, ...], Any] = {}
         for m, c in q.items():
             exponents = [0] * len(used)
             for letter, power in m:
@@ -299,7 +368,7 @@ def _resigned(tree: Sum) -> Cost:
 
 def stripped(p: Polynomial) -> tuple[Fraction, Monomial, Polynomial]:
     """Number and letters common to all terms, and what is left, in which most terms are positive."""
-    numbers = list(p.values())
+    numbers: list[Any] = list(p.values())
     number: Any = 1
     if all(type(c) is int for c in numbers):
         number = gcd(*numbers)
@@ -349,7 +418,7 @@ def multiplied(a: Monomial, b: Monomial) -> Monomial:
     return tuple(sorted(powers.items()))
 
 
-def _irreducible(q: Mapping[Monomial, Fraction]) -> bool:
+def _irreducible(q: Polynomial) -> bool:
     """Whether a letter stands in one term only, to the first power: then nothing but letters could be a factor."""
     counts: dict[int, list[int]] = {}
     for m in q:

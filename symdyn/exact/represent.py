@@ -6,12 +6,12 @@ s^2 and c^2 either may be written by the other. What leaves here is a plain poly
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
 from symdyn.exact.angles import combined
-from symdyn.exact.arrange import Monomial, Polynomial, integer, multiplied
+from symdyn.exact.arrange import Monomial, Number, Polynomial, integer, multiplied
 from symdyn.exact.ring import fraction
 from symdyn.exact.walk import Exact
 
@@ -25,18 +25,20 @@ TRIED = 6
 class Letters:
     """Numbers of letters: generators of plain symbols and functions keep theirs, sines and cosines of sums get new ones.
 
-    turns   letter -> ("sin" or "cos", vector of integers over the base angles)
+    turns      letter -> ("sin", "cos" or "tan", vector of integers over the base angles)
+    below      letter -> what it is one over: the number of a factor of the ring, or -1 - letter
     opposite   vector -> whether its opposite is the one to write
     """
 
     def __init__(self, exact: Exact, opposite: Callable[[Vector], bool]) -> None:
         n = len(exact.bases)
         self.opposite = opposite
-        self.first = len(exact.ring.generators)
+        self._next = len(exact.ring.generators)
+        self.below: dict[int, int] = {}
+        self._inverses: dict[int, int] = {}
         self.turns: dict[int, tuple[str, Vector]] = {}
         self._numbers: dict[tuple[str, Vector], int] = {}
         self.sines = exact.sines
-        self.units: dict[int, int] = {}
         for k, (s, c) in enumerate(exact.sines):
             unit = tuple(int(i == k) for i in range(n))
             for name, g in (("sin", s), ("cos", c)):
@@ -49,10 +51,24 @@ class Letters:
         if (name, vector) not in self._numbers and (
                 (name, tuple(-i for i in vector)) in self._numbers or self.opposite(vector)):
             vector = tuple(-i for i in vector)
-            sign = -1 if name == "sin" else 1
-        letter = self._numbers.setdefault((name, vector), self.first + len(self._numbers))
-        self.turns[letter] = name, vector
+            sign = 1 if name == "cos" else -1
+        letter = self._numbers.get((name, vector))
+        if letter is None:
+            letter = self._numbers[name, vector] = self._new()
+            self.turns[letter] = name, vector
         return letter, sign
+
+    def inverse(self, key: int) -> int:
+        """The letter of one over a factor of the ring (its number), or over a letter (-1 - letter)."""
+        letter = self._inverses.get(key)
+        if letter is None:
+            letter = self._inverses[key] = self._new()
+            self.below[letter] = key
+        return letter
+
+    def _new(self) -> int:
+        self._next += 1
+        return self._next - 1
 
 
 def plain(num: Any) -> Polynomial:
@@ -81,7 +97,7 @@ class Basis:
         if any(a is not b for a, b in zip(self._taken, ring.generators)):
             num = ring.reduced(num.compose(*self._taken, ctx=ring.context))
         degrees = num.degrees() if len(num) else ()
-        for k, (s, c) in enumerate(self.exact.sines):
+        for s, c in self.exact.sines:
             if not degrees or degrees[c] < 2:
                 continue
             swapped = list(ring.generators)
@@ -102,13 +118,10 @@ class Basis:
                     new[g] = letter
         if not new:
             return p
-        result = {}
-        for m, c in p.items():
-            sign = 1
-            for g, n in m:
-                if g in new and n % 2:
-                    sign *= new[g][1]
-            result[tuple(sorted([(new[g][0] if g in new else g, n) for g, n in m]))] = sign * c
+        result: Polynomial = {}
+        for m, number in p.items():
+            odd = sum(n for g, n in m if g in new and new[g][1] < 0) % 2
+            result[tuple(sorted([(new[g][0] if g in new else g, n) for g, n in m]))] = -number if odd else number
         return result
 
 
@@ -143,10 +156,53 @@ def _regular(rows: tuple[Vector, ...], k: int, vector: Vector) -> bool:
     return combination is not None and abs(combination[k]) == 1
 
 
+def divided(p: Polynomial, under: Sequence[tuple[int, int]], factors: Sequence[Any], letters: Letters) -> Polynomial:
+    """The polynomial over factors of the ring, in letters for one over each of them."""
+    for k, n in under:
+        single = [(g, int(degree)) for g, degree in enumerate(factors[k].degrees()) if degree] if len(factors[k]) == 1 else []
+        if single:
+            (g, _), = single
+            inverse = letters.inverse(-1 - g)
+            p = {_cancelled(m, g, inverse, n): c for m, c in p.items()}
+        else:
+            inverse = letters.inverse(k)
+            p = {multiplied(m, ((inverse, n),)): c for m, c in p.items()}
+    return p
+
+
+def _cancelled(m: Monomial, letter: int, inverse: int, power: int) -> Monomial:
+    """m / letter^power."""
+    own = next((n for k, n in m if k == letter), 0)
+    common = min(own, power)
+    m = _less(m, letter, common) if common else m
+    return multiplied(m, ((inverse, power - common),)) if power > common else m
+
+
+def with_tangents(p: Polynomial, letters: Letters) -> Polynomial:
+    """sin / cos as tan."""
+    over = {letter: -1 - key for letter, key in letters.below.items()
+            if key < 0 and letters.turns.get(-1 - key, ("", ()))[0] == "cos"}
+    if not over:
+        return p
+    result: Polynomial = {}
+    for m, c in p.items():
+        for inverse, n in m:
+            if inverse in over:
+                vector = letters.turns[over[inverse]][1]
+                sine, sign = letters.of("sin", vector)
+                both = min(n, next((i for k, i in m if k == sine), 0))
+                if both:
+                    tangent, other = letters.of("tan", vector)
+                    m = multiplied(_less(_less(m, sine, both), inverse, both), ((tangent, both),))
+                    c = c * (sign * other) ** both
+        result[m] = result.get(m, 0) + c
+    return result
+
+
 def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
     """Sums of sines and cosines of combinations of the base angles; None where that is much longer."""
     most = GROWTH * len(p) + 20
-    groups: dict[Monomial, list[tuple[Monomial, Fraction]]] = {}
+    groups: dict[Monomial, list[tuple[Monomial, Number]]] = {}
     turns = letters.turns
     for m, c in p.items():
         own = tuple(item for item in m if item[0] in turns)
@@ -212,8 +268,8 @@ def contracted(p: Polynomial, letters: Letters) -> Polynomial:
     p = dict(p)
     while True:
         kinds: dict[tuple[int, int], list[tuple[Monomial, Monomial, Monomial, int]]] = {}
-        for kind, *pair in _matches(p, letters):
-            kinds.setdefault(kind, []).append(tuple(pair))
+        for kind, one, two, m, factor in _matches(p, letters):
+            kinds.setdefault(kind, []).append((one, two, m, factor))
         if not kinds:
             return p
         for kind in sorted(kinds, key=lambda k: (-len(kinds[k]), k)):
@@ -250,7 +306,7 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
         return (a, b, down, up) if second == "cos" else None
 
     for m, a in list(p.items()):
-        trig = [item for item in m if item[0] in turns]
+        trig = [item for item in m if item[0] in turns and turns[item[0]][0] != "tan"]
         for x, n in trig:
             if n >= 2:
                 name, v = turns[x]

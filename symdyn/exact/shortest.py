@@ -14,14 +14,16 @@ from typing import Any
 import sympy as sp
 
 from symdyn.errors import SymdynError, UnsupportedExpression
-from symdyn.exact.arrange import Arranger, Letter, Polynomial, Product, Sum, Tree, total
-from symdyn.exact.represent import Basis, Letters, better_basis, contracted, fourier, plain
-from symdyn.exact.ring import Value
+from symdyn.exact.arrange import Arranger, Letter, Polynomial, Sum, Tree, total
+from symdyn.exact.represent import Basis, Letters, better_basis, contracted, divided, fourier, plain, with_tangents
+from symdyn.exact.ring import BOUND, Value
+from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Atom, Exact
 from symdyn.shown import shown
 from symdyn.tape.external import UserFunction
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, SEED, SPEED, Node
-from symdyn.tape.sympy_bridge import applied, number
+from symdyn.tape.sympy_bridge import applied, expand, number
+from symdyn.tape.tape import Output, reachable
 
 FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters", "angles", "nested")
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
@@ -29,6 +31,10 @@ _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; longer polynomials are only nested, in the
 # two shortest representations.
 WORSE, SHORT = 1.5, 25
+# Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
+MULTIPLE = 10
+# Entries with so many operations at most are compared with the form in which they were derived.
+DERIVED = 400
 
 
 class Writer:
@@ -48,7 +54,7 @@ class Writer:
         self._written: dict[Any, sp.Expr] = {}
         n = len(exact.bases)
         self.bases = [Basis(exact, tuple(tuple(int(i == k) for i in range(n)) for k in range(n)))]
-        longest = max((value.num for value in exact.values if value is not None), key=len, default=None)
+        longest = max((value.num for value in exact.values), key=len, default=None)
         if n > 1 and longest is not None and form == "shortest":
             other = better_basis(exact, self.letters, longest)
             self.bases += [other] if other else []
@@ -69,9 +75,6 @@ class Writer:
         """What stands in an angle: a symbol, or something that the angle cannot be taken apart at."""
         if node.op == "leaf":
             return self.symbols.get(node, sp.Symbol(node.args[1]))
-        from symdyn.tape.sympy_bridge import expand
-        from symdyn.tape.tape import Output
-
         return expand(Output.of("angle", node), self.symbols)
 
     def _opposite(self, vector: tuple[int, ...]) -> bool:
@@ -87,6 +90,11 @@ class Writer:
         if letter in self.letters.turns:
             name, vector = self.letters.turns[letter]
             return getattr(sp, name)(self._angle(vector))
+        if letter in self.letters.below:
+            key = self.letters.below[letter]
+            if key < 0:
+                return self.expression(-1 - key)
+            return self.tree_expression(self.tree(Value(self.exact.ring.factors[key])))
         if letter in self.exact.leaves:
             return self._node(self.exact.leaves[letter])
         return self._function(self.exact.atoms[letter])
@@ -96,9 +104,9 @@ class Writer:
             kernel, *arguments = atom.args
             given = [self._argument(a) for a in arguments]
             if isinstance(kernel, UserFunction):
-                return kernel.applied(given)[atom.item]
+                return kernel.applied(given)[atom.item or 0]
             if kernel.letters:
-                return sp.Function(kernel.letters[atom.item])(*given)
+                return sp.Function(kernel.letters[atom.item or 0])(*given)
             raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
                                         "the right side instead")
         return applied(atom.op, [self._argument(a) for a in atom.args])
@@ -110,75 +118,98 @@ class Writer:
 
     def kind(self, letter: int) -> str:
         """Parameter, position or motion."""
+        if letter not in self._kinds:
+            self._kinds[letter] = self._kind(letter)
+        return self._kinds[letter]
+
+    def _kind(self, letter: int) -> str:
         leaf = self.exact.leaves.get(letter)
-        if leaf is None:
-            return "position"
-        mask = leaf.args[0]
-        return "parameter" if mask == PARAMETER else "motion" if mask & _MOTION else "position"
+        if leaf is not None:
+            mask = leaf.args[0]
+            return "parameter" if mask == PARAMETER else "motion" if mask & _MOTION else "position"
+        if letter in self.letters.below:
+            key = self.letters.below[letter]
+            return self.kind(-1 - key) if key < 0 else self._kind_of(self.exact.ring.factors[key])
+        if letter in self.exact.atoms and self.exact.atoms[letter].op != "call":
+            parts = [self._kind_of(a.num) for a in self.exact.atoms[letter].args if isinstance(a, Value)]
+            return "parameter" if all(kind == "parameter" for kind in parts) else "position"
+        return "position"
+
+    def _kind_of(self, num: Any) -> str:
+        kinds = {self.kind(k) for k, degree in enumerate(num.degrees()) if degree} if len(num) else set()
+        return "parameter" if kinds <= {"parameter"} else "position"
 
     # -- values
 
-    def write(self, value: Value) -> sp.Expr:
-        """The value in the form asked for."""
-        if not value.under:
-            return self.tree_expression(self.tree(value.num))
-        above = self.tree(value.num)
-        below = [(self.tree(self.exact.ring.factors[k]), n) for k, n in value.under]
-        return self._quotient(above, below)
+    def write(self, value: Value, as_derived: sp.Expr | None = None) -> sp.Expr:
+        """The value in the form asked for; the shortest may be the one that was derived."""
+        tree = self.tree(value)
+        result = self.tree_expression(self.arranger.signed(tree))
+        if as_derived is not None and sp.count_ops(as_derived) < sp.count_ops(result):
+            return as_derived
+        return result
 
-    def _quotient(self, above: Tree, below: Sequence[tuple[Tree, int]]) -> sp.Expr:
-        coefficient = Fraction(1)
-        parts: list[sp.Expr] = []
-        if isinstance(above, Product):
-            coefficient *= above.number
-            parts += [self._power(base, n) for base, n in above.factors]
-        else:
-            parts.append(self.tree_expression(above))
-        for tree, n in below:
-            if isinstance(tree, Product):
-                coefficient /= tree.number ** n
-                parts += [self._power(base, -n * m) for base, m in tree.factors]
-            else:
-                parts.append(sp.Pow(self.tree_expression(tree), -n))
-        return _times(number(coefficient), parts)
-
-    def tree(self, num: Any) -> Tree:
-        """The arrangement of a numerator or factor."""
-        form, letters = self.form, self.letters
-        if len(num) == 0:
-            return self.arranger.product(Fraction(0), ())
-        base = plain(num)
+    def tree(self, value: Value) -> Tree:
+        """The arrangement of a value."""
+        form, a = self.form, self.arranger
+        if len(value.num) == 0:
+            return a.product(Fraction(0), ())
         if form == "polynomial":
-            return self.arranger.grouped(base, ("position", "motion"), self.arranger.expanded) or self.arranger.expanded(base)
+            base = self._over(plain(value.num), value)
+            return a.grouped(base, ("position", "motion"), a.expanded) or a.expanded(base)
         if form == "fourier":
-            series = fourier(base, letters)
-            if series is None:
-                series = base
-            return self.arranger.grouped(series, ("position",), self.arranger.factored) or self.arranger.factored(series)
-        found = self._representations(num, base)
+            base = plain(value.num)
+            series = self._over(fourier(base, self.letters) or base, value)
+            return a.grouped(series, ("position",), a.factored) or a.factored(series)
+        found = self._representations(value)
         least = min(map(len, found))
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
             found = found[:2]
         return min((tree for p in found for tree in self._arranged(p)), key=total)
 
-    def _representations(self, num: Any, base: Polynomial) -> list[Polynomial]:
+    def _over(self, p: Polynomial, value: Value) -> Polynomial:
+        return divided(p, value.under, self.exact.ring.factors, self.letters) if value.under else p
+
+    def _representations(self, value: Value) -> list[Polynomial]:
         """Different polynomials in letters for the same value."""
+        num, letters = value.num, self.letters
+        base = plain(num)
         found = [base]
-        if any(letter in self.letters.turns for m in base for letter, _ in m):
+        if any(letter in letters.turns for m in base for letter, _ in m):
             for basis in self.bases:
-                other = basis.of(num)
-                p = basis.plain(other, self.letters)
-                found += [p, contracted(p, self.letters)]
+                p = basis.plain(basis.of(num), letters)
+                found += [p, contracted(p, letters)]
             if len(base) <= SHORT:
-                found.append(contracted(base, self.letters))
-            series = fourier(base, self.letters)
+                found.append(contracted(base, letters))
+            series = fourier(base, letters)
             if series is not None:
-                found += [series, contracted(series, self.letters)]
+                found += [series, contracted(series, letters)]
+        if value.under:
+            found = [self._over(p, value) for p in found]
+            found += self._parts(value)
+            found += [with_tangents(p, letters) for p in found]
         unique: dict[frozenset, Polynomial] = {}
         for p in found:
             unique.setdefault(frozenset(p.items()), p)
         return list(unique.values())
+
+    def _parts(self, value: Value) -> list[Polynomial]:
+        """num / (f g) as q / g + r / (f g), for each factor that the numerator holds a part of."""
+        ring = self.exact.ring
+        found = []
+        for k, n in value.under:
+            factor = ring.factors[k]
+            if len(factor) == 1 or n > 1:
+                continue
+            quotient, rest = divmod(value.num, factor)
+            if len(quotient) and len(rest):
+                others = tuple(item for item in value.under if item[0] != k)
+                p = self._over(contracted(plain(rest), self.letters), value)
+                for m, c in self._over(contracted(plain(quotient), self.letters), Value(quotient, others)).items():
+                    p[m] = p.get(m, 0) + c
+                found.append({m: c for m, c in p.items() if c})
+        return found
 
     def _arranged(self, p: Polynomial) -> list[Tree]:
         a = self.arranger
@@ -210,6 +241,7 @@ class Writer:
             e = self._written.get(base)
             if e is None:
                 e = self._written[base] = self.tree_expression(base)
+        n = -n if isinstance(base, int) and base in self.letters.below else n
         return e if n == 1 else sp.Pow(e, n)
 
 
@@ -226,9 +258,10 @@ class _Lookup(Sequence[Letter]):
             e = self.writer.expression(k)
             multiples = 0
             if k in self.writer.letters.turns:
-                multiples = sum(3 for a in sp.Add.make_args(e.args[0]) if a.as_coeff_Mul()[0] not in (1, -1))
+                multiples = sum(MULTIPLE for a in sp.Add.make_args(e.args[0]) if a.as_coeff_Mul()[0] not in (1, -1))
             length = 1 if e.is_Symbol else len(str(e))
-            letter = self.known[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k))
+            letter = self.known[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k),
+                                            k in self.writer.letters.below)
         return letter
 
     def __len__(self) -> int:
@@ -254,17 +287,54 @@ def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str =
     form."""
     if form not in FORMS:
         raise SymdynError(f"the form {shown(form)} was asked for; there are {', '.join(FORMS)}")
-    exact = Exact(entries) if bound is None else Exact(entries, bound)
+    exact = Exact(entries, BOUND if bound is None else bound)
     writer = Writer(exact, symbols, form)
+    sizes = _sizes(entries) if form == "shortest" else {}
     known: dict[str, sp.Expr] = {}
     result = []
-    for value in exact.values:
+    for entry, value in zip(entries, exact.values):
         key = exact.ring.key(value)
         if key not in known:
             opposite = known.get(exact.ring.key(exact.ring.neg(value)))
             if opposite is not None and not opposite.is_Add:
                 known[key] = -opposite
             else:
-                known[key] = writer.write(value)
+                derived = None
+                if isinstance(entry, Node) and sizes.get(entry, DERIVED + 1) <= min(DERIVED, 8 * len(value.num) + 20):
+                    derived = _as_derived(entry, symbols)
+                known[key] = writer.write(value, derived)
         result.append(known[key])
     return result
+
+
+def shortest(value: Any, form: str = "shortest") -> Any:
+    """An expression or matrix of SymPy in the form asked for; its symbols are taken as real.
+
+    Raises as `written`, and UnsupportedExpression for functions that have no counterpart on a tape."""
+    entries, symbols = recorded(value if isinstance(value, sp.MatrixBase) else [value])
+    result = written(entries, symbols, form)
+    return sp.Matrix(*value.shape, result) if isinstance(value, sp.MatrixBase) else result[0]
+
+
+def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "shortest") -> Any:
+    """An output of a tape as explicit SymPy: a scalar expression, or a matrix (column for a vector). Raises as `written`."""
+    entries = written(output.entries, symbols, form)
+    if output.shape == ():
+        return entries[0]
+    rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
+    return sp.Matrix(rows, columns, entries)
+
+
+def _sizes(entries: Sequence[Any]) -> dict[Node, int]:
+    """Operations of each step written out."""
+    sizes: dict[Node, int] = {}
+    for node in reachable(entries):
+        own = node.op not in ("leaf", "neg", "guard", "item")
+        sizes[node] = sum([sizes[a] for a in node.args if isinstance(a, Node)]) + own
+    return sizes
+
+
+def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr]) -> sp.Expr:
+    """As it stands on the tape; common factors are taken out of sums where that is shorter."""
+    plain_form = expand(Output.of("entry", entry), symbols)
+    return min((plain_form, sp.factor_terms(plain_form)), key=sp.count_ops)

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from symdyn.exact.angles import Angles, Linear, arguments
-from symdyn.exact.ring import BOUND, Ring, TooLarge, Value
+from symdyn.exact.ring import BOUND, Ring, Value
 from symdyn.tape.node import Node
 from symdyn.tape.tape import reachable
 
-_ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos")
+_ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
 _TRUTH = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 
 
@@ -35,7 +34,7 @@ class Atom:
 class Exact:
     """Exact values of entries (nodes and numbers) of one recorder.
 
-    values   of the entries, in order; None for a truth
+    values   of the entries, in order
     ring     their arithmetic; leaves: generator -> leaf; atoms: generator -> atom
     bases    base angles, each a sum of terms; sines: generators of sine and cosine of each
     """
@@ -84,10 +83,9 @@ class Exact:
         for node in steps:
             if node.op == "leaf":
                 continue
-            if node.op in ("sin", "cos"):
-                argument = node.args[0]
-                pair = self._turned(argument) if isinstance(argument, Node) else None
-                done[node] = function(node) if pair is None else pair[node.op == "cos"]
+            if node.op in ("sin", "cos", "tan"):
+                sine, cosine = self._turned(node.args[0])
+                done[node] = sine if node.op == "sin" else cosine if node.op == "cos" else ring.div(sine, cosine)
             elif node.op in arithmetic:
                 done[node] = arithmetic[node.op](*map(take, node.args))
             elif node.op == "call":
@@ -96,7 +94,7 @@ class Exact:
                 done[node] = Atom(node.op, tuple(map(take, node.args)))
             else:
                 done[node] = function(node)
-        self.values = [take(e) if not isinstance(e, bool) else None for e in entries]
+        self.values: list[Value] = [take(e) for e in entries]
 
     def _key(self, a: Any) -> str:
         if isinstance(a, Value):
@@ -105,8 +103,8 @@ class Exact:
             return f"{a.op}({','.join(map(self._key, a.args))})"
         return str(id(a)) if not isinstance(a, bool) else str(a)
 
-    def _turned(self, argument: Node) -> tuple[Value, Value]:
-        """Sine and cosine of an argument."""
+    def _turned(self, argument: Any) -> tuple[Value, Value]:
+        """Sine and cosine of an argument, a node or a number."""
         s, c = self.of_sum(self._angles.vectors[argument])
         ring = self.ring
         return ((s, c), (c, ring.neg(s)), (ring.neg(s), ring.neg(c)), (ring.neg(c), s))[self._angles.quarter[argument]]
@@ -124,6 +122,3 @@ class Exact:
             si = si if sign > 0 else ring.neg(si)
             self._pairs[vector] = (ring.add(ring.mul(s, ci), ring.mul(c, si)), ring.sub(ring.mul(c, ci), ring.mul(s, si)))
         return self._pairs[vector]
-
-
-

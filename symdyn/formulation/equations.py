@@ -108,7 +108,7 @@ class Equations:
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
-    _printed: dict[str, Any] = field(default_factory=dict)
+    _printed: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def quantity(self, name: str) -> np.ndarray:
         """A quantity, or a named output, as an array of nodes and numbers; recorded on first use."""
@@ -128,31 +128,56 @@ class Equations:
         """A tape with the named quantities as outputs."""
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
-    def explicit(self, name: str, simplify: bool = True) -> Any:
-        """The quantity as explicit SymPy, simplified as far as the time limit `simplify_seconds` allows.
+    def explicit(self, name: str, simplify: bool = True, form: str = "shortest") -> Any:
+        """The quantity as explicit SymPy in its shortest form, by exact algebra (symdyn.exact).
 
-        Without `simplify` there is no limit. Raises SymdynError if the quantity is so long that the time is over before it is
+        simplify   False: as it was derived, in any time that this takes
+        form       "shortest": of all others, entry by entry; "polynomial" in sines and cosines; "fourier": sums of sines and
+                   cosines of sums of angles; "factored"; "speeds", "parameters", "angles": gathered by these; "nested"
+        What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
+        for an unknown form, for one that is too large, and if the quantity is so long that the time is over before it is
         multiplied into one expression.
         """
         text(name, "the name of a quantity", "M_tilde")
-        if not flag(simplify, "simplify") or name not in self._printed:
-            output = self.tape(name).outputs[name]
-            if not simplify:
-                return expand(output, self.printed_leaves())
+        if not flag(simplify, "simplify"):
+            return expand(self.tape(name).outputs[name], self.printed_leaves())
+        key = (name, text(form, "the form", "fourier"))
+        if key not in self._printed:
+            from symdyn.exact.ring import TooLarge
+            from symdyn.exact.shortest import explicit
             from symdyn.report.limit import TimeUp, within
-            from symdyn.report.simplify import simplified
 
+            output = self.tape(name).outputs[name]
+            limit = max(self.simplify_seconds, _EXPANDED)
             begin = clock.monotonic()
             try:
-                value = within(max(self.simplify_seconds, _EXPANDED), lambda: expand(output, self.printed_leaves()))
-            except TimeUp:
-                raise SymdynError(
-                    f"{self.name}: {name} has {len(self.tape(name).steps)} steps and is no explicit expression within "
-                    f"{max(self.simplify_seconds, _EXPANDED):g} s; print its steps with latex({name!r}, intermediates=True), "
-                    f"evaluate it with lambdify({name!r}), or wait for it without a limit with explicit({name!r}, "
-                    "simplify=False)") from None
-            self._printed[name] = simplified(value, self.simplify_seconds - (clock.monotonic() - begin))
-        return self._printed[name]
+                self._printed[key] = within(limit, lambda: explicit(output, self.printed_leaves(), form))
+            except (TooLarge, TimeUp, ZeroDivisionError) as error:
+                if form != "shortest":
+                    reason = f"{error}" if isinstance(error, TooLarge) else f"it takes more than {limit:g} s"
+                    raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {reason}; print its steps "
+                                      f"with latex({name!r}, intermediates=True), or as derived with explicit({name!r}, "
+                                      "simplify=False)") from None
+                left = self.simplify_seconds - (clock.monotonic() - begin)
+                self._printed[key] = self._simplified(name, limit, left)
+        return self._printed[key]
+
+    def _simplified(self, name: str, limit: float, left: float) -> Any:
+        """By SymPy's methods, within the seconds that are left; the expression itself within a limit."""
+        from symdyn.report.limit import TimeUp, within
+        from symdyn.report.simplify import simplified
+
+        output = self.tape(name).outputs[name]
+        begin = clock.monotonic()
+        try:
+            value = within(limit, lambda: expand(output, self.printed_leaves()))
+        except TimeUp:
+            raise SymdynError(
+                f"{self.name}: {name} has {len(self.tape(name).steps)} steps and is no explicit expression within "
+                f"{limit:g} s; print its steps with latex({name!r}, intermediates=True), "
+                f"evaluate it with lambdify({name!r}), or wait for it without a limit with explicit({name!r}, "
+                "simplify=False)") from None
+        return simplified(value, left - (clock.monotonic() - begin))
 
     def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
               simplify: bool = True) -> Typeset:

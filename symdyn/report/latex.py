@@ -169,7 +169,8 @@ def _sum(left: str, value: sp.Expr, width: int) -> list[str]:
 def wrapped(value: sp.Expr, room: float, mul_symbol: str | None = None) -> list[str]:
     """Lines of a sum, or of a product with a long sum in it; anything else is one line."""
     whole = str(sp.latex(value, mul_symbol=mul_symbol))
-    if letters(whole) <= room or room < NARROWEST:
+    room = max(room, NARROWEST)
+    if letters(whole) <= room:
         return [whole]
     if value.is_Add:
         return _terms(value, room, mul_symbol)

@@ -1,4 +1,8 @@
-"""Simplification for printing only, within a time limit; nothing on the way to numbers goes through here."""
+"""Simplification for printing only, within a time limit; nothing on the way to numbers goes through here.
+
+Exact algebra writes an expression in its shortest form (symdyn.exact). What is too large for it, or has functions that it does
+not know, is searched by SymPy's methods.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,9 @@ import sympy as sp
 from sympy.functions.elementary.trigonometric import TrigonometricFunction
 from sympy.simplify.fu import TR10i
 
+from symdyn.errors import UnsupportedExpression
+from symdyn.exact.ring import TooLarge
+from symdyn.exact.shortest import shortest
 from symdyn.model.symbols import Rate, Speed
 from symdyn.report.limit import TimeUp, within
 
@@ -51,7 +58,14 @@ def shown_zero(e: sp.Expr) -> bool:
 
 
 def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
-    """The shortest of what each method makes of the best so far."""
+    """The shortest form, or the shortest of what each method makes of the best so far."""
+    try:
+        return within(deadline - clock.monotonic(), partial(shortest, e))
+    except (TimeUp, TooLarge, UnsupportedExpression, ZeroDivisionError):
+        return _searched(e, deadline)
+
+
+def _searched(e: sp.Expr, deadline: float) -> sp.Expr:
     best = e
     for attempt in (_polynomial, _angle_sums, _by_speeds, sp.factor_terms, _general):
         try:

@@ -136,8 +136,8 @@ def test_parts_are_printed_by_name():
         "  euler       [-x*q_ddot*sin(q), x*q_ddot*cos(q), 0]",
         "  centripetal [-x*q_dot**2*cos(q), -x*q_dot**2*sin(q), 0]",
         "  coriolis    [-2*q_dot*x_dot*sin(q), 2*q_dot*x_dot*cos(q), 0]",
-        "  total       [-x*q_dot**2*cos(q) - x*q_ddot*sin(q) - 2*q_dot*x_dot*sin(q) + x_ddot*cos(q), "
-        "-x*q_dot**2*sin(q) + x*q_ddot*cos(q) + 2*q_dot*x_dot*cos(q) + x_ddot*sin(q), 0]"]
+        "  total       [(-x*q_dot**2 + x_ddot)*cos(q) - (x*q_ddot + 2*q_dot*x_dot)*sin(q), "
+        "(-x*q_dot**2 + x_ddot)*sin(q) + (x*q_ddot + 2*q_dot*x_dot)*cos(q), 0]"]
     assert repr(P.inertial_forces(m)).startswith("inertial forces on P felt in b, inertial is n, components in b\n  origin")
     assert repr(P.velocity_parts()).startswith("velocity of P seen from n, by way of b, components in n\n  origin")
 

@@ -77,6 +77,7 @@ def test_an_entry_is_as_simple_as_when_the_time_was_up():
 def test_a_form_that_is_not_reached_in_time_names_the_alternatives(monkeypatch):
     monkeypatch.setattr("symdyn.formulation.equations._EXPANDED", 0.05)
     monkeypatch.setattr("symdyn.formulation.equations.expand", lambda *_: forever())
+    monkeypatch.setattr("symdyn.exact.shortest.explicit", lambda *_: forever())
     equations = replace(sd.systems.get("pendulum").embedding(), simplify_seconds=0.1)
     message = (r"accelerations has \d+ steps and is no explicit expression within 0.1 s; print its steps with "
                r"latex\('accelerations', intermediates=True\), evaluate it with lambdify")

@@ -1,0 +1,41 @@
+"""SymPy's expressions on a tape, for exact values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, symbols_of, time
+from symdyn.tape.node import COORDINATE, PARAMETER, SPEED, Node
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.sympy_bridge import record_expression
+
+
+def recorded(expressions: Iterable[Any]) -> tuple[list[Any], dict[Node, sp.Expr]]:
+    """Entries (nodes and numbers) of the expressions, and what each leaf stands for.
+
+    Functions without a value, such as q(t), and their derivatives are leaves. Raises UnsupportedExpression for functions that no
+    code can be generated for, ZeroDivisionError for a division by zero.
+    """
+    expressions = [sp.sympify(e) for e in expressions]
+    found: set[Any] = set()
+    for e in expressions:
+        found |= symbols_of(e) | e.atoms(AppliedUndef, sp.Derivative, sp.Integral)
+    recorder = Recorder()
+    leaves: dict[sp.Basic, Any] = {}
+    symbols: dict[Node, sp.Expr] = {}
+    for k, symbol in enumerate(sorted(found, key=sp.default_sort_key)):
+        leaf = recorder.leaf(f"x{k}", _kind(symbol))
+        leaves[symbol], symbols[leaf] = leaf, symbol
+    memory: dict[sp.Basic, Any] = {}
+    return [record_expression(recorder, e, leaves, memory) for e in expressions], symbols
+
+
+def _kind(symbol: Any) -> int:
+    if isinstance(symbol, (Rate, Speed, Acceleration, Input, sp.Derivative)):
+        return SPEED
+    moves = isinstance(symbol, (Coordinate, AppliedUndef, sp.Integral)) or symbol == time
+    return COORDINATE if moves else PARAMETER
