@@ -27,6 +27,7 @@ _HOME = {
     "symdyn.runtime.sampled": ("Sampled",),
     "symdyn.formulation.explicit": ("embedding",),
     "symdyn.formulation.explicit_augmented": ("augmented",),
+    "symdyn.exact.prove": ("prove",),
     "symdyn.report.full": ("full_report",),
     "symdyn.report.latex": ("latex",),
     "symdyn.flexible.beam": ("Beam",),

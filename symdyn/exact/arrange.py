@@ -27,9 +27,9 @@ Number = int | Fraction
 Polynomial = dict[Monomial, Number]
 Cost = tuple[int, int]
 
-# Longer polynomials are not given to the factorization; up to SEARCHED terms the best grouping is tried at each level, up to ALL
-# every one. A grouping must leave fewer terms than WORTH times those that there are.
-FACTORED, SEARCHED, ALL, WORTH = 120, 1000, 16, 1.0
+# Longer polynomials are not given to the factorization. Up to ALL terms every grouping is tried at each level, above it the one
+# that leaves the fewest terms; Horner's scheme too up to BOTH terms, and where the grouping leaves more than this part of them.
+FACTORED, ALL, BOTH, CLEAR = 120, 16, 40, 0.6
 _KINDS = (("motion",), ("parameter",), ("position",))
 ONE = Fraction(1)
 
@@ -257,17 +257,17 @@ class Arranger:
         parts = self._factors(q)
         if parts is not None:
             return self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
-        found: list[Tree] = [self.horner(q)]
+        groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
+        # Terms that are left to arrange tell which of them are worth it.
+        left = [sum(len(a) + len(b) for a, b in g) for g in groups]
+        if len(q) > ALL and groups:
+            groups = [groups[left.index(min(left))]] if min(left) < len(q) else []
+        found: list[Tree] = [self._gathered(g, self.nested) for g in groups]
+        if not groups or len(q) <= BOTH or min(left) > CLEAR * len(q):
+            found.append(self.horner(q))
         squares = self._squares(q)
         if squares is not None:
             found.append(squares)
-        if len(q) <= SEARCHED:
-            groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
-            # Terms that are left to arrange tell which of them are worth it.
-            left = [sum(len(a) + len(b) for a, b in g) for g in groups]
-            if len(q) > ALL and groups:
-                groups = [groups[left.index(min(left))]] if min(left) < WORTH * len(q) else []
-            found += [self._gathered(g, self.nested) for g in groups]
         return min(found, key=total)
 
     def horner(self, p: Polynomial) -> Tree:

@@ -20,6 +20,8 @@ from symdyn.errors import SymdynError
 
 # Terms that a product may have; so many take about a gigabyte with forty generators.
 BOUND = 2_000_000
+# All products of one set of values may have so many times as many.
+ALL = 20
 # Denominators with more terms than this are not split into factors.
 FACTORED = 400
 # Trial divisions of longer numerators are left out.
@@ -54,6 +56,7 @@ class Ring:
         self.sines = sines
         self.squares: dict[int, Any] = {}
         self._relations = [(s, self.generators[s] ** 2 + self.generators[c] ** 2 - 1) for s, c in sines]
+        self._work = 0
         self._roots: list[tuple[int, Any]] = []
         self.factors: list[Any] = []
         self._known: dict[str, int] = {}
@@ -94,6 +97,9 @@ class Ring:
     def product(self, a: Any, b: Any) -> Any:
         """The normal form of a product. Raises TooLarge before a product of too many terms is formed."""
         self._check(len(a) * len(b))
+        self._work += len(a) * len(b)
+        if self._work > ALL * self.bound:
+            raise TooLarge(f"products have more than {ALL * self.bound:,} terms together")
         return self.reduced(a * b)
 
     def _check(self, terms: int) -> None:

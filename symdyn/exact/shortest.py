@@ -28,9 +28,9 @@ from symdyn.tape.tape import Output, reachable
 FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters", "angles", "nested")
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
 _MOTION = SPEED | ACCELERATION | INPUT | SEED
-# Representations with this many times the terms of the shortest one are not arranged; longer polynomials are only nested, in the
-# two shortest representations.
-WORSE, SHORT = 1.5, 25
+# Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
+# nested, in the two shortest representations, and of more than LONG terms in one.
+WORSE, SHORT, LONG = 1.5, 25, 150
 # Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
 MULTIPLE = 10
 # Entries with so many operations at most are compared with the form in which they were derived.
@@ -177,14 +177,17 @@ class Writer:
         base = plain(num)
         found = [base]
         if any(letter in letters.turns for m in base for letter, _ in m):
-            for basis in self.bases:
-                p = basis.plain(basis.of(num), letters)
-                found += [p, contracted(p, letters)]
-            if len(base) <= SHORT:
-                found.append(contracted(base, letters))
-            series = fourier(base, letters)
-            if series is not None:
-                found += [series, contracted(series, letters)]
+            others = [basis.plain(basis.of(num), letters) for basis in self.bases]
+            if len(num) > LONG:
+                found = [contracted(min(others, key=len), letters)]
+            else:
+                for p in others:
+                    found += [p, contracted(p, letters)]
+                series = fourier(base, letters)
+                if series is not None:
+                    found += [series, contracted(series, letters)]
+                if len(base) <= SHORT:
+                    found.append(contracted(base, letters))
         if value.under:
             found = [self._over(p, value) for p in found]
             found += self._parts(value)

@@ -39,12 +39,17 @@ class Exact:
     bases    base angles, each a sum of terms; sines: generators of sine and cosine of each
     """
 
-    def __init__(self, entries: Sequence[Any], bound: int = BOUND) -> None:
-        """Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
+    def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = ()) -> None:
+        """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters.
+
+        Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
         angles = Angles(arguments(steps))
         others = [node for node in steps if node.op not in _ARITHMETIC and node.op not in _TRUTH]
         leaves = [node for node in steps if node.op == "leaf"]
+        groups = [group for group in unit_vectors if all(leaf in leaves for leaf in group)]
+        leading = [group[0] for group in groups]
+        leaves = [*leading, *[leaf for leaf in leaves if leaf not in leading]]
         n, m, count = len(others), len(angles.bases), 0
         # Functions first, the last one highest; two generators a base angle; plain symbols.
         free = iter(range(n - 1, -1, -1))
@@ -55,6 +60,9 @@ class Exact:
         self.leaves = {count + k: leaf for k, leaf in enumerate(leaves)}
         self.atoms: dict[int, Atom] = {}
         self._angles = angles
+        number_of = {leaf: k for k, leaf in self.leaves.items()}
+        for first, *others in groups:
+            ring.relate(number_of[first], 1 - sum(ring.generators[number_of[leaf]] ** 2 for leaf in others))
         self._pairs: dict[tuple[int, ...], tuple[Value, Value]] = {}
         known: dict[str, Value] = {}
         done: dict[Node, Any] = {leaf: ring.generator(k) for k, leaf in self.leaves.items()}

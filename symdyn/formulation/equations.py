@@ -268,6 +268,12 @@ class Equations:
 
         return verify(self, states, digits, params)
 
+    def prove(self) -> Any:
+        """Decide identities of the equations by exact algebra, for every state; see symdyn.exact.mechanism."""
+        from symdyn.exact.mechanism import prove_equations
+
+        return prove_equations(self)
+
     def __repr__(self) -> str:
         s = self.symbols
         rows = f", {counted(len(self.constraints), 'constraint')}" if self.constraints else ""

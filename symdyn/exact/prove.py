@@ -1,0 +1,190 @@
+"""Equality proved, or refuted by a state where the sides differ.
+
+The difference of the sides is brought to normal form (symdyn.exact.ring). Where that is zero, they are equal wherever no
+denominator vanishes: a proof. Where it is not, they are evaluated at random states to fifty digits: one where they differ refutes
+the claim. Where none does, which roots and functions without relations make possible, the claim is undecided.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+
+from symdyn.errors import ArgumentError, UnsupportedExpression
+from symdyn.exact.ring import BOUND, TooLarge
+from symdyn.exact.shortest import Writer
+from symdyn.exact.taken import recorded
+from symdyn.exact.walk import Exact
+from symdyn.model.symbols import symbols_of
+from symdyn.shown import shown
+from symdyn.tape.evaluate import evaluate
+from symdyn.tape.node import Node
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.sympy_bridge import printed_as_decimal
+from symdyn.tape.tape import Tape, reachable
+
+# States that are tried to refute a claim, digits of the evaluation; relative differences up to SAME are none, and up to ROUNDED
+# of the largest entry they may come from decimal numbers, which are rounded to doubles.
+STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
+# A difference with more terms than this is not written out in a reason.
+WRITTEN = 60
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The verdict on a claim a = b; true where it is proved.
+
+    proved, refuted   undecided where neither holds
+    reason    why it is undecided, or how the sides differ; index: of the entry that differs, of matrices
+    state     symbol -> number, where the sides differ; difference: a - b in its shortest form, unless it is long
+    """
+
+    proved: bool
+    refuted: bool = False
+    reason: str = ""
+    index: tuple[int, ...] | None = None
+    state: Mapping[Any, float] = field(default_factory=dict)
+    difference: Any = None
+
+    def __bool__(self) -> bool:
+        return self.proved
+
+    @property
+    def verdict(self) -> str:
+        """proved, refuted or undecided."""
+        return "proved" if self.proved else "refuted" if self.refuted else "undecided"
+
+    def __str__(self) -> str:
+        return f"{self.verdict}{': ' if self.reason else ''}{self.reason}"
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def prove(a: Any, b: Any = 0) -> Proof:
+    """Whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
+
+    a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too
+    Numbers are taken exactly: 0.1 is the double next to 1/10, which is not 1/10. Raises ArgumentError for what is neither
+    expression nor matrix, and for matrices of different shapes.
+
+    >>> import sympy as sp, symdyn as sd
+    >>> x, y = sp.symbols("x y")
+    >>> sd.prove(sp.sin(x)*sp.cos(y) + sp.cos(x)*sp.sin(y), sp.sin(x + y))
+    proved
+    """
+    left, right, columns = _entries(a, b)
+    try:
+        nodes, symbols = recorded([*left, *right])
+    except (UnsupportedExpression, ZeroDivisionError) as error:
+        return Proof(False, reason=str(error))
+    n = len(left)
+    recorder = next((leaf.recorder for leaf in symbols), Recorder())
+    pairs = [(x if isinstance(x, Node) else recorder.add(x, 0), y) for x, y in zip(nodes[:n], nodes[n:])]
+    proof = decide(recorder, pairs, symbols, columns=columns)
+    others = sorted({str(s) for e in right for s in symbols_of(e)} ^ {str(s) for e in left for s in symbols_of(e)})
+    if proof.refuted and others and any(e != 0 for e in right):
+        only = f"; only one side holds {', '.join(others)}"
+        return Proof(False, True, proof.reason + only, proof.index, proof.state, proof.difference)
+    return proof
+
+
+def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
+    """Entries of both sides, and the number of columns; 0 for scalars."""
+    sides = []
+    for name, value in (("a", a), ("b", b)):
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            value = sp.sympify(value)
+        if not isinstance(value, (sp.MatrixBase, sp.Expr)) or value.has(sp.nan, sp.zoo, sp.oo):
+            raise ArgumentError(f"prove takes expressions and matrices of SymPy and finite numbers; {name} is {shown(value)}")
+        sides.append(value)
+    a, b = sides
+    if isinstance(a, sp.MatrixBase) and b == 0:
+        b = sp.zeros(*a.shape)
+    if not isinstance(a, sp.MatrixBase) and not isinstance(b, sp.MatrixBase):
+        return [a], [b], 0
+    shapes = [value.shape if isinstance(value, sp.MatrixBase) else "a scalar" for value in (a, b)]
+    if shapes[0] != shapes[1]:
+        raise ArgumentError(f"prove takes two expressions, or two matrices of one shape; a is {shapes[0]}, b is {shapes[1]}")
+    return list(a), list(b), a.cols
+
+
+def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mapping[Node, sp.Expr], columns: int = 0,
+           unit_vectors: Sequence[Sequence[Node]] = (), bound: int = BOUND) -> Proof:
+    """Whether both nodes of every pair have equal values.
+
+    columns        of the matrix that the pairs are the entries of, row by row; 0: scalars
+    unit_vectors   groups of leaves whose squares add up to one
+    bound          terms that a product may have
+    """
+    def index(k: int) -> tuple[int, ...] | None:
+        return None if not columns else (k,) if columns == 1 else divmod(k, columns)
+
+    doubtful: list[int] = []
+    differences: list[Any] = []
+    reason = ""
+    try:
+        differences = [recorder.sub(x, y) for x, y in pairs]
+        exact = Exact(differences, bound, unit_vectors)
+        doubtful = [k for k, value in enumerate(exact.values) if len(value.num)]
+        if not doubtful:
+            return Proof(True)
+        reason = "the normal forms differ, at no state that was tried do the values"
+        names = sorted({atom.op for atom in exact.atoms.values()} - {"pi"})
+        if names:
+            reason += f"; functions whose relations are not all known: {', '.join(names)}"
+    except TooLarge as error:
+        doubtful, exact = list(range(len(pairs))), None
+        reason = f"{error}; ask for a part of it, or put numbers in place of parameters"
+    except ZeroDivisionError as error:
+        return Proof(False, reason=str(error))
+    decimal = any(isinstance(a, Fraction) and printed_as_decimal(a) for node in reachable(differences) for a in node.args)
+    k, state = _different(recorder, pairs, doubtful, unit_vectors, ROUNDED if decimal else SAME)
+    if k is None and decimal and exact is not None:
+        return Proof(False, reason=f"the sides differ by no more than the rounding of decimal numbers, {ROUNDED:g} of their size")
+    if k is None:
+        return Proof(False, reason=reason)
+    where = {symbols.get(leaf, sp.Symbol(leaf.args[1])): float(value) for leaf, value in state.items()}
+    if exact is None or len(exact.values[k].num) > WRITTEN:
+        return Proof(False, True, "the values differ", index(k), where)
+    difference = Writer(exact, symbols).write(exact.values[k])
+    return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: Sequence[int],
+               unit_vectors: Sequence[Sequence[Node]], same: float) -> tuple[int | None, dict[Node, Any]]:
+    """A pair whose values differ, and the values of the leaves there."""
+    taken = range(len(pairs)) if same != SAME else doubtful
+    tape = Tape.of(recorder, left=[pairs[k][0] for k in taken], right=[pairs[k][1] for k in taken])
+    draw = random.Random(1)
+    for attempt in range(STATES):
+        # Positive numbers first: roots and logarithms of them are real.
+        least = 0.2 if attempt % 2 == 0 else -2.0
+        values = {leaf: draw.uniform(least, 2.0) for leaf in tape.inputs}
+        _normalize(values, unit_vectors)
+        found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
+        rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
+                if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
+        largest = max((abs(x) + abs(y) for _, x, y in rows), default=0)
+        for place, x, y in rows:
+            if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest):
+                return taken[place], values
+    return None, {}
+
+
+def _normalize(values: dict[Node, Any], unit_vectors: Sequence[Sequence[Node]]) -> None:
+    """Unit vectors, to all digits, among the values."""
+    import mpmath
+
+    for group in unit_vectors:
+        if all(leaf in values for leaf in group):
+            with mpmath.workdps(DIGITS + 10):
+                numbers = [mpmath.mpf(values[leaf]) for leaf in group]
+                size = mpmath.sqrt(sum(x * x for x in numbers))
+                values.update({leaf: x / size for leaf, x in zip(group, numbers)})
+
