@@ -29,6 +29,7 @@ Cost = tuple[int, int]
 
 # Longer polynomials are not given to the factorization. Up to ALL terms every grouping is tried at each level, above it the one
 # that leaves the fewest terms; Horner's scheme too up to BOTH terms, and where the grouping leaves more than this part of them.
+# Squares of sums are looked for up to BOTH terms.
 FACTORED, ALL, BOTH, CLEAR = 120, 16, 40, 0.6
 _KINDS = (("motion",), ("parameter",), ("position",))
 ONE = Fraction(1)
@@ -265,7 +266,7 @@ class Arranger:
         found: list[Tree] = [self._gathered(g, self.nested) for g in groups]
         if not groups or len(q) <= BOTH or min(left) > CLEAR * len(q):
             found.append(self.horner(q))
-        squares = self._squares(q)
+        squares = self._squares(q) if len(q) <= BOTH else None
         if squares is not None:
             found.append(squares)
         return min(found, key=total)

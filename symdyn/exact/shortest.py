@@ -166,7 +166,7 @@ class Writer:
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
             found = found[:2]
-        return min((tree for p in found for tree in self._arranged(p)), key=total)
+        return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
 
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
         return divided(p, value.under, self.exact.ring.factors, self.letters) if value.under else p

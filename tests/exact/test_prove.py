@@ -1,0 +1,149 @@
+"""Claims are proved, refuted by a state where the sides differ, or undecided with the reason."""
+
+import dataclasses
+import random
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError
+from symdyn.tape.evaluate import evaluate
+from symdyn.tape.node import Node
+from symdyn.tape.passes import substitute
+from symdyn.tape.tape import reachable
+
+x, y, z = sp.symbols("x y z", real=True)
+
+
+@pytest.mark.parametrize(("left", "right"), [
+    (sp.sin(x) * sp.cos(y) + sp.cos(x) * sp.sin(y), sp.sin(x + y)),
+    (sp.tan(x), sp.sin(2 * x) / (1 + sp.cos(2 * x))),
+    (sp.sin(x / 2) ** 2, (1 - sp.cos(x)) / 2),
+    (sp.cos(5 * x), 16 * sp.cos(x) ** 5 - 20 * sp.cos(x) ** 3 + 5 * sp.cos(x)),
+    (1 / (x - y) + 1 / (y - x), 0),
+    ((sp.sqrt(x**2 + y**2) + x) * (sp.sqrt(x**2 + y**2) - x), y**2),
+    (sp.Abs(x) ** 2, x**2),
+    (sp.exp(x + y) * sp.exp(y + x), sp.exp(x + y) ** 2),
+    (sp.Matrix([[x, x + y], [0, sp.cos(z) ** 2]]), sp.Matrix([[x, y + x], [0, 1 - sp.sin(z) ** 2]])),
+    (sp.zeros(2, 2), 0),
+    (0.5 * x, x / 2),
+])
+def test_proved(left, right):
+    proof = sd.prove(left, right)
+    assert proof and proof.proved and not proof.refuted and str(proof) == "proved"
+
+
+@pytest.mark.parametrize(("left", "right", "index"), [
+    (sp.sin(x) ** 2, 1 + sp.cos(x) ** 2, None),
+    (sp.sqrt(x**2), x, None),
+    (sp.Matrix([[x, y]]), sp.Matrix([[x, -y]]), (0, 1)),
+    (sp.Matrix([x, y]), sp.Matrix([x, x]), (1,)),
+    (x, 0.5 * x, None),
+])
+def test_refuted_by_a_state(left, right, index):
+    proof = sd.prove(left, right)
+    assert proof.refuted and not proof and proof.index == index
+    difference = left - right if index is None else (left - right)[index if len(index) > 1 else index[0]]
+    assert abs(difference.subs(proof.state)) > 1e-6
+    assert sd.prove(proof.difference, difference)
+
+
+def test_symbols_of_one_side_are_named():
+    assert str(sd.prove(x * z, x * y)) == "refuted: the sides differ by x*(-y + z); only one side holds y, z"
+
+
+@pytest.mark.parametrize(("left", "right", "reason"), [
+    (sp.exp(x) * sp.exp(-y), sp.exp(x - y), "undecided: the normal forms differ, at no state that was tried do the values; "
+                                            "functions whose relations are not all known: exp"),
+    (0.1 * x + 0.2 * x, 0.3 * x, "the sides differ by no more than the rounding of decimal numbers"),
+    (sp.zeta(x), sp.zeta(x), "has no counterpart in generated code"),
+    (x / sp.Add(x, -x, evaluate=False), 1, "divides by zero"),
+])
+def test_undecided_with_the_reason(left, right, reason):
+    proof = sd.prove(left, right)
+    assert not proof.proved and not proof.refuted and reason in str(proof)
+
+
+def test_too_large_a_claim_is_undecided(monkeypatch):
+    monkeypatch.setattr("symdyn.exact.prove.BOUND", 50)
+    from symdyn.exact.prove import decide
+    from symdyn.exact.taken import recorded
+
+    entries, symbols = recorded([(x + y + z) ** 8 * (x - y) ** 8, (x - y) ** 8 * (z + x + y) ** 8])
+    recorder = entries[0].recorder
+    proof = decide(recorder, [(entries[0], recorder.add(entries[1], 0))], symbols, bound=50)
+    assert proof.proved or "above the bound of 50; ask for a part of it, or put numbers in place of parameters" in str(proof)
+    assert not proof.refuted
+
+
+@pytest.mark.parametrize(("left", "right", "message"), [
+    ("x", x, "prove takes expressions and matrices of SymPy and finite numbers; a is 'x'"),
+    (x, sp.nan, "b is nan"),
+    (sp.zeros(2, 1), sp.zeros(1, 2), r"a is \(2, 1\), b is \(1, 2\)"),
+    (sp.zeros(2, 1), x, r"a is \(2, 1\), b is a scalar"),
+])
+def test_faults(left, right, message):
+    with pytest.raises(ArgumentError, match=message):
+        sd.prove(left, right)
+
+
+@pytest.mark.parametrize("name", [*sd.systems.names(constrained=False), "four_bar", "slider_crank", "rolling_disc", "sleigh",
+                                  "andrews_squeezer", "particle_on_moving_slope", "spatial_slider_crank", "car_axis"])
+def test_identities_of_the_catalogue(name):
+    system = sd.systems.get(name, **({"n": 3} if name == "spatial_chain" else {}))
+    eq = system.augmented() if name in sd.systems.names(constrained=True) else system.recursive()
+    proofs = eq.prove()
+    assert proofs.proved and not proofs.refuted, str(proofs)
+    assert len(proofs.claims) >= 6
+
+
+def test_euler_parameters_have_unit_length():
+    system = sd.System("ball", gravity=[0, 0, -9.81])
+    m, I, c = sd.parameters("m I c")
+    body = system.add_body("body", mass=m, inertia=[I, 2 * I, 3 * I], com=[c, 0, 0])
+    system.add_joint(sd.Spherical("joint", system.ground, body, orientation=sd.EulerParameters()))
+    proofs = system.recursive().prove()
+    assert proofs.proved, str(proofs)
+
+
+def mistakes(eq, quantity, draw):
+    """The quantity with a random mistake in its tape: a sign, a factor, or another argument of the same kind."""
+    entries = tuple(eq.quantity(quantity).ravel())
+    node = draw.choice([n for n in reachable(entries) if n.op != "leaf"])
+    way = draw.randrange(3)
+    new = -node if way == 1 else node * draw.choice([2, 3])
+    if way == 2 and node.op in ("add", "sub", "mul"):
+        taken = draw.choice([n for n in node.args if isinstance(n, Node)])
+        others = [n for n in reachable(entries) if (n.op, n.mask) == (taken.op, taken.mask) and n.index < node.index]
+        other = draw.choice(others)
+        new = getattr(eq.recorder, node.op)(*[other if n is taken else n for n in node.args])
+    wrong = np.empty(len(entries), dtype=object)
+    wrong[:] = substitute(entries, {node: new}, eq.recorder)
+    return wrong.reshape(eq.quantity(quantity).shape)
+
+
+@pytest.mark.parametrize("name", ["two_link_arm", "three_link_arm", "four_bar", "flyball_governor"])
+def test_mistakes_are_refuted(name):
+    system = sd.systems.get(name)
+    constrained = name in sd.systems.names(constrained=True)
+    eq = system.augmented() if constrained else system.recursive()
+    quantities = ["M_tilde", "k_tilde", "F_tilde", "inverse_dynamics", "J", "energy",
+                  *(["C_r", "C_dot", "F_d"] if constrained else ["coriolis"])]
+    draw, refuted = random.Random(7), 0
+    while refuted < 50:
+        quantity = draw.choice(quantities)
+        wrong = mistakes(eq, quantity, draw)
+        spoilt = dataclasses.replace(eq, _recorded={**eq._recorded, quantity: wrong}, _printed={})
+        tapes = eq.tape(quantity), spoilt.tape(quantity)
+        values = {leaf.args[1]: 0.3 + 0.1 * k for k, leaf in enumerate(tapes[0].inputs)}
+        values |= {leaf.args[1]: values.get(leaf.args[1], 0.7) for leaf in tapes[1].inputs}
+        right, other = (evaluate(tape, values)[quantity] for tape in tapes)
+        if max(abs(r - o) for r, o in zip(right.ravel(), other.ravel())) < 1e-20:
+            continue
+        proofs = spoilt.prove()
+        assert proofs.refuted, f"{quantity}: {proofs}"
+        claim = next(claim for claim in proofs.claims if claim.proof.refuted)
+        assert claim.proof.state and f"refuted   {claim.name}" in str(proofs)
+        refuted += 1

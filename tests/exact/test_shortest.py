@@ -1,0 +1,132 @@
+"""What exact algebra writes has the value of what was given, reads back as the same, and is never longer."""
+
+import random
+
+import mpmath
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import SymdynError
+from symdyn.exact.ring import TooLarge
+from symdyn.exact.shortest import FORMS, shortest, written
+from symdyn.exact.taken import recorded
+from symdyn.model.symbols import symbols_of
+
+a, b, c = sp.symbols("a b c", positive=True)
+q1, q2, q3 = sd.coordinates("q1 q2 q3")
+# Operations of today's reference and of a polynomial or Fourier form, by quantity: never exceeded.
+MOST = {("four_bar", "M_tilde"): 162, ("four_bar", "k_tilde"): 76, ("four_bar", "F_tilde"): 46,
+        ("n_link_pendulum", "M_tilde"): 1244, ("n_link_pendulum", "k_tilde"): 535, ("n_link_pendulum", "F_tilde"): 161,
+        ("three_link_arm", "M_tilde"): 79, ("three_link_arm", "k_tilde"): 143, ("puma560", "M_tilde"): 1998,
+        ("puma560", "F_tilde"): 148, ("flyball_governor", "F_tilde"): 246, ("car_axis", "F_tilde"): 86}
+
+
+def expression(draw: random.Random, depth: int) -> sp.Expr:
+    """A random expression with fractions, roots, sums of angles and numbers of all kinds."""
+    if depth == 0:
+        return draw.choice([a, b, c, q1, q1.dot, q2.dot, sp.Integer(draw.randint(-3, 3)), sp.Rational(1, 3), sp.Float(0.1)])
+    parts = [expression(draw, depth - 1) for _ in range(2)]
+    kind = draw.randrange(9)
+    if kind < 3:
+        return sp.Add(*parts)
+    if kind < 6:
+        return sp.Mul(*parts)
+    if kind == 6:
+        angle = draw.choice([q1, q2, q1 + q2, q1 - q2, q1 + q2 + q3, 2 * q1, q2 / 2, q1 + sp.pi / 2, a * sd.t])
+        return parts[0] * draw.choice([sp.sin, sp.cos, sp.tan])(angle)
+    if kind == 7:
+        return parts[0] / draw.choice([a, a + b, b * sp.cos(q1) + c, sp.sqrt(a**2 + q1**2)])
+    return sp.sqrt(a**2 + parts[0]**2) if draw.random() < 0.3 else parts[0] ** 2
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_value_is_kept_and_read_back(seed):
+    draw = random.Random(seed)
+    given = expression(draw, draw.randint(2, 5))
+    short = shortest(given)
+    symbols = sorted(symbols_of(given) | symbols_of(short), key=str)
+    with mpmath.workdps(50):
+        point = {s: mpmath.mpf(draw.randint(20, 190)) / 97 for s in symbols}
+        wanted, found = (sp.lambdify(symbols, e, "mpmath")(*point.values()) for e in (given, short))
+        # Decimal numbers are printed in sixteen digits, as products and sums of them are.
+        assert abs(wanted - found) <= (1e-13 if given.has(sp.Float) else 1e-40) * (1 + abs(wanted) + abs(found))
+    if not given.has(sp.Float):
+        names = {s.name: s for s in symbols}
+        assert sd.prove(sp.sympify(str(short), locals=names), given)
+
+
+@pytest.mark.parametrize(("name", "quantity"), MOST)
+def test_operations_of_the_catalogue(name, quantity):
+    system = sd.systems.get(name)
+    eq = system.augmented() if name in sd.systems.names(constrained=True) else system.embedding()
+    assert sp.count_ops(eq.explicit(quantity)) <= MOST[name, quantity]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_is_the_same_and_none_is_shorter(form):
+    eq = sd.systems.get("four_bar").augmented()
+    for quantity in ("M_tilde", "k_tilde"):
+        found, best = eq.explicit(quantity, form=form), eq.explicit(quantity)
+        assert sd.prove(found, eq.explicit(quantity, simplify=False))
+        assert sp.count_ops(best) <= sp.count_ops(found)
+
+
+def test_textbook_form_of_a_planar_chain():
+    q1_dot, q2_dot = q1.dot, q2.dot
+    products = -a * (2 * q1_dot * q2_dot + q2_dot**2) * (sp.cos(q1) * sp.sin(q1 + q2) - sp.sin(q1) * sp.cos(q1 + q2))
+    assert shortest(products) == -a * q2_dot * (2 * q1_dot + q2_dot) * sp.sin(q2)
+    assert shortest(products, "fourier") == shortest(products)
+
+
+@pytest.mark.parametrize(("given", "wanted"), [
+    ((a - b) ** 2 + (b - c) ** 2 - a * c, (a - b) ** 2 + (b - c) ** 2 - a * c),
+    (a**2 - 2 * a * b + b**2 - c * q1, -c * q1 + (a - b) ** 2),
+    (a * sp.cos(q1) ** 2 + b * sp.sin(q1) ** 2 + (a - b) * sp.sin(q1) ** 2, a),
+    (sp.sqrt(a + b) ** 3 / (a + b), sp.sqrt(a + b)),
+    (sp.sin(q1) / sp.cos(q1), sp.tan(q1)),
+    (a / (b * c) + (a + b) / b - a / (b * c), a / b + 1),
+    (0.1 * a * b + 0.1 * a * c, 0.1 * a * (b + c)),
+    (sp.Piecewise((a**2 - a * a + b, a > b), (c, True)), sp.Piecewise((b, a > b), (c, True))),
+    (sp.cos(q1 + sp.pi / 2), -sp.sin(q1)),
+    (sp.Integer(0), sp.Integer(0)),
+])
+def test_relations(given, wanted):
+    assert shortest(given) == wanted
+
+
+def test_symbols_are_those_of_the_user():
+    eq = sd.systems.two_link_arm().embedding()
+    free = symbols_of(eq.k_tilde)
+    s = eq.symbols
+    assert free <= {*s.coordinates, *s.speeds, *s.parameters}
+    assert eq.M_tilde.subs(s.coordinates[1], 0).free_symbols <= set(s.parameters)
+
+
+def test_the_same_in_every_order():
+    """Nothing depends on which entries are asked for with it."""
+    terms = [a * sp.sin(q1 + q2) + b * sp.sin(q1 + q2), c * (a + b) * sp.cos(q1)]
+    assert [shortest(sp.Matrix(terms))[0], shortest(sp.Matrix(terms))[1]] == [shortest(e) for e in terms]
+
+
+def test_bound_is_reported_before_memory_is_taken():
+    entries, symbols = recorded([(a + b + c) ** 9 * (a - b + q1) ** 9])
+    with pytest.raises(TooLarge, match="a product has up to 225 terms, above the bound of 200"):
+        written(entries, symbols, bound=200)
+
+
+def test_unknown_form():
+    eq = sd.systems.pendulum().embedding()
+    with pytest.raises(SymdynError, match="the form 'shorter' was asked for; there are shortest, polynomial, fourier"):
+        eq.explicit("M_tilde", form="shorter")
+
+
+def test_a_form_that_is_too_large_names_the_alternatives(monkeypatch):
+    def too_large(*_: object) -> None:
+        raise TooLarge("a product has up to 9 terms, above the bound of 8")
+
+    monkeypatch.setattr("symdyn.exact.shortest.explicit", too_large)
+    eq = sd.systems.pendulum().embedding()
+    with pytest.raises(SymdynError, match="M_tilde is too large for the form 'fourier': a product has up to 9 terms"):
+        eq.explicit("M_tilde", form="fourier")
+    assert sd.prove(eq.explicit("M_tilde"), eq.explicit("M_tilde", simplify=False))
