@@ -12,7 +12,7 @@ from fractions import Fraction
 from math import gcd, lcm
 from typing import Any
 
-from symdyn.tape.node import Node
+from symdyn.tape.node import Node, exact
 
 # A product of nodes, in order of recording: what stands in a term of an argument.
 Term = tuple[Node, ...]
@@ -26,7 +26,7 @@ def arguments(steps: Sequence[Node]) -> dict[Any, Linear]:
     forms: dict[Node, Linear] = {}
 
     def form(value: Any) -> Linear:
-        return forms[value] if isinstance(value, Node) else {(): Fraction(value)} if value else {}
+        return forms[value] if isinstance(value, Node) else {(): Fraction(exact(value))} if value else {}
 
     wanted = {node.args[0] for node in steps if node.op in ("sin", "cos", "tan")}
     needed = {a for a in wanted if isinstance(a, Node)}

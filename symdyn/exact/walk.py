@@ -14,7 +14,7 @@ from typing import Any
 
 from symdyn.exact.angles import Angles, Linear, arguments
 from symdyn.exact.ring import BOUND, Ring, Value
-from symdyn.tape.node import Node
+from symdyn.tape.node import Node, exact
 from symdyn.tape.tape import reachable
 
 _ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
@@ -70,7 +70,7 @@ class Exact:
         def take(a: Any) -> Any:
             if isinstance(a, Node):
                 return done[a]
-            return a if isinstance(a, bool) else ring.number(a)
+            return a if isinstance(a, bool) else ring.number(exact(a))
 
         def function(node: Node) -> Value:
             item = node.args[1] if node.op == "item" else None
