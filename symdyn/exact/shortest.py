@@ -7,8 +7,10 @@ angles, nested. Nothing depends on time, hash seeds or the machine.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import sympy as sp
@@ -33,8 +35,9 @@ _MOTION = SPEED | ACCELERATION | INPUT | SEED
 WORSE, SHORT, LONG = 1.5, 25, 150
 # Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
 MULTIPLE = 10
-# Entries with so many operations at most are compared with the form in which they were derived.
-DERIVED = 400
+# Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before SymPy
+# combines terms; up to FACTOR_TERMS operations common factors are taken out of it.
+LONGER, FACTOR_TERMS = 2.5, 400
 
 
 class Writer:
@@ -141,12 +144,20 @@ class Writer:
 
     # -- values
 
-    def write(self, value: Value, as_derived: sp.Expr | None = None) -> sp.Expr:
-        """The value in the form asked for; the shortest may be the one that was derived."""
+    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], sp.Expr] | None = None) -> sp.Expr:
+        """The value in the form asked for.
+
+        operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form, which is
+                     taken if it is the shortest
+        """
+        if derived is not None and operations <= len(value.num):
+            return derived()
         tree = self.tree(value)
-        result = self.tree_expression(self.arranger.signed(tree))
-        if as_derived is not None and sp.count_ops(as_derived) < sp.count_ops(result):
-            return as_derived
+        result = self.tree_expression(tree)
+        if derived is not None and operations <= LONGER * total(tree)[0]:
+            other = derived()
+            if sp.count_ops(other) < sp.count_ops(result):
+                return other
         return result
 
     def tree(self, value: Value) -> Tree:
@@ -302,10 +313,9 @@ def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str =
             if opposite is not None and not opposite.is_Add:
                 known[key] = -opposite
             else:
-                derived = None
-                if isinstance(entry, Node) and sizes.get(entry, DERIVED + 1) <= min(DERIVED, 8 * len(value.num) + 20):
-                    derived = _as_derived(entry, symbols)
-                known[key] = writer.write(value, derived)
+                size = sizes.get(entry, math.inf) if isinstance(entry, Node) else math.inf
+                derived = partial(_as_derived, entry, symbols, size) if size < math.inf else None
+                known[key] = writer.write(value, size, derived)
         result.append(known[key])
     return result
 
@@ -337,7 +347,7 @@ def _sizes(entries: Sequence[Any]) -> dict[Node, int]:
     return sizes
 
 
-def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr]) -> sp.Expr:
-    """As it stands on the tape; common factors are taken out of sums where that is shorter."""
-    plain_form = expand(Output.of("entry", entry), symbols)
-    return min((plain_form, sp.factor_terms(plain_form)), key=sp.count_ops)
+def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float) -> sp.Expr:
+    """As it stands on the tape; common factors are taken out of sums where that is shorter and does not take long."""
+    found = expand(Output.of("entry", entry), symbols)
+    return min((found, sp.factor_terms(found)), key=sp.count_ops) if size <= FACTOR_TERMS else found
