@@ -44,7 +44,9 @@ class Linearization:
 
     x'_dot = A x' + B in',  y' = C_out x' + D in'   with x' = [eta; zeta; z']: changes of the independent displacements (n_d,),
     of the independent speeds (n_s,) and of the extra states. Velocity constraints bind speeds only: n_s is less than n_d then.
-    A, B, C_out and D are the derivative of the flow on the manifold, at rest and along any motion. The same by forces:
+    A, B, C_out and D are the derivative of the flow on the manifold, at rest and along any motion. Where a motion (sd.motions)
+    stands in constraints, what depends on the independent ones follows its value, rate and acceleration, which is in B and D, for
+    changes of the three that belong together. The same by forces:
     M zeta_dot + C zeta + K eta + ... = F_in in'    M, C (n_s, n_s), K (n_s, n_d); where speeds are rates of coordinates and
     nothing but positions is constrained, eta_dot = zeta, and this is M eta_ddot + C eta_dot + K eta = F_in in'
     G   (n_d, n_d): eta_dot = ... - G eta; zero where speeds are rates of coordinates, and at rest
@@ -70,16 +72,20 @@ class Linearization:
 
     @cached_property
     def state_space(self) -> StateSpace:
-        """(A, B, C, D); C and D have no rows without outputs."""
+        """(A, B, C, D); C and D have no rows without outputs.
+
+        Raises ArgumentError where the constraints do not let the mechanism follow changes of a motion (sd.motions).
+        """
+        self._manifold.demand_followed()
         return StateSpace(*self._manifold.matrices, *self._manifold.output_matrices())
 
     def tangent(self) -> np.ndarray:
-        """x' of the whole state = T [eta; zeta; z'], (n_x, m)."""
+        """x' of the whole state = T [eta; zeta; z'], (n_x, m), with the inputs as they are."""
         return self._manifold.tangent()
 
     @property
     def A(self) -> np.ndarray:
-        return self.state_space.A
+        return self._manifold.matrices[0]
 
     @property
     def B(self) -> np.ndarray:
@@ -293,9 +299,12 @@ class Linearization:
         others = [(f"{n} [{self.units.get(n) or '1'}]" for n in names) for names in (inputs, self.outputs)]
         ins, outs = (tuple(each) for each in others)
         A = np.where(np.abs(self.A) <= self._analysis.noise.A.rounding, 0.0, self.A)
-        for name, matrix, rows, columns in (("A", A, states, states), ("B", self.B, states, ins),
-                                            ("C_out", self.C_out, outs, states), ("D", self.D, outs, ins)):
-            lines += _table(name, matrix, rows, columns)
+        lines += _table("A", A, states, states)
+        try:
+            _, B, C_out, D = self.state_space
+            lines += [*_table("B", B, states, ins), *_table("C_out", C_out, outs, states), *_table("D", D, outs, ins)]
+        except ArgumentError as error:  # no linear equations by the inputs
+            lines.append(str(error).removeprefix(f"{self.module.name}: "))
         lines += held_note(self._manifold)
         singular = singular_configuration(self._manifold.place, self._manifold.selection)
         if singular:

@@ -1,15 +1,18 @@
 """The linear equations about a state on the manifold of the constraints, in independent displacements and speeds.
 
 Small changes v along which coordinates move (q' = N v), u' of the speeds, z' of the extra states and in' of the inputs fulfil
-    P v = 0                                                     rows that hold positions: holonomic constraints, held coordinates
-    S u' + S_v v + S_z z' = 0                                   rows that hold speeds: all constraints, all that is held
+    P v + P_in in' = 0                                          rows that hold positions: holonomic constraints, held coordinates
+    S u' + S_v v + S_z z' + S_in in' = 0                        rows that hold speeds: all constraints, all that is held
     M u'_dot + F_v v + F_u u' + F_z z' + F_in in' + S^T mu' = 0
     S u'_dot + A_v v + A_u u' + A_z z' + A_in in' = 0           the derivative of C_ddot = 0
     v_dot = u' - G v
-A velocity constraint has a row in S and none in P: it binds speeds, but not displacements. With independent displacements eta,
-v = Z_v eta, and independent speeds zeta, u' = Z_u zeta + W eta + W_z z', where the rows of the independent ones in Z_v and Z_u
-are those of the identity, the multipliers drop out by Z_u^T, and [eta; zeta; z'] are coordinates of the manifold: their equations
-x'_dot = A x' + B in' are the derivative of the flow on it along any motion, at rest or not.
+A velocity constraint has a row in S and none in P: it binds speeds, but not displacements. Motions (sd.motions) move what
+constraints hold: the value of a motion in P, value and rate in S, all three in the accelerations. With independent
+displacements eta, v = Z_v eta + V_in in', and independent speeds zeta, u' = Z_u zeta + W eta + W_z z' + U_in in', where the
+rows of the independent ones in Z_v and Z_u are those of the identity and in W, W_z, V_in and U_in zero, the multipliers drop
+out by Z_u^T, and [eta; zeta; z'] are coordinates of the manifold that the inputs move: their equations x'_dot = A x' + B in'
+are the derivative of the flow on it along any motion, at rest or not, for changes of a motion's value, rate and acceleration
+that belong together.
 Source: Wehage and Haug, Generalized coordinate partitioning, J. Mech. Des. 104 (1982); Neimark and Fufaev, Dynamics of
 Nonholonomic Systems, chapter V (velocity constraints near steady motion).
 """
@@ -37,6 +40,8 @@ DUST = 16 * float(np.finfo(float).eps)
 SERVES = 30.0
 # Masses below this part of the largest are none.
 MASSLESS = 1e-6
+# Changes of inputs that leave more than this part of what they change of the constraints are not followed.
+FOLLOWED = 1e-8
 # Independent velocities that determine the others worse than by this condition are rejected.
 CONDITION = 1e8
 
@@ -46,14 +51,15 @@ class Held:
     """Rows of what is held besides the constraints.
 
     positions   (k, n_u) in v; speeds (l, n_u) in u'; the derivatives of the latter's rates and accelerations by x and inputs:
-    rates (l, n_x), accelerations (l, n_x), by_inputs (l, n_in)
+    rates (l, n_x), accelerations (l, n_x), rates_in (l, n_in), accelerations_in (l, n_in)
     """
 
     positions: np.ndarray
     speeds: np.ndarray
     rates: np.ndarray
     accelerations: np.ndarray
-    by_inputs: np.ndarray
+    rates_in: np.ndarray
+    accelerations_in: np.ndarray
 
 
 def held_rows(place: Place, selection: Selection) -> Held:
@@ -64,10 +70,10 @@ def held_rows(place: Place, selection: Selection) -> Held:
     parts, n_x, n_in = place.parts, len(metadata["x"]), len(metadata["inputs"])
     first, second = (np.arange(s.start, s.stop)[coordinates] for s in (parts["q_dot"], parts["q_ddot"]))
     positions = place.N[coordinates]
-    still = np.zeros((len(speeds), n_x))
-    return Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]), np.vstack([place.whole_x[first], still]),
-                np.vstack([place.whole_x[second], still]),
-                np.vstack([place.whole_inputs[second], np.zeros((len(speeds), n_in))]))
+    by_x, by_in = (np.zeros((len(speeds), n)) for n in (n_x, n_in))
+    return Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]),
+                *(np.vstack([whole[rows], still]) for whole, still in ((place.whole_x, by_x), (place.whole_inputs, by_in))
+                  for rows in (first, second)))
 
 
 def held_indices(place: Place, selection: Selection) -> tuple[list[int], list[int]]:
@@ -95,9 +101,11 @@ def held_indices(place: Place, selection: Selection) -> tuple[list[int], list[in
 class Manifold:
     """The linear equations in independent displacements eta, speeds zeta and free extra states z'.
 
-    Z_v, Z_u      (n_u, n_d) and (n_u, n_s), of v and u'; W (n_u, n_d), W_z (n_u, n_z): u' = Z_u zeta + W eta + W_z z'
+    Z_v, Z_u      (n_u, n_d) and (n_u, n_s), of v and u'; W (n_u, n_d), W_z (n_u, n_z): u' = Z_u zeta + W eta + W_z z' + U_in in'
+    V_in, U_in    (n_u, n_in), the parts of v and u' that follow the inputs
     displacements, speeds   places of eta and zeta among the speeds; states: of the free extra states
     demanded      parts of u'_dot (n_u, k) that the rows of accelerations demand of eta, zeta and z'
+    demanded_in   what they demand of the inputs (n_u, n_in)
     M, C, K, K_z, F_in      M zeta_dot + C zeta + K eta + K_z z' = F_in in'
     G             eta_dot = Z_u[displacements] zeta + (W - G Z_v)[displacements] eta + ...
     """
@@ -113,9 +121,9 @@ class Manifold:
                                 "change; hold nothing, or give the mechanism a constraint or a prescribed motion that holds it")
         self.held = held_rows(place, selection)
         self.states = selection.free_states
-        _, n_u, _, n_c = place.sizes
-        holonomic = np.array(place.module.metadata.get("holonomic") or [True] * n_c, dtype=bool)[:n_c]
-        self.P = np.vstack([place.C_r[holonomic], self.held.positions])
+        n_c = place.sizes[3]
+        self._holonomic = np.array(place.module.metadata.get("holonomic") or [True] * n_c, dtype=bool)[:n_c]
+        self.P = np.vstack([place.C_r[self._holonomic], self.held.positions])
         self.S = np.vstack([place.C_r, self.held.speeds])
         if isinstance(independent, tuple):
             partition = independent
@@ -126,7 +134,6 @@ class Manifold:
             wanted = list(named)
         self.Z_u, self.speeds = (self.Z_v, self.displacements) if len(self.S) == len(self.P) else \
             _basis(place, self.S, wanted, among=self.displacements)
-        self._dependent = [k for k in range(n_u) if k not in set(self.speeds)]
         self._form()
 
     # -- sizes and names
@@ -188,36 +195,48 @@ class Manifold:
         x_u = np.vstack([np.zeros((n_q, n_u)), np.eye(n_u), np.zeros((n_z, n_u))])
         x_z = np.vstack([np.zeros((n_q + n_u, n_z)), np.eye(n_z)])[:, self.states]
         rates = np.vstack([place.whole_x[parts["C_dot"]] * scale, held.rates])
+        positions_in = place.whole_inputs[parts["C"]] * scale
+        rates_in = np.vstack([place.whole_inputs[parts["C_dot"]] * scale, held.rates_in])
         self.W = self._particular(rates @ x_v @ self.Z_v)
         self.W_z = self._particular(rates @ x_z)
-        # Columns: the changes of x that eta, zeta and z' stand for.
+        asked = np.vstack([positions_in[self._holonomic], np.zeros((len(held.positions), positions_in.shape[1]))])
+        self.V_in = self._particular(asked, self.P, self.displacements)
+        self.U_in = self._particular(rates_in + rates @ x_v @ self.V_in)
+        self._unfollowed = _left(self.P, self.V_in, asked) | _left(self.S, self.U_in, rates_in, (rates @ x_v, self.V_in))
+        # Columns: the changes of x that eta, zeta, z' and in' stand for.
         self.along = (x_v @ self.Z_v + x_u @ self.W, x_u @ self.Z_u, x_z + x_u @ self.W_z)
+        along_in = self.along_in = x_v @ self.V_in + x_u @ self.U_in
         forces = place.whole_x[parts["forces"]]
         bent = self._bent_reactions()
         second = np.vstack([place.whole_x[parts["C_ddot"]] * scale, held.accelerations])
-        second_in = np.vstack([place.whole_inputs[parts["C_ddot"]] * scale, held.by_inputs])
+        second_in = np.vstack([place.whole_inputs[parts["C_ddot"]] * scale, held.accelerations_in])
         self.demanded = [self._particular(second @ each) for each in self.along]
-        self.demanded_in = self._particular(second_in)
+        self.demanded_in = self._particular(second_in + second @ along_in)
+        self._unfollowed |= _left(self.S, self.demanded_in, second_in, (second, along_in))
         inner = self.Z_u.T
         pulls = [forces @ each for each in self.along]
         pulls[0] = pulls[0] + bent @ self.Z_v
         self.M = inner @ place.M @ self.Z_u
         self.K, self.C, self.K_z = (inner @ (pull + place.M @ demanded)
                                     for pull, demanded in zip(pulls, self.demanded, strict=True))
-        self.F_in = -inner @ (place.whole_inputs[parts["forces"]] + place.M @ self.demanded_in)
+        self.F_in = -inner @ (place.whole_inputs[parts["forces"]] + forces @ along_in + bent @ self.V_in
+                              + place.M @ self.demanded_in)
         self.turned = place.turning_of_speeds
         self.G = (self.turned @ self.Z_v)[self.displacements]
         rates_z = place.whole_x[parts["z_dot"]][self.states]
         self._of_states = [rates_z @ each for each in self.along]
-        self._states_in = place.whole_inputs[parts["z_dot"]][self.states]
+        self._states_in = place.whole_inputs[parts["z_dot"]][self.states] + rates_z @ along_in
 
-    def _particular(self, right: np.ndarray) -> np.ndarray:
-        """The u' (n_u, k) with S u' = -right whose independent speeds are zero."""
-        found = np.zeros((self.place.sizes[1], right.shape[1]))
-        if right.any() and self._dependent:
-            block = self.S[:, self._dependent]
-            columns = natural_scales(self.place)[self._dependent]
-            found[self._dependent] = -columns[:, None] * np.linalg.lstsq(block * columns, right, rcond=1e-12)[0]
+    def _particular(self, right: np.ndarray, rows: np.ndarray | None = None,
+                    independent: Sequence[int] | None = None) -> np.ndarray:
+        """The u' (n_u, k) with rows u' = -right whose independent ones are zero; left out: S and the speeds."""
+        rows = self.S if rows is None else rows
+        n_u = self.place.sizes[1]
+        found = np.zeros((n_u, right.shape[1]))
+        dependent = [k for k in range(n_u) if k not in set(self.speeds if independent is None else independent)]
+        if right.any() and dependent:
+            columns = natural_scales(self.place)[dependent]
+            found[dependent] = -columns[:, None] * np.linalg.lstsq(rows[:, dependent] * columns, right, rcond=1e-12)[0]
         return found
 
     def _bent_reactions(self) -> np.ndarray:
@@ -249,11 +268,21 @@ class Manifold:
         return np.hstack(self.along)
 
     def state_matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """A (m, m) and B (m, n_in) of [eta; zeta; z']."""
+        """A (m, m) and B (m, n_in) of [eta; zeta; z'], see `demand_followed`."""
         inverse = _factorized(self.M, self.place.module.name)
         top = [self.W[self.displacements] - self.G, self.Z_u[self.displacements], self.W_z[self.displacements]]
         A = np.block([top, [-inverse(self.K), -inverse(self.C), -inverse(self.K_z)], self._of_states])
-        return A, np.vstack([np.zeros((self.n_d, self.F_in.shape[1])), inverse(self.F_in), self._states_in])
+        moved = (self.U_in - self.turned @ self.V_in)[self.displacements]
+        return A, np.vstack([moved, inverse(self.F_in), self._states_in])
+
+    def demand_followed(self) -> None:
+        """Raises ArgumentError where a motion moves what the constraints hold fast, so that there are no B and D."""
+        if self._unfollowed.any():
+            metadata = self.place.module.metadata
+            told = ", ".join(n for n, lost in zip(metadata["inputs"], self._unfollowed, strict=True) if lost)
+            raise ArgumentError(f"{self.place.module.name}: B and D are requested where the constraints do not let the mechanism "
+                                f"follow changes of {told}, to first order: the position is singular, or the constraints and "
+                                "what is held leave nothing to follow by; move away from there, or hold less")
 
     def output_matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """C_out (n_y, m) and D (n_y, n_in); accelerations in outputs are those of the constrained motion, what is held held."""
@@ -268,7 +297,7 @@ class Manifold:
         accelerations = [self.Z_u @ -inverse(pull) + demanded
                          for pull, demanded in zip((self.K, self.C, self.K_z), self.demanded, strict=True)]
         C_out = np.hstack([by_x @ each + by_ud @ ud for each, ud in zip(self.along, accelerations, strict=True)])
-        return C_out, by_in + by_ud @ (self.Z_u @ inverse(self.F_in) + self.demanded_in)
+        return C_out, by_in + by_x @ self.along_in + by_ud @ (self.Z_u @ inverse(self.F_in) + self.demanded_in)
 
     @cached_property
     def bundle(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -289,6 +318,15 @@ class Manifold:
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """A and B, once."""
         return self.state_matrices()
+
+
+def _left(rows: np.ndarray, found: np.ndarray, asked: np.ndarray, *products: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Which columns of rows @ found + asked + the products are not zero, by the sizes of their terms, (n_in,) of bool."""
+    left, size = rows @ found + asked, np.abs(asked)
+    for factor, other in products:
+        left, size = left + factor @ other, size + np.abs(factor) @ np.abs(other)
+    worst: np.ndarray = np.abs(left).max(axis=0, initial=0.0) > FOLLOWED * size.max(axis=0, initial=0.0)
+    return worst
 
 
 def common_partition(start: Manifold, places: Sequence[Place]) -> tuple[list[int], list[int]] | None:
