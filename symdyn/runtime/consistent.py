@@ -136,7 +136,9 @@ def smallest_acceleration(module: Module, t: float, x: np.ndarray, params: np.nd
     change = search.smallest(x, J, gaps, free)
     found = ud if change is None else ud + change
     left = gaps - J @ (found - ud)
-    size = float(np.abs(gaps).max(initial=0.0))
+    # Gaps may be rounding themselves: what counts is the size of the terms, which they are a part of.
+    terms = np.abs(J) @ np.abs(ud) + np.abs(module.evaluate("F_d", t, x, params) * module.evaluate("C_scale", t, x, params))
+    size = float(np.maximum(terms, np.abs(gaps)).max(initial=0.0))
     if (np.abs(left) > _GOOD * size).any():
         kept = f" with those of {', '.join(keep)} kept" if keep else ""
         raise ArgumentError(f"{module.name}: no accelerations fulfil the constraints here{kept}: the nearest violate "

@@ -11,6 +11,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.runtime.consistent import smallest_acceleration
 from symdyn.runtime.labelled import Labelled
 
 R, INERTIA, MASS, DAMPING = 0.3, 0.05, 2.0, 0.7
@@ -167,6 +168,34 @@ def test_no_accelerations_at_contradicting_constraints() -> None:
         module = s.augmented().compile(backend="numpy")
     with pytest.raises(sd.ArgumentError, match=r"no accelerations fulfil the constraints here: the nearest violate"):
         module.actuation(0.0, [0.0, R], [2.0, 0.0], [0.0, 0.0], project=True)
+
+
+def test_gaps_that_are_rounding_need_no_other_accelerations() -> None:
+    """Of two equal rows the rounding contradicts itself, which no accelerations fulfil; it is nothing by the size of the terms."""
+    q, u, ud = MOTION
+    x = np.array([*q, *u])
+    found = smallest_acceleration(yoke(rows=2), 0.0, x, np.zeros(0), np.array(ud), np.array([1e-16, -2e-16]))
+    assert np.allclose(found, ud, rtol=0, atol=1e-14)
+    with pytest.raises(sd.ArgumentError, match="no accelerations fulfil the constraints here"):
+        smallest_acceleration(yoke(rows=2), 0.0, x, np.zeros(0), np.array(ud), np.array([1e-6, -2e-6]))
+
+
+def test_rounding_of_absolute_coordinates_is_no_contradiction(backend: str) -> None:
+    """The inputs of least norm are those of the same arm in its angles."""
+    q1, q2 = sd.coordinates("q1 q2")
+    F1, F2, F3 = sd.inputs("F1 F2 F3")
+    s = sd.System("arm", gravity=[0, -9.81])
+    a, b = s.add_body("a", 1.0, 0.1, com=[0.3, 0]), s.add_body("b", 2.0, 0.2, com=[0.2, 0])
+    s.add_joint(sd.Revolute("shoulder", "ground", a, q1))
+    s.add_joint(sd.Revolute("elbow", a, b, q2, parent_point=[0.6, 0]))
+    s.add_joint_force("shoulder", F1 + 0.5 * F3)
+    s.add_joint_force("elbow", F2)
+    module = s.augmented(coordinates="absolute").compile(backend=backend)
+    q, u = module.consistent()
+    ud = module.rhs(0.0, [*q, *u], inputs={F1: 1, F2: 3, F3: 2})[len(q):]
+    found = module.actuation(0.0, q, u, ud, project=True).inputs.to_dict()
+    # Of all with F1 + F3 / 2 = 2 the least.
+    assert found == pytest.approx({"F1": 1.6, "F2": 3.0, "F3": 0.8}, rel=1e-9)
 
 
 # -- fewer inputs than freedoms
