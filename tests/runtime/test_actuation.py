@@ -171,7 +171,7 @@ def test_no_accelerations_at_contradicting_constraints() -> None:
 
 
 def test_gaps_that_are_rounding_need_no_other_accelerations() -> None:
-    """Of two equal rows the rounding contradicts itself, which no accelerations fulfil; it is nothing by the size of the terms."""
+    """Of two equal rows the rounding contradicts itself, which no accelerations fulfil; it is nothing by the size of terms."""
     q, u, ud = MOTION
     x = np.array([*q, *u])
     found = smallest_acceleration(yoke(rows=2), 0.0, x, np.zeros(0), np.array(ud), np.array([1e-16, -2e-16]))
