@@ -85,6 +85,7 @@ FUNCTIONS = {
     "watches": ("watches", "values that loads want to be looked at: draft, tilt and the like"),
     "events": ("events", "what vanishes at the events, in their order"),
     "event_resets": ("event_resets", "what entries of the state become at events that reset them"),
+    "reset_directions": ("reset_directions", "changes of [q; u] along each coordinate and speed that events reset"),
     "switches": ("switches", "what passes zero where the right-hand side may jump"),
     "drawn_lengths": ("drawn_lengths", "lengths in pictures that follow from parameters, m"),
     "jacobian_x": ("jacobian_x", "exact derivative of x_dot by x"),
@@ -207,7 +208,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         if name == "rhs":  # looked at in or after every simulation
             needed = (*needed, *(["watches"] if "watches" in equations.quantities else []),
                       *(["switches"] if switches(equations) else []))
-        needed = (*needed, *(n for n in ("events", "event_resets") if n in equations.quantities))
+        needed = (*needed, *(n for n in ("events", "event_resets", "reset_directions") if n in equations.quantities))
         field, method = split_name(name)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in field,
                     baumgarte="baumgarte" in field, method=method)

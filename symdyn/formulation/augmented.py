@@ -31,8 +31,8 @@ from symdyn.model.quantity import Quantity
 from symdyn.model.record import Model
 from symdyn.model.symbols import symbols_of
 from symdyn.shown import shown
-from symdyn.spatial.vectors import inner, vector
-from symdyn.tape.differentiate import jacobian
+from symdyn.spatial.vectors import inner, vector, zeros
+from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.node import SEED, is_zero
 from symdyn.turning import turns
 
@@ -84,7 +84,40 @@ class ConstrainedTree(Constrained, TreeQuantities):
         return self.gathered.remaining()
 
     def quantities(self) -> dict[str, Any]:
-        return {**super().quantities(), "reactions_by_lam": self.reactions_by_lam}
+        own = {"reactions_by_lam": self.reactions_by_lam}
+        if self.rows and self._places_of_resets():
+            own["reset_directions"] = self.reset_directions
+        return {**super().quantities(), **own}
+
+    def _places_of_resets(self) -> list[int]:
+        """Entries of [q; u] that events reset, in order."""
+        names = [*self.coordinates, *self.speeds]
+        reset = {symbol for event in self.model.events for symbol, _ in event.reset}
+        return [k for k, symbol in enumerate(names) if symbol in reset]
+
+    def reset_directions(self) -> np.ndarray:
+        """Change of [q; u], as far as the constraints let it, by a force along each coordinate and an impulse along each speed
+        that events reset, in the order of [q; u], (n, n_q + n_u).
+
+        Along these directions a change of the entry is the smallest in the metric of the mass matrix: M du + C_r^T lam = e_k,
+        C_r du = 0.
+        """
+        recorder, saddle = self.algebra.recorder, self.recall("saddle")
+        n_q, n_u, leaves = len(self.coordinates), len(self.speeds), [self.algebra.leaves[u] for u in self.speeds]
+        result = zeros(len(self._places_of_resets()), n_q + n_u)
+        with self.algebra.section("directions of resets"):
+            for row, k in zip(result, self._places_of_resets(), strict=True):
+                along = zeros(n_u)
+                if k < n_q:
+                    along[:] = jacobian(recorder, [self.rates[k]], leaves, "forward")[0]
+                else:
+                    along[k - n_q] = 1
+                v = saddle.solve(along, zeros(len(self.rows)))[0]
+                if k < n_q:
+                    row[:n_q] = forward(recorder, self.rates, dict(zip(leaves, v, strict=True)))
+                else:
+                    row[n_q:] = v
+        return result
 
     def reactions_by_lam(self) -> np.ndarray:
         """Derivatives of the reactions, row by row, by the multipliers at given accelerations, (6 n_joints, n_c)."""

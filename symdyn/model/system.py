@@ -308,7 +308,11 @@ class System:
         stop       end the motion there
         reset      coordinates, speeds and extra states with expressions for what they become, from the state before the
                    event: {v: -e*v} for a ball that bounces. Events at the same time make their resets in the order in which
-                   they were added, each from the state before all of them: of two for one speed the later counts
+                   they were added, each from the state before all of them: of two for one speed the later counts. Without
+                   constraints all else stays. With them, and so in absolute coordinates, what is reset becomes what it says,
+                   and the others follow: they change by as little as the constraints allow in the metric of the mass matrix,
+                   coordinates first, then speeds. For speeds that is the impact by impulses along what is reset alone, such as
+                   in a joint. What the constraints do not allow ends the run with the reason
         """
         made = make_event(self._faults, name, value, direction, stop, reset)
         if made is not None:

@@ -20,7 +20,7 @@ from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.short_steps import ShortSteps
-from symdyn.runtime.stabilization import Corrections, not_converged
+from symdyn.runtime.stabilization import Corrections, not_converged, reset_refused
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ STEPS_AT_ONCE = 4096
 _DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
 _PROJECTION_FAILED = -6
 _EVENT_STOPPED, _EVENT_FAILED, _EVENT_AT_ONCE = 3, -7, -8
-_NO_SERIES = -9
+_NO_SERIES, _RESET_REFUSED = -9, -10
 # Most events that wait to be taken, besides two of each kind; see `noted` in the generated source.
 _EVENTS_WAITING = 64
 _INPUT_STOPPED = 100_000
@@ -152,6 +152,13 @@ class _Run:
         status = int(function(self.address, *arguments))
         self.seconds += clock.perf_counter() - begun
         return status
+
+    @property
+    def reset_gap(self) -> float:
+        """By how much what was refused as a reset is off."""
+        gap = self.unit.function("simulation_reset_gap")
+        gap.restype = ctypes.c_double
+        return float(gap(self.address))
 
     def report(self) -> np.ndarray:
         """See `simulation_report` in the generated source."""
@@ -279,6 +286,9 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         return describe_stop(metadata, t, x, at_once(module, run.happened, near))
     if status == _EVENT_FAILED:
         why = run.unit.reason(int(report[5])) if report[5] else not_known(module, int(report[6]))
+        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
+    if status == _RESET_REFUSED:
+        why = reset_refused(metadata["x"][int(report[6])], run.reset_gap)
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _FIELD_FAILED:
         x_fail = report[8 + n:8 + 2 * n]

@@ -9,6 +9,7 @@ import numpy as np
 
 from symdyn import panels
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.stabilization import Projector
 from symdyn.shown import LENGTH, name_of
 
 if TYPE_CHECKING:
@@ -221,15 +222,19 @@ class Locator:
         return None
 
     def after(self, t: float, x: np.ndarray) -> np.ndarray | None:
-        """The state that the motion goes on from; None if no event changed it."""
+        """The state that the motion goes on from, on the constraints, whatever keeps steps there; None if no event changed it.
+
+        Raises ProjectionFailed where the constraints do not allow what the resets ask for.
+        """
         changed = [k for k in self.fired if self.records[k]["reset"]]
         if not changed:
             return None
-        becomes = self.module.evaluate(RESETS, t, x[:self.n_state], self.p, self.given(t, x[:self.n_state]))
-        state = x.copy()
+        projector = Projector(self.module, self.p)
+        state = projector(t, x)
+        becomes = self.module.evaluate(RESETS, t, state[:self.n_state], self.p, self.given(t, state[:self.n_state]))
         for k in changed:
             state[self.records[k]["reset"]] = becomes[self.starts[k]:self.starts[k + 1]]
-        return state
+        return projector.keeping(t, state, [place for k in changed for place in self.records[k]["reset"]])
 
     def goes_on(self, after: np.ndarray) -> None:
         """Note the state after the resets of the latest events."""

@@ -21,7 +21,7 @@ from symdyn.runtime.methods import is_compiled
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.sampled import Replay, Sampling
-from symdyn.runtime.stabilization import Corrections, Projector
+from symdyn.runtime.stabilization import Corrections
 from symdyn.runtime.stops import describe_stop
 
 if TYPE_CHECKING:
@@ -193,7 +193,6 @@ class _Pieces:
         self.locator.fired = fired
         after = self.locator.after(t, x)
         assert after is not None  # one of them has a reset
-        after = Projector(self.module, self.request.p)(t, after)
         self.jumped[-len(fired):] = [one._replace(after=after) for one in self.jumped[-len(fired):]]
         self.carried = self.carried._replace(reset=True)
         return after

@@ -280,8 +280,7 @@ class Run:
             while (at := locator.first(begun, float(solver.t), self.between)) is not None:
                 x = self.between(at)
                 after = locator.after(at, x)
-                if after is not None:  # onto the constraints, whatever keeps the steps there
-                    after = Projector(self.module, self.request.p)(at, after)
+                if after is not None:
                     locator.goes_on(after)
                 if after is not None or locator.over or locator.failed:
                     return _Cut(at, x, None if locator.over or locator.failed else after)

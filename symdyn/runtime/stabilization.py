@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -101,7 +101,9 @@ class Projector:
         self.n_evaluations, self.n_steps = 0, 0
         self.largest = np.zeros(2)
         self._evaluators = {}
-        for name in ("position_correction", "velocity_correction", "violation") if self.n_c else ():
+        needed = ("position_correction", "velocity_correction", "violation",
+                  *[name for name in ("reset_directions",) if name in module.functions])
+        for name in needed if self.n_c else ():
             evaluator = self._evaluators[name] = module.unit("rhs").evaluator(name)
             evaluator.set_params(params)
 
@@ -112,6 +114,59 @@ class Projector:
         if self.n_c:
             self._correct(t, x)
         return x
+
+    def keeping(self, t: float, x: np.ndarray, held: Sequence[int]) -> np.ndarray:
+        """The state x (n_x,), or with the work behind it, after resets of its entries `held`, on the constraints: these stay, all
+        others change by as little as can be in the metric of the mass matrix, first coordinates, then speeds.
+
+        Raises ProjectionFailed, also where the constraints do not let an entry be what its reset makes it.
+        """
+        x = np.array(x, dtype=float)
+        self._normalise(x)
+        middle = self.n_q + self.n_u
+        if not self.n_c or not any(k < middle for k in held):
+            return self(t, x)
+        resets = {k for event in self.module.metadata["events"] for k in event["reset"]}
+        known = [k for k in sorted(resets) if k < middle]  # in the order of reset_directions
+        wanted, u = x.copy(), x[self.n_q:middle].copy()
+        for part in (slice(0, self.n_q), slice(self.n_q, middle)):
+            rows = [r for r, k in enumerate(known) if k in held and part.start <= k < part.stop]
+            places = [known[r] for r in rows]
+            x[self.n_q:middle] = u
+            x = self(t, x)
+            self._close(t, x, wanted, rows, places)
+        return x
+
+    def _close(self, t: float, x: np.ndarray, wanted: np.ndarray, rows: Sequence[int], places: Sequence[int]) -> None:
+        """Bring the entries `places` of x to what is wanted, by Newton's method along `rows` of the function reset_directions."""
+        if not places:
+            return
+        of_speeds = places[0] >= self.n_q
+        factors = np.concatenate([self.lengths, self.velocities])
+        sizes = np.abs(x[:len(factors)] * factors)
+        asked = float((np.abs(wanted - x)[places] * factors[places]).max())
+        size = max(1e-5 * self.length, sizes[self.n_q:].max(), asked) if of_speeds else self.length
+        allowed = _TOO_MUCH[1] if of_speeds else max(_TOO_MUCH[0], 4 * _RESOLVED * sizes[:self.n_q].max() / self.length)
+        worst = np.inf
+        for _ in range(_ROUNDS + 1):
+            gaps = (wanted - x)[places]
+            before, parts = worst, np.abs(gaps) * factors[places] / size
+            worst, entry, left = float(parts.max()), places[int(parts.argmax())], float(np.abs(gaps)[int(parts.argmax())])
+            if worst <= 1e-15 or worst > 0.7 * before:
+                break
+            try:
+                directions = self._evaluate("reset_directions", t, x).reshape(-1, len(factors))[rows]
+                own = np.diag(directions[:, places]) * factors[places]
+                # What would take the others a million times as far is held by the constraints.
+                free = np.flatnonzero(1e6 * own > np.abs(directions * factors).max(axis=1))
+                G = directions[free][:, np.array(places)[free]].T
+                x[:len(factors)] += _multipliers(G, gaps[free]) @ directions[free]
+                x[:] = self(t, x)
+            except ProjectionFailed:
+                worst = np.inf
+                break
+        if worst > allowed:
+            raise ProjectionFailed(reset_refused(self.module.metadata["x"][entry], left))
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
         """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
@@ -163,7 +218,7 @@ class Projector:
                 names(self.module)[worst], float(residuals[int(of_speeds), worst]), of_speeds))
 
     def _evaluate(self, name: str, t: float, x: np.ndarray) -> np.ndarray:
-        self.n_evaluations += name != "violation"
+        self.n_evaluations += name.endswith("correction")
         try:
             return self._evaluators[name].one(t, x[:self.n_state], self.module.motions_at(t))
         except EvaluationError as error:
@@ -194,6 +249,21 @@ class Watch:
 def not_converged(constraint: str, residual: float, of_speeds: bool = False) -> str:
     """What to say where corrections do not converge."""
     return f"{constraint} stays violated by {residual:.3g} m" + "/s" * of_speeds
+
+
+def reset_refused(entry: str, gap: float) -> str:
+    """What to say where a reset asks for what the constraints do not allow."""
+    return (f"the constraints do not let {entry} be what the reset of an event makes it: the nearest is {gap:.3g} off; reset "
+            "fewer coordinates and speeds, from which the others follow, or to values that the constraints allow")
+
+
+def _multipliers(G: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+    """mu with G mu = gaps, as well as it can be, for a positive semidefinite G: scaled to a diagonal of ones."""
+    if not len(gaps):
+        return gaps
+    factors = 1 / np.sqrt(np.diag(G))
+    found: np.ndarray = factors * np.linalg.lstsq(G * np.outer(factors, factors), factors * gaps, rcond=1e-10)[0]
+    return found
 
 
 def chosen_gain(trial: Callable[[], np.ndarray], span: tuple[float, float]) -> float:

@@ -83,7 +83,7 @@ def test_resets_at_one_time_share_their_energy() -> None:
 
 
 def test_a_reset_on_constraints_counts_with_its_projection() -> None:
-    """A particle on a circle whose speed is set to what the circle does not let it keep."""
+    """A particle on a circle of which one speed is reset, which the other one follows."""
     x, y = sd.coordinates("x y")
     s = sd.System("circling", gravity=[0, -G])
     rail, particle = s.add_body("rail"), s.add_body("particle", mass=1)
@@ -91,11 +91,11 @@ def test_a_reset_on_constraints_counts_with_its_projection() -> None:
     s.add_joint(sd.Prismatic("up", rail, particle, y, axis=[0, 1]))
     s.add_constraint(x**2 + y**2 - 1, "circle")
     s.initial = {x: 1}
-    s.add_event("bottom", x, direction=-1, reset={x.dot: -x.dot / 2, y.dot: 3})
+    s.add_event("low", y + 0.8, direction=-1, reset={x.dot: -x.dot / 2})
     module = s.augmented().compile(backend="c")
     for method in ("dop853", "RK45"):
         sol = module.simulate((0, 0.8), method=method, rtol=1e-10)
-        assert sol.reset_energy["bottom"][-1] == pytest.approx(-0.75 * G, rel=1e-8) and sol.energy_error() < 1e-8
+        assert sol.reset_energy["low"][-1] == pytest.approx(-0.75 * 0.8 * G, rel=1e-8) and sol.energy_error() < 1e-8
 
 
 def test_reports_and_summaries_name_the_resets(modules: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -222,13 +222,16 @@ def test_reset_is_put_onto_the_constraints_whatever_keeps_the_steps_there(method
     s.add_joint(sd.Prismatic("up", rail, particle, y, axis=[0, 1]))
     s.add_constraint(x**2 + y**2 - 1, "circle")
     s.initial = {x: 1}
-    s.add_event("bottom", x, reset={x.dot: -x.dot / 2, y.dot: 3})  # upwards, which the circle does not let it go
+    s.add_event("back", x - sp.Rational(3, 10), direction=-1, reset={x.dot: -x.dot / 2})  # which makes y.dot turn, too
     s.add_event("half", x - sp.Rational(1, 2), stop=True, direction=1)
     if method == "ggl":
         pytest.importorskip("solve_dae")
     module = s.augmented().compile(backend="c")
     run = module.simulate((0, 1.2), method=method, stabilization=way, rtol=1e-9)
-    assert run.success and len(run.events["bottom"].t) == 1
+    assert run.success and len(run.events["back"].t) == 1
+    at = run.events["back"].t[0]
+    around = module.simulate([0, at - 1e-9, at + 1e-9], method=method, stabilization=way, rtol=1e-9)
+    assert around["x_dot"][2] == pytest.approx(-around["x_dot"][1] / 2, rel=1e-7)
     assert np.abs(run["x"] ** 2 + run["y"] ** 2 - 1).max() < 1e-7 and np.abs(run.velocity_violation).max() < 1e-7
     exact = module.simulate((0, 1.2), rtol=1e-12)
     assert run.t[-1] == pytest.approx(exact.t[-1], abs=1e-7) and run.x[-1] == pytest.approx(exact.x[-1], abs=1e-6)
