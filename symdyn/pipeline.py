@@ -24,6 +24,7 @@ from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
 from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.event_bounds import BOUNDS, bound_names, enclosed, event_bounds, event_leaves, unknowns
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.skipped import skipped
 from symdyn.model.symbols import GivenMotion
@@ -166,6 +167,8 @@ def has_function(equations: Equations, name: str) -> bool:
         return any(q.startswith("output_") for q in equations.quantities)
     if name == "switches":
         return bool(switches(equations))
+    if name == BOUNDS:
+        return bool(event_leaves(equations))
     return _quantity(name) in equations.quantities
 
 
@@ -208,7 +211,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         if name == "rhs":  # looked at in or after every simulation
             needed = (*needed, *(["watches"] if "watches" in equations.quantities else []),
                       *(["switches"] if switches(equations) else []))
-        needed = (*needed, *(n for n in ("events", "event_resets", "reset_directions") if n in equations.quantities))
+        needed = (*needed, *(n for n in ("events", "event_resets", "reset_directions", BOUNDS) if has_function(equations, n)))
         field, method = split_name(name)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in field,
                     baumgarte="baumgarte" in field, method=method)
@@ -232,7 +235,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
         return make(equations, backend, fallback)
 
-    metadata = {**rhs.metadata, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
+    rates = _given_rates(equations, ("rhs",))
+    metadata = {**rhs.metadata, "ud": rates, "sizes": {**rhs.metadata["sizes"], "ud": len(rates)}, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
                 "reactions": [name for name, *_ in equations.joints], "bodies": list(equations.bodies),
                 "drawn": list(equations.drawn), "flexible": list(equations.flexible), "planar": equations.planar,
@@ -244,7 +248,7 @@ def compile_equations(equations: Equations, backend: str | None = None, template
                 "charts": [list(chart) for chart in equations.charts],
                 "masses": {p.name: body for p, body in equations.symbols.masses.items()},
                 "output_units": dict(equations.symbols.point_units),
-                "events": event_records(equations),
+                "events": event_records(equations), "event_leaves": event_leaves(equations),
                 "not_smooth": not_smooth(equations.quantity("rhs").tolist()),
                 "switches": [description(jump, equations.printed_leaves()) for jump in switches(equations)],
                 "watches": [[w.label, w.least, w.most, w.message] for w in equations.watched()],
@@ -271,11 +275,13 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
 
 
 def event_records(equations: Equations) -> list[dict[str, Any]]:
-    """Events as plain data: name, direction, whether it ends the motion, entries of x = [q; u; z] that it resets."""
+    """Events as plain data: name, direction, whether it ends the motion, entries of x = [q; u; z] that it resets; whether it can be
+    enclosed; which inputs and functions of the user its value depends on."""
     symbols = equations.symbols
     places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
-    return [{"name": e.name, "direction": e.direction, "stop": e.stop, "reset": [places[s] for s, _ in e.reset]}
-            for e in equations.events]
+    about = zip(equations.events, enclosed(equations), unknowns(equations), strict=True)
+    return [{"name": e.name, "direction": e.direction, "stop": e.stop, "reset": [places[s] for s, _ in e.reset],
+             "enclosed": can, "inputs": inputs, "functions": functions} for e, can, (inputs, functions) in about]
 
 
 def _content(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
@@ -302,7 +308,7 @@ def _content(equations: Equations, names: Sequence[str], standalone: bool, bound
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
                    [[q.name for q in group] for group in equations.unit_groups], otherwise,
-                   event_records(equations) if "events" in names else ())
+                   event_records(equations) if "events" in names else (), event_leaves(equations) if BOUNDS in names else ())
 
 
 def _tapes(equations: Equations, names: Sequence[str], work: bool, baumgarte: bool) -> dict[str, Tape]:
@@ -330,6 +336,8 @@ def _given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
     """What stands in the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
     for the residual the rates of the coordinates, too, and multipliers."""
     symbols, n_c = equations.symbols, len(equations.constraints)
+    if BOUNDS in names:
+        return bound_names(event_leaves(equations))
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
     given = [f"{s.name}_dot" for s in symbols.speeds]
@@ -355,6 +363,8 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
     if name == "switches":
         surfaces = np.array([jump.surface for jump in switches(equations)], dtype=object)
         return Tape(equations.recorder, {name: Output.of(name, surfaces)})
+    if name == BOUNDS:
+        return event_bounds(equations)
     if name != "outputs":
         return equations.tape(_quantity(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]

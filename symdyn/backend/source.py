@@ -49,7 +49,8 @@ class Content:
     outputs  user outputs: (name, shape) in the order of the function `outputs`
     unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
     otherwise     tapes by function name for where the first ones fail
-    events        what the function `events` is about: records with direction, stop and reset, entries of x
+    events        what the function `events` is about: records with direction, stop and reset, entries of x, and enclosed
+    event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
     """
 
     name: str
@@ -65,6 +66,7 @@ class Content:
     unit_groups: Sequence[Sequence[str]] = ()
     otherwise: Mapping[str, Tape] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()
+    event_leaves: Sequence[int] = ()
 
 
 @dataclass(frozen=True)
@@ -243,6 +245,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
         "method": method_of(method), "m": f"{name}_{method}", "has_events": EVENTS in uses, "events": content.events,
+        "event_leaves": content.event_leaves,
         "panels": panels,
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,

@@ -23,7 +23,7 @@ from symdyn.runtime.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.memory import demand
 from symdyn.runtime.sampled import check_span
-from symdyn.runtime.simulate import checked_method, checked_positive, checked_times, checked_tolerances
+from symdyn.runtime.simulate import checked_method, checked_positive, checked_spacing, checked_times, checked_tolerances
 from symdyn.runtime.stops import describe_stop
 from symdyn.runtime.watches import WATCHES
 
@@ -62,7 +62,8 @@ class _Asked:
 def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
                    inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
                    first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
-                   events: Any = True, interpolation: str = "linear", extend: str = "error") -> BatchSolution:
+                   events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
+                   extend: str = "error") -> BatchSolution:
     """See Module.simulate_batch."""
     metadata = module.metadata
     checked_method(module, method)
@@ -91,7 +92,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
     note = why_one_by_one(module, has_events) or _why_these(by_time, options)
-    options["events"] = events
+    options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
     if by_time:
         options |= {"interpolation": interpolation, "extend": extend}
     given = np.full((n, len(times), metadata["sizes"]["inputs"]), np.nan) if by_time and metadata.get(WATCHES) else fixed

@@ -13,7 +13,7 @@ import numpy as np
 
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.chatter import STEPS, chatter_of
-from symdyn.runtime.events import CHATTER, EVENTS, Happened, at_once, ended, not_known, too_quick
+from symdyn.runtime.events import CHATTER, EVENTS, Happened, at_once, ended, not_known, not_proved, too_quick
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
@@ -34,7 +34,7 @@ _DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0
 _PROJECTION_FAILED = -6
 _EVENT_STOPPED, _EVENT_FAILED, _EVENT_AT_ONCE = 3, -7, -8
 _NO_SERIES, _RESET_REFUSED = -9, -10
-# Most events that wait to be taken, besides two of each kind; see `noted` in the generated source.
+# Most events that wait to be taken, besides three of each kind; see `noted` in the generated source.
 _EVENTS_WAITING = 64
 _INPUT_STOPPED = 100_000
 _InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
@@ -79,11 +79,13 @@ class _Run:
         self.written = ctypes.c_long(0)
         self.happened: list[Happened] = []
         self.too_quick: list[tuple[int, float]] = []
+        self.hidden: list[tuple[int, float]] = []
         self.rows: np.ndarray | None = None
         if request.look is not None and request.look.any():
             self.look = np.ascontiguousarray(request.look, dtype=np.intc)
-            self.rows = np.zeros((_EVENTS_WAITING + 2 * len(self.look), 2 + 2 * self.n_x))
-            unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data))
+            self.rows = np.zeros((_EVENTS_WAITING + 3 * len(self.look), 2 + 2 * self.n_x))
+            unit.function("simulation_look")(self.address, ctypes.c_void_p(self.look.ctypes.data),
+                                             ctypes.c_double(request.event_spacing))
             if request.carried is not None:
                 carried = np.ascontiguousarray(request.carried[:3], dtype=float)
                 unit.function("simulation_carry")(self.address, ctypes.c_void_p(carried.ctypes.data),
@@ -141,7 +143,8 @@ class _Run:
             n = take(self.address, ctypes.c_void_p(self.rows.ctypes.data))
             for k, t, *states in self.rows[:n]:
                 if k < 0:
-                    self.too_quick.append((-1 - int(k), float(t)))
+                    of = -1 - int(k)
+                    (self.too_quick if of < len(self.look) else self.hidden).append((of % len(self.look), float(t)))
                 else:
                     self.happened.append(Happened(int(k), float(t), *np.array(states).reshape(2, -1)))
         return status
@@ -232,7 +235,8 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
         message = ended(module, next(stopping), report[0])
     if over or not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
-    doubts = [too_quick(module, run.too_quick), _doubt(module, request, method, report) if status >= 0 else ""]
+    doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing),
+              _doubt(module, request, method, report) if status >= 0 else ""]
     dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
     return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), run.seconds,
                    Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),

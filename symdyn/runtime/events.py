@@ -15,7 +15,7 @@ from symdyn.shown import LENGTH, name_of
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-EVENTS, RESETS = "events", "event_resets"
+EVENTS, RESETS, BOUNDS = "events", "event_resets", "event_bounds"
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14
 # So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
@@ -110,15 +110,41 @@ def too_quick(module: Module, found: Sequence[tuple[int, float]]) -> str:
             "shortest wave")
 
 
+def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: float) -> str:
+    """What to warn of where quantities may pass zero between their samples, with the time from when on; "" where none does, and
+    where the user has chosen the spacing of samples."""
+    if not found or spacing:
+        return ""
+    names = [f"{module.metadata[EVENTS][k]['name']} (from t = {t:.9g} s on)" for k, t in found]
+    return (f"{module.name}: zeros of events may be missed: {', '.join(names)} may pass zero and back between two samples, which "
+            f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short as "
+            "the shortest pulse that matters")
+
+
+def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
+    """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, and the
+    inputs that are given by functions; "" where none does, and where the user has chosen the spacing of samples."""
+    if look is None or spacing:
+        return ""
+    told = []
+    for record, wanted in zip(module.metadata.get(EVENTS, ()), look, strict=True):
+        of = [f"the function {f}" for f in record["functions"]] + [f"the input {i}" for i in record["inputs"] if i in functions]
+        told += [f"{record['name']} depends on {', '.join(of)}"] if wanted and of else []
+    if not told:
+        return ""
+    return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is not "
+            "seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
+
+
 class Locator:
     """Looks for events in the steps of a run: the algorithm is that of c/events.c.jinja.
 
     p        parameters; look: which events, (n_e,) of bool; given: inputs at (t, x)
-    n_state  entries of x that are the mechanism's state; span: of the run, s
+    n_state  entries of x that are the mechanism's state; span: of the run, s; spacing: of samples at the most, s, 0: any
     """
 
     def __init__(self, module: Module, p: np.ndarray, look: np.ndarray, given: Callable[[float, np.ndarray], Any], n_state: int,
-                 span: float) -> None:
+                 span: float, spacing: float = 0.0) -> None:
         self.module, self.p, self.look, self.given, self.n_state = module, p, look, given, n_state
         self.records = module.metadata[EVENTS]
         self.direction = np.array([record["direction"] for record in self.records])
@@ -134,6 +160,9 @@ class Locator:
         self.fired: list[int] = []  # the events of the latest time
         self.happened: list[Happened] = []
         self.too_quick: list[tuple[int, float]] = []  # quantities that vary too quickly, and from when on
+        self.hidden: list[tuple[int, float]] = []  # those not proved to have no zeros between samples, and from when on
+        self.spacing = spacing
+        self.bounded = look & np.array([record["enclosed"] for record in self.records])
         self.size: Any = 0.0  # of the entries of the state over the latest step
         self.known = 0.0  # up to when the quantities are known
         self.apart = module.unit(EVENTS).evaluator(EVENTS)
@@ -190,20 +219,24 @@ class Locator:
     def first(self, t_old: float, t_new: float, between: Between) -> float | None:
         """The time of the first events in a step, after `known`, which are noted; between(s): the state within it. None: there
         is none."""
-        left, ends, divisions = self.known, [t_new], 0
+        left, ends, divisions, proofs = self.known, [t_new], 0, 0
         self.size = np.maximum(np.abs(between(t_old)), np.abs(between(t_new)))
         most = panels.FEW_DIVISIONS if self.unresolved.any() else panels.MOST_DIVISIONS
         while ends:
             right = ends[-1]
             middle, width = 0.5 * (left + right), abs(right - left)
             divisible = width > max(2 * self.resolution, 16 * np.finfo(float).eps * abs(right))
+            if divisible and 0 < self.spacing < panels.WIDEST * width:
+                ends.append(middle)
+                continue
             try:
-                samples, end = self._samples(left, right, between)
+                samples, states = self._samples(left, right, between)
             except EvaluationError:
                 if not divisible or width < panels.EVALUATED * abs(t_new - t_old):
                     raise
                 ends.append(middle)
                 continue
+            end = states[panels.N - 2]
             wavy = self._undecided(samples, right, end) if divisible else None
             if wavy is not None and divisions < most:
                 divisions += 1
@@ -212,6 +245,15 @@ class Locator:
             if wavy is not None and not self.unresolved[wavy]:
                 self.unresolved[wavy] = True
                 self.too_quick.append((wavy, left))
+            hidden = self._unproved(left, right, samples, [between(left), *states]) if divisible and wavy is None else None
+            if hidden is not None:
+                known = hidden in [k for k, _ in self.hidden]
+                if proofs < (panels.FEW_DIVISIONS if known else panels.MOST_PROOFS):
+                    proofs += 1
+                    ends.append(middle)
+                    continue
+                if not known:
+                    self.hidden.append((hidden, left))
             roots = self._roots(left, right, samples, between)
             if roots:
                 return self._note(roots, t_old, t_new, between)
@@ -241,8 +283,8 @@ class Locator:
         n = len(self.fired)
         self.happened[-n:] = [happened._replace(after=after) for happened in self.happened[-n:]]
 
-    def _samples(self, left: float, right: float, between: Between) -> tuple[np.ndarray, np.ndarray]:
-        """The quantities on a panel, (N + 1, n_e), see symdyn.panels, and the state at its end."""
+    def _samples(self, left: float, right: float, between: Between) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The quantities on a panel, (N + 1, n_e), see symdyn.panels, and the states there but at its start."""
         times = left + panels.NODES * (right - left)
         times[panels.N - 1] = right
         states = [between(float(s)) for s in times[1:]]
@@ -251,7 +293,7 @@ class Locator:
             values = self.module.evaluate(EVENTS, times[1:], np.array(states)[:, :self.n_state], self.p, np.array(inputs))
         except EvaluationError:  # of one that is not looked for, perhaps
             values = np.array([self.values(float(s), x) for s, x in zip(times[1:], states, strict=True)])
-        return np.vstack([self.now, values]), states[panels.N - 2]
+        return np.vstack([self.now, values]), states
 
     def _noise(self, t: float, x: np.ndarray) -> np.ndarray:
         """What the quantities change by with the rounding of t and of a state within the latest step."""
@@ -270,6 +312,26 @@ class Locator:
             return int(wavy.argmax())
         wavy &= panels.size(samples) > panels.NOISE * noise
         return int(wavy.argmax()) if wavy.any() else None
+
+    def _unproved(self, left: float, right: float, samples: np.ndarray, states: Sequence[np.ndarray]) -> int | None:
+        """The first quantity that may have zeros between the samples of a panel."""
+        if not self.bounded.any():
+            return None
+        times = left + panels.NODES * (right - left)
+        times[panels.N - 1] = right
+        rows = np.array([np.concatenate([x[:self.n_state], self.given(float(s), x[:self.n_state])])
+                         for s, x in zip(times, states, strict=True)])
+        leaves = self.module.metadata["event_leaves"]
+        jets = panels.jets(left, right, rows)[leaves].ravel()
+        try:
+            bounds = self.module.evaluate(BOUNDS, right, states[panels.N - 1][:self.n_state], self.p, rows[0, self.n_state:], jets)
+            doubtful = self.bounded & panels.unproved(samples, bounds)
+            most = np.abs(samples[:panels.N]).max(axis=0)
+            if doubtful.any():
+                doubtful &= most > panels.NOISE * self._noise(right, states[panels.N - 1])
+        except EvaluationError:
+            doubtful = self.bounded
+        return int(doubtful.argmax()) if doubtful.any() else None
 
     def _roots(self, left: float, right: float, samples: np.ndarray, between: Between) -> dict[int, float]:
         """Events on a panel on which every quantity is monotone or has no zero, with their times."""

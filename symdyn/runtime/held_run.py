@@ -63,7 +63,7 @@ class _Pieces:
         if self.request.look is not None and self.request.look.any():
             begin, end = self.request.span
             self.locator = Locator(self.module, self.request.p, self.request.look, lambda t, x: self.inputs.at(t, x),
-                                   self.request.n_state, end - begin)
+                                   self.request.n_state, end - begin, self.request.event_spacing)
 
     def through(self) -> Outcome:
         """To the end, or as far as it gets."""

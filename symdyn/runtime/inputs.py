@@ -104,6 +104,16 @@ class Inputs:
         """Whether any is a function that is not declared to be smooth: kinks at times that are not known."""
         return self.function is not None and not self.smooth
 
+    def by_function(self, names: Sequence[str]) -> list[str]:
+        """Those of the inputs, in order, that functions give over time, rates of such motions among them; splines and tables do
+        not count."""
+        if self.function is None:
+            return []
+        if not isinstance(self.function, Mixed):
+            return list(names)
+        moving = [names[k] for m in self.function.followed if not m.breaks for k in m.places]
+        return [name for _, name, _ in self.function.functions] + moving
+
     @property
     def are_held(self) -> bool:
         """Whether controllers set some of them at instants, or did so."""

@@ -364,7 +364,7 @@ class Module:
                  rtol: float = 1e-8, atol: float | Numbers | None = None, method: str | type | None = None,
                  steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
                  progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
-                 events: bool | str | Sequence[str] = True, interpolation: str = "linear",
+                 events: bool | str | Sequence[str] = True, event_spacing: float = 0.0, interpolation: str = "linear",
                  extend: str = "error") -> Solution:
         """Integrate the motion.
 
@@ -395,6 +395,8 @@ class Module:
                     C_ddot = 0, unless given with a = 1/(twenty mean steps of a short run without); "none".
                     Default: projection, with methods that build on several steps (BDF, LSODA) baumgarte
         events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
+        event_spacing   the longest time between samples of the events, s, for pulses that last as long; 0: they are sampled as
+                    they vary, with a warning where zeros between samples cannot be ruled out
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
@@ -407,15 +409,16 @@ class Module:
 
         return simulate(self, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method, steps=steps,
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
-                        stabilization=stabilization, events=events, interpolation=interpolation, extend=extend)
+                        stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
+                        extend=extend)
 
     def simulate_batch(self, q: Values | Numbers | None = None, u: Values | Numbers | None = None,
                        params: Values | Numbers | None = None, *, z: Values | Numbers | None = None, t: Numbers | None = None,
                        inputs: InputValues | None = None, rtol: float = 1e-8, atol: float | Numbers | None = None,
                        max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
                        max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
-                       events: bool | str | Sequence[str] = True, interpolation: str = "linear",
-                       extend: str = "error") -> BatchSolution:
+                       events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
+                       interpolation: str = "linear", extend: str = "error") -> BatchSolution:
         """Integrate many motions of one mechanism, each with its own steps.
 
         q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
@@ -425,7 +428,8 @@ class Module:
                     sampled controller is asked in one motion after the other)
         t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
         rtol, atol, max_step, first_step   as for `simulate`
-        method, max_steps, stabilization, events   as for `simulate`, too; with others than the default they run one by one
+        method, max_steps, stabilization, events, event_spacing   as for `simulate`, too; with others than the default they run one
+                    by one
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters
@@ -442,7 +446,7 @@ class Module:
 
         return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
                               first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
-                              events=events, interpolation=interpolation, extend=extend)
+                              events=events, event_spacing=event_spacing, interpolation=interpolation, extend=extend)
 
     # -- statics and linearization
 

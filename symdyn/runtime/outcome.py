@@ -21,6 +21,7 @@ class Request:
     look      which of the module's events are looked for, (n_e,) of bool; None: the module has none
     stabilization   what keeps the state on its constraints
     carried   of events, where the run goes on from the end of another one
+    event_spacing   of the samples of events at the most, s; 0: as they vary
     """
 
     span: tuple[float, float]
@@ -37,6 +38,7 @@ class Request:
     stabilization: Stabilization = field(default_factory=Stabilization)
     look: np.ndarray | None = None
     carried: Carried | None = None
+    event_spacing: float = 0.0
 
     @property
     def field_p(self) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.chatter import STEPS_OF_SCIPY, chatter_of
-from symdyn.runtime.events import Locator, too_quick
+from symdyn.runtime.events import Locator, not_proved, too_quick
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
@@ -132,7 +132,8 @@ class Run:
         self.locator: Locator | None = None
         if request.look is not None and request.look.any():
             span = request.span[1] - request.span[0]
-            self.locator = Locator(module, request.p, request.look, self.field.given, request.n_state, span)
+            self.locator = Locator(module, request.p, request.look, self.field.given, request.n_state, span,
+                                   request.event_spacing)
         self.chatter = chatter_of(module, request)
         self.short = None if request.inputs.has_kinks else ShortSteps(module, request, self._trial, TRIED_OF_SCIPY)
         self.warned: list[str] = []
@@ -336,7 +337,10 @@ class Run:
         if not done or self.over:
             t, x = with_last(t, x, self.here, self.state)
         rejected, evaluations, jacobians, factorizations = self._used()
-        doubts = [too_quick(self.module, self.locator.too_quick) if self.locator is not None else ""]
+        doubts = []
+        if self.locator is not None:
+            doubts = [too_quick(self.module, self.locator.too_quick),
+                      not_proved(self.module, self.locator.hidden, self.request.event_spacing)]
         return Outcome(t, x, done, message or "reached the end", interrupted, self.accepted, rejected, evaluations,
                        corrections=self.projector.corrections if self.projector is not None else Corrections(),
                        happened=self.locator.happened if self.locator is not None else (),

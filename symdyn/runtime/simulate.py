@@ -20,7 +20,7 @@ from symdyn.runtime.automatic import automatic
 from symdyn.runtime.charts import CHARTS, warn_near_lock
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
-from symdyn.runtime.events import wanted
+from symdyn.runtime.events import not_seen, wanted
 from symdyn.runtime.handover import run_series
 from symdyn.runtime.held_run import run_held
 from symdyn.runtime.inputs import take_inputs
@@ -45,6 +45,8 @@ MOST_STEPS = 2**31 - 1
 # With more, steps whose error is of the size of the motion itself pass: a double pendulum gained energy without end in 10 s from
 # 0.2 on (RK45) or 0.3 on (dop853, bs54), while at 0.1 it was wrong by a sixth at most with the compiled methods.
 LARGEST_RTOL = 0.1
+# Part of a run below which events are not sampled.
+FINEST = 1e-8
 # Steps of the trial run that Baumgarte's gain is chosen by.
 TRIAL_STEPS = 100
 
@@ -53,7 +55,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
              progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
-             interpolation: str = "linear", extend: str = "error") -> Solution:
+             event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error") -> Solution:
     """See Module.simulate."""
     metadata = module.metadata
     p = real_parameters(module, params)
@@ -71,7 +73,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                             f"found {shown(max_steps)}")
     request = Request(span, None if every else times, start, p, free, *checked_tolerances(module, rtol, atol),
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
-                      max_steps, len(start), look=wanted(module, events))
+                      max_steps, len(start), look=wanted(module, events),
+                      event_spacing=checked_spacing(module, event_spacing, span))
     if work and "power" not in metadata["functions"]:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
@@ -106,6 +109,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             raise SimulationInterrupted(solution, outcome.message)
         if not outcome.success:
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
+        unseen = not_seen(module, request.look, free.by_function(metadata["inputs"]), request.event_spacing)
+        if unseen:
+            outcome = replace(outcome, doubts=(*outcome.doubts, unseen))
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
         if metadata.get(WATCHES) and len(solution.t):
@@ -230,6 +236,15 @@ def checked_positive(module: Module, value: Any, what: str) -> float:
     if not seconds >= 0:
         raise ArgumentError(f"{module.name}: {what} must be a positive number of seconds, or 0, found {shown(value)}")
     return 0.0 if np.isinf(seconds) else seconds
+
+
+def checked_spacing(module: Module, value: Any, span: tuple[float, float]) -> float:
+    """The time between samples of events, s; 0: as they vary. Raises ArgumentError for what would take for ever."""
+    spacing = checked_positive(module, value, "event_spacing")
+    if 0 < spacing < FINEST * abs(span[1] - span[0]):
+        raise ArgumentError(f"{module.name}: event_spacing = {spacing:g} s makes over {1 / FINEST:.0e} samples of a run of "
+                            f"{abs(span[1] - span[0]):g} s; give a longer one, or a shorter run around the pulse")
+    return spacing
 
 
 def _underway(module: Module, name: str) -> str:

@@ -1,0 +1,98 @@
+"""Bounds of what vanishes at events, over parts of a motion, from bounds of the state, the time and the inputs there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.tape.external import UserFunction
+from symdyn.tape.intervals import Interval, Jet, encloses, enclosures
+from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, Node
+from symdyn.tape.tape import Tape, reachable
+
+BOUNDS = "event_bounds"
+# Of a leaf, in the order of its bounds: value, derivative and second derivative by the place within the part, from and to.
+_ENDS = ("least", "most", "least rate", "most rate", "least bend", "most bend")
+
+
+def enclosed(equations: Equations) -> list[bool]:
+    """Which events can be enclosed."""
+    if not equations.events:
+        return []
+    ways = [equations] if equations.otherwise is None else [equations, equations.otherwise]
+    return [all(encloses(way.recorder, way.quantity("events")[k]) for way in ways) for k in range(len(equations.events))]
+
+
+def event_leaves(equations: Equations) -> list[int]:
+    """What the events that can be enclosed depend on: 0 for t, then the entries of x = [q; u; z], then the inputs."""
+    places = {name: k for k, name in enumerate(_leaf_names(equations))}
+    ways = [equations] if equations.otherwise is None else [equations, equations.otherwise]
+    values = [entry for way in ways for entry in _values(way, enclosed(equations))]
+    return sorted({places[leaf.args[1]] for leaf in _moving(values)})
+
+
+def bound_names(leaves: Sequence[int]) -> list[str]:
+    """What stands in the group ud of the function."""
+    return [f"({end} {k})" for k in leaves for end in _ENDS]
+
+
+def event_bounds(equations: Equations) -> Tape:
+    """Bounds of the values at events, (n_e, 6): from and to of each value, its derivative and its second derivative; of those that
+    cannot be enclosed zeros."""
+    recorder, can = equations.recorder, enclosed(equations)
+    values = _values(equations, can)
+    places = {name: k for k, name in enumerate(_leaf_names(equations))}
+
+    def jet(leaf: Node) -> Jet:
+        ends = [recorder.leaf(name, ACCELERATION) for name in bound_names([places[leaf.args[1]]])]
+        return Jet(*[Interval(*ends[k:k + 2]) for k in (0, 2, 4)])
+
+    with recorder.section("bounds of the events"):
+        found = iter(enclosures(recorder, values, {leaf: jet(leaf) for leaf in _moving(values)}))
+        rows = np.zeros((len(can), 6), dtype=object)
+        for k in np.flatnonzero(can):
+            rows[k] = [end for interval in next(found) for end in interval]
+    return Tape.of(recorder, **{BOUNDS: rows})
+
+
+def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
+    """Of every event the inputs and the functions of the user that its value depends on, but for those of equations that are solved
+    for it."""
+    if not equations.events:
+        return []
+    return [_unknowns(equations, entry) for entry in equations.quantity("events")]
+
+
+def _unknowns(equations: Equations, entry: Any) -> tuple[list[str], list[str]]:
+    recorder, inputs, functions = equations.recorder, [], []
+    stack, seen = [entry], set()
+    while stack:
+        node = stack.pop()
+        if not isinstance(node, Node) or node in seen:
+            continue
+        seen.add(node)
+        if node.op == "leaf":
+            inputs += [node.args[1]] if node.mask & INPUT else []
+        elif node.op == "call" and isinstance(node.args[0], UserFunction):
+            functions.append(node.args[0].signature)
+        elif node.op not in ("call", "guard") and node not in recorder.checks:
+            stack += node.args
+        if node.op == "call" and isinstance(node.args[0], UserFunction):
+            stack += node.args[1:]
+    return sorted(inputs), sorted(set(functions))
+
+
+def _leaf_names(equations: Equations) -> list[str]:
+    s = equations.symbols
+    return ["t", *[one.name for one in (*s.coordinates, *s.speeds, *s.states, *s.inputs)]]
+
+
+def _values(equations: Equations, can: Sequence[bool]) -> list[Any]:
+    return [entry for entry, one in zip(equations.quantity("events"), can, strict=True) if one] if can else []
+
+
+def _moving(values: Sequence[Any]) -> list[Node]:
+    return [node for node in reachable(values) if node.op == "leaf" and node.mask & ~PARAMETER]
