@@ -24,7 +24,7 @@ from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
 from symdyn.formulation.constrained import BAUMGARTE, residual_names
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.event_bounds import BOUNDS, bound_names, enclosed, event_bounds, event_leaves, unknowns
+from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, enclosed, event_bounds, event_leaves, unknowns
 from symdyn.formulation.linearization import multiplier_names, variation_names
 from symdyn.formulation.skipped import skipped
 from symdyn.model.symbols import GivenMotion
@@ -167,7 +167,7 @@ def has_function(equations: Equations, name: str) -> bool:
         return any(q.startswith("output_") for q in equations.quantities)
     if name == "switches":
         return bool(switches(equations))
-    if name == BOUNDS:
+    if name in (BOUNDS, RANGES):
         return bool(event_leaves(equations))
     return _quantity(name) in equations.quantities
 
@@ -211,7 +211,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         if name == "rhs":  # looked at in or after every simulation
             needed = (*needed, *(["watches"] if "watches" in equations.quantities else []),
                       *(["switches"] if switches(equations) else []))
-        needed = (*needed, *(n for n in ("events", "event_resets", "reset_directions", BOUNDS) if has_function(equations, n)))
+        needed = (*needed, *(n for n in ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
+                             if has_function(equations, n)))
         field, method = split_name(name)
         return emit(equations, backend, needed, templates, standalone=False, specialize=specialize, work="work" in field,
                     baumgarte="baumgarte" in field, method=method)
@@ -363,8 +364,8 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
     if name == "switches":
         surfaces = np.array([jump.surface for jump in switches(equations)], dtype=object)
         return Tape(equations.recorder, {name: Output.of(name, surfaces)})
-    if name == BOUNDS:
-        return event_bounds(equations)
+    if name in (BOUNDS, RANGES):
+        return event_bounds(equations, name)
     if name != "outputs":
         return equations.tape(_quantity(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]

@@ -13,7 +13,7 @@ from symdyn.tape.intervals import Interval, Jet, encloses, enclosures
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, Node
 from symdyn.tape.tape import Tape, reachable
 
-BOUNDS = "event_bounds"
+BOUNDS, RANGES = "event_bounds", "event_ranges"
 # Of a leaf, in the order of its bounds: value, derivative and second derivative by the place within the part, from and to.
 _ENDS = ("least", "most", "least rate", "most rate", "least bend", "most bend")
 
@@ -39,9 +39,9 @@ def bound_names(leaves: Sequence[int]) -> list[str]:
     return [f"({end} {k})" for k in leaves for end in _ENDS]
 
 
-def event_bounds(equations: Equations) -> Tape:
-    """Bounds of the values at events, (n_e, 6): from and to of each value, its derivative and its second derivative; of those that
-    cannot be enclosed zeros."""
+def event_bounds(equations: Equations, name: str) -> Tape:
+    """BOUNDS of the values at events, (n_e, 6): from and to of each value, its derivative and its second derivative, or RANGES,
+    (n_e, 2), of the values alone; of those that cannot be enclosed zeros."""
     recorder, can = equations.recorder, enclosed(equations)
     values = _values(equations, can)
     places = {name: k for k, name in enumerate(_leaf_names(equations))}
@@ -55,7 +55,7 @@ def event_bounds(equations: Equations) -> Tape:
         rows = np.zeros((len(can), 6), dtype=object)
         for k in np.flatnonzero(can):
             rows[k] = [end for interval in next(found) for end in interval]
-    return Tape.of(recorder, **{BOUNDS: rows})
+    return Tape.of(recorder, **{name: rows if name == BOUNDS else rows[:, :2]})
 
 
 def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
