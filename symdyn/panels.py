@@ -10,8 +10,9 @@ where s are the coefficients of the polynomial's derivative and
 
     error = TAIL (|c_6| + |c_7|) + CHECK |g - polynomial at the check point|.
 
-Samples do not see a pulse between them. So a quantity is bounded by interval arithmetic, too (symdyn.tape.intervals): on [-1, 1] for
-[a, b] it lies within V, its derivative within D and its second derivative within B, |B| <= beta. Nothing is between the samples if
+Samples do not see a pulse between them. So a quantity is bounded by interval arithmetic, too (symdyn.tape.intervals): on [-1, 1]
+for [a, b] it lies within V, its derivative within D and its second derivative within B, |B| <= beta. Nothing is between the
+samples if
 
     0 is not in V, in D, or in B (it has no zero, is monotone, or has no more zeros than a parabola), or if for every two samples
     g_i, g_j next to each other, h apart,

@@ -237,7 +237,8 @@ def compile_equations(equations: Equations, backend: str | None = None, template
         return make(equations, backend, fallback)
 
     rates = _given_rates(equations, ("rhs",))
-    metadata = {**rhs.metadata, "ud": rates, "sizes": {**rhs.metadata["sizes"], "ud": len(rates)}, "outputs": output_shapes(equations), "duration": equations.symbols.duration,
+    metadata = {**rhs.metadata, "ud": rates, "sizes": {**rhs.metadata["sizes"], "ud": len(rates)},
+                "outputs": output_shapes(equations), "duration": equations.symbols.duration,
                 "constraints": list(equations.constraints), "holonomic": list(equations.holonomic),
                 "reactions": [name for name, *_ in equations.joints], "bodies": list(equations.bodies),
                 "drawn": list(equations.drawn), "flexible": list(equations.flexible), "planar": equations.planar,
@@ -276,8 +277,8 @@ def output_shapes(equations: Equations) -> list[list[Any]]:
 
 
 def event_records(equations: Equations) -> list[dict[str, Any]]:
-    """Events as plain data: name, direction, whether it ends the motion, entries of x = [q; u; z] that it resets; whether it can be
-    enclosed; which inputs and functions of the user its value depends on."""
+    """Events as plain data: name, direction, whether it ends the motion, entries of x = [q; u; z] that it resets; whether it can
+    be enclosed; which inputs and functions of the user its value depends on."""
     symbols = equations.symbols
     places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
     about = zip(equations.events, enclosed(equations), unknowns(equations), strict=True)

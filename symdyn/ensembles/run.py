@@ -45,7 +45,7 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
              resume: bool = False, progress: bool = False, consistent: bool = False, outstanding: int | None = None,
              functions: tuple[str, ...] = (), rtol: float | None = None, atol: Any = None, method: Any = None,
              max_step: float | None = None, first_step: float | None = None, max_steps: int | None = None,
-             stabilization: Any = None, events: Any = None) -> Ensemble:
+             stabilization: Any = None, events: Any = None, event_spacing: float | None = None) -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -66,7 +66,7 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     consistent  begin each motion with the nearest state that fulfils the constraints; what is sampled is kept
     outstanding chunks that are handed to the executor at a time; default: three for every worker
     functions   of the module that functions of a Solution call in other processes only
-    rtol, atol, method, max_step, first_step, max_steps, stabilization, events   of `simulate`; None: as there
+    rtol, atol, method, max_step, first_step, max_steps, stabilization, events, event_spacing   of `simulate`; None: as there
 
     From 2000 samples on motions are integrated several at once on the processor's vectors, where `simulate_batch` does so.
     A member that fails has no numbers in its row, and is told in `failures`; warnings of single motions are not given. Returns an
@@ -80,7 +80,7 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
         raise ArgumentError(f"an ensemble needs a Module or a System, found {shown(system, 80)}")
     drawn = samples if isinstance(samples, Samples) else Samples(samples, "paired")
     asked = {"rtol": rtol, "atol": atol, "method": method, "max_step": max_step, "first_step": first_step,
-             "max_steps": max_steps, "stabilization": stabilization, "events": events}
+             "max_steps": max_steps, "stabilization": stabilization, "events": events, "event_spacing": event_spacing}
     options = {name: value for name, value in asked.items() if value is not None}
     measures = take_measures(outcomes, module)
     times = output_times(t, measures, module)

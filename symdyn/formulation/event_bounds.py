@@ -59,8 +59,8 @@ def event_bounds(equations: Equations, name: str) -> Tape:
 
 
 def unknowns(equations: Equations) -> list[tuple[list[str], list[str]]]:
-    """Of every event the inputs and the functions of the user that its value depends on, but for those of equations that are solved
-    for it."""
+    """Of every event the inputs and the functions of the user that its value depends on, but for those in equations that are
+    solved for it."""
     if not equations.events:
         return []
     return [_unknowns(equations, entry) for entry in equations.quantity("events")]

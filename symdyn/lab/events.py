@@ -6,12 +6,14 @@ of the particle's position s = t:
     sines      a sum of four sines of frequencies between 0.2 and 30 1/s minus a threshold
     doubles    a polynomial with three pairs of zeros, each pair 1e-1 to 1e-9 apart, relative to the span
     touching   sin(w s + p) - (1 - d), which reaches its threshold from below, d between 1e-1 and 1e-13
+    pulses     bells exp(-z^2), peaks 1/(1 + z^2), windows (tanh z - tanh(z - 10))/2, roofs max(1 - |z|, 0) and boxes, 1 where
+               |z| < 1, each less one half, z = (s - a)/w, w between 2e-2 and 1e-6 of the span
 
 and of the mass on the spring, where the steps have errors,
 
     swinging   sin t - (1 - d), d between 1e-1 and a thousand times the relative tolerance.
 
-Zeros of `doubles`, `touching` and `swinging` are closed forms. Those of `sines` are found by sampling at 400 points of the
+Zeros of `doubles`, `touching`, `pulses` and `swinging` are closed forms. Those of `sines` are found by sampling at 400 points of the
 shortest period, each extreme between samples being refined. A zero is missed if no event is within 1e-6 of the span (of
 `swinging`: within what two thousand tolerances move it by), superfluous is an event that no zero is near.
 
@@ -36,7 +38,13 @@ from symdyn.errors import SimulationWarning
 
 SPAN = 20.0
 N_SINES, N_PAIRS = 4, 3
-KINDS = ("sines", "doubles", "touching", "swinging")
+KINDS = ("sines", "doubles", "touching", "pulses", "swinging")
+PULSES: dict[str, Any] = {
+    "bell": lambda z: sp.exp(-z**2), "peak": lambda z: 1 / (1 + z**2), "window": lambda z: (sp.tanh(z) - sp.tanh(z - 10)) / 2,
+    "roof": lambda z: sp.Max(1 - sp.Abs(z), 0), "box": lambda z: sp.Piecewise((1, (z > -1) & (z < 1)), (0, True))}
+# Where they are one half.
+HALVES = {"bell": (-np.sqrt(np.log(2)), np.sqrt(np.log(2))), "peak": (-1, 1), "window": (0, 10), "roof": (-0.5, 0.5),
+          "box": (-1, 1)}
 COMPILED = ("dop853", "bs54", "taylor", "radau", "radau5", "gauss")
 SCIPY = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 TOLERANCES = (1e-4, 1e-8, 1e-11)
@@ -46,7 +54,7 @@ NEAR = 1e-6
 
 @dataclass(frozen=True)
 class Draw:
-    """Parameters by name, and the zeros of each kind, sorted; names of quantities -> kind."""
+    """Parameters by name, and the zeros of each kind, sorted; of pulses by name."""
 
     params: dict[str, float]
     zeros: dict[str, np.ndarray]
@@ -78,10 +86,13 @@ def system() -> sd.System:
     a, w, p = ([sd.parameters(f"{letter}{k}") for k in range(N_SINES)] for letter in "awp")
     roots = [sd.parameters(f"r{k}") for k in range(2 * N_PAIRS)]
     c, d, e, f, g = sd.parameters("c d e f g")
+    places, widths = ([sd.parameters(f"{letter}{k}") for k in range(len(PULSES))] for letter in ("at", "width"))
     for of, label in ((sd.t, "t"), (y, "y")):
         s.add_event(f"sines_{label}", sum(a[k] * sp.sin(w[k] * of + p[k]) for k in range(N_SINES)) - c)
         s.add_event(f"doubles_{label}", sp.prod([(of - r) / SPAN for r in roots]))
         s.add_event(f"touching_{label}", sp.sin(f * of + g) - 1 + d)
+        for (name, pulse), at, width in zip(PULSES.items(), places, widths, strict=True):
+            s.add_event(f"pulses_{name}_{label}", pulse((of - at) / width) - sp.Rational(1, 2))
     s.add_event("swinging", x - 1 + e)
     s.initial = {y.dot: 1, x.dot: 1}
     return s
@@ -100,8 +111,11 @@ def draw(seed: int, rtol: float) -> Draw:
     params = {"c": c, "d": d, "e": e, "f": f, "g": g}
     for letter, values in (("a", a), ("w", w), ("p", p), ("r", roots)):
         params |= {f"{letter}{k}": float(v) for k, v in enumerate(values)}
+    at, width = rng.uniform(0.3, 0.6, len(PULSES)) * SPAN, 10 ** rng.uniform(-6, -1.7, len(PULSES)) * SPAN
+    params |= {f"at{k}": v for k, v in enumerate(at)} | {f"width{k}": v for k, v in enumerate(width)}
     zeros = {"sines": _sampled(lambda t: np.sin(np.multiply.outer(t, w) + p) @ a - c, float(w.max())),
              "doubles": roots[(roots > 0) & (roots < SPAN)], "touching": _of_sine(f, g, d), "swinging": _of_sine(1.0, 0.0, e)}
+    zeros |= {f"pulses_{name}": a + w * np.array(HALVES[name]) for name, a, w in zip(PULSES, at, width, strict=True)}
     return Draw({name: float(value) for name, value in params.items()}, zeros)
 
 
@@ -156,9 +170,10 @@ def measure(modules: dict[str, Any], methods: Sequence[str], seeds: Sequence[int
                     run = module.simulate((0, SPAN), params=drawn.params, method=method, rtol=rtol)
                 for name, rows in run.events.items():
                     kind = name.partition("_")[0]
+                    of = name.rpartition("_")[0] if kind == "pulses" else kind
                     # The error of a swing within the span is at most some hundred tolerances; the slope at a zero is sqrt(2 d).
                     near = 200 * rtol / np.sqrt(2 * drawn.params["e"]) * 10 if kind == "swinging" else NEAR * SPAN
-                    one = count(rows.t, drawn.zeros[kind], near)
+                    one = count(rows.t, drawn.zeros[of], near)
                     total[kind].add(one, bool(told))
             for kind, of in total.items():
                 yield method, rtol, kind, of

@@ -117,8 +117,8 @@ def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: floa
         return ""
     names = [f"{module.metadata[EVENTS][k]['name']} (from t = {t:.9g} s on)" for k, t in found]
     return (f"{module.name}: zeros of events may be missed: {', '.join(names)} may pass zero and back between two samples, which "
-            f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short as "
-            "the shortest pulse that matters")
+            f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short "
+            "as the shortest pulse that matters")
 
 
 def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
@@ -132,8 +132,8 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
         told += [f"{record['name']} depends on {', '.join(of)}"] if wanted and of else []
     if not told:
         return ""
-    return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is not "
-            "seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
+    return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "
+            "not seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
 
 
 class Locator:
@@ -324,7 +324,7 @@ class Locator:
         leaves = self.module.metadata["event_leaves"]
         jets = panels.jets(left, right, rows)[leaves].ravel()
         try:
-            bounds = self.module.evaluate(BOUNDS, right, states[panels.N - 1][:self.n_state], self.p, rows[0, self.n_state:], jets)
+            bounds = self.module.evaluate(BOUNDS, right, rows[0, :self.n_state], self.p, rows[0, self.n_state:], jets)
             doubtful = self.bounded & panels.unproved(samples, bounds)
             most = np.abs(samples[:panels.N]).max(axis=0)
             if doubtful.any():

@@ -428,8 +428,8 @@ class Module:
                     sampled controller is asked in one motion after the other)
         t           (start, end): the end states alone are kept; or an array of output times; default: from 0 over the duration
         rtol, atol, max_step, first_step   as for `simulate`
-        method, max_steps, stabilization, events, event_spacing   as for `simulate`, too; with others than the default they run one
-                    by one
+        method, max_steps, stabilization, events, event_spacing   as for `simulate`, too; with others than the default, and with
+                    events, they run one by one
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters

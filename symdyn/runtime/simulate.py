@@ -101,6 +101,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                 request = replace(request, x0=Projector(module, p)(span[0], start))
         begun = clock.perf_counter()
         outcome = _run(module, request.with_work() if work else request, method, bar)
+        unseen = not_seen(module, request.look, free.by_function(metadata["inputs"]), request.event_spacing)
+        outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
                             work, (request.rtol, float(request.atol.max(initial=0.0))), why,
@@ -109,9 +111,6 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             raise SimulationInterrupted(solution, outcome.message)
         if not outcome.success:
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
-        unseen = not_seen(module, request.look, free.by_function(metadata["inputs"]), request.event_spacing)
-        if unseen:
-            outcome = replace(outcome, doubts=(*outcome.doubts, unseen))
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
         if metadata.get(WATCHES) and len(solution.t):

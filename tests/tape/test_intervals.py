@@ -10,7 +10,7 @@ import pytest
 
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
-from symdyn.tape.intervals import BIG, Interval, Jet, enclosures, encloses
+from symdyn.tape.intervals import BIG, Interval, Jet, encloses, enclosures
 from symdyn.tape.node import COORDINATE, PARAMETER, SPEED
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape
@@ -31,13 +31,14 @@ VALUES = {
     "atan2": lambda r, x, y, p: r.apply("atan2", y, x), "min": lambda r, x, y, p: r.apply("min", x, y * y),
     "max": lambda r, x, y, p: r.apply("max", x * y, p),
     "piecewise": lambda r, x, y, p: r.apply("select", r.apply("and", r.apply("gt", x, -1), r.apply("le", x, y)), x * y, p),
-    "either": lambda r, x, y, p: r.apply("select", r.apply("or", r.apply("ge", x, 1), r.apply("not", r.apply("lt", y, 0))), x, y),
+    "either": lambda r, x, y, p: r.apply("select", r.apply("or", r.apply("ge", x, 1), r.apply("not", r.apply("lt", y, 0))),
+                                         x, y),
     "equal": lambda r, x, y, p: r.apply("select", r.apply("eq", r.apply("floor", x), 1), 1, 0),
     "unequal": lambda r, x, y, p: r.apply("select", r.apply("ne", r.apply("floor", x), 1), x, 0),
     "pulse": lambda r, x, y, p: r.apply("exp", -((x - p) * 20) ** 2) - Fraction(1, 2),
     "sine_of_much": lambda r, x, y, p: r.apply("sin", 9 * x + y), "pi": lambda r, x, y, p: r.apply("pi") * x,
-    **{op: call(op) for op in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "atanh", "exp", "abs",
-                               "sign", "floor", "ceil", "erf", "neg")},
+    **{op: call(op) for op in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "atanh", "exp",
+                               "abs", "sign", "floor", "ceil", "erf", "neg")},
 }
 
 
