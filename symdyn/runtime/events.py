@@ -301,13 +301,32 @@ class Locator:
         nearby = x + eps * panels.roundings(len(x)) * self.size
         return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))
 
+    def _rounding(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The same where quantities are resolved: of those that are bounded no less than what they vary by within the rounding."""
+        noise = self._noise(t, x)
+        if not self.bounded.any():
+            return noise
+        eps, state = np.finfo(float).eps, x[:self.n_state]
+        given = np.asarray(self.given(t, state), dtype=float)
+        at = np.concatenate([[t], state, given])
+        radius = eps * np.concatenate([[2 * abs(t)], panels.DENSE * self.size[:self.n_state], panels.DENSE * np.abs(given)])
+        jets = np.zeros((len(at), 6))
+        jets[:, 0], jets[:, 1] = at - radius, at + radius
+        ranges = self._bounds(t, state, given, jets)
+        return np.where(self.bounded, np.maximum(noise, ranges[:, 1] - ranges[:, 0]), noise)
+
+    def _bounds(self, t: float, state: np.ndarray, given: np.ndarray, jets: np.ndarray) -> np.ndarray:
+        """Bounds of the quantities, (n_e, 6), from those of t, the state and the inputs, (1 + n_x + n_in, 6)."""
+        leaves = self.module.metadata["event_leaves"]
+        return self.module.evaluate(BOUNDS, t, state, self.p, given, jets[leaves].ravel())
+
     def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
         """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
         wavy = self.look & panels.undecided(samples)
         if not wavy.any():
             return None
         try:
-            noise = self._noise(right, end)
+            noise = self._rounding(right, end)
         except EvaluationError:
             return int(wavy.argmax())
         wavy &= panels.size(samples) > panels.NOISE * noise
@@ -321,14 +340,12 @@ class Locator:
         times[panels.N - 1] = right
         rows = np.array([np.concatenate([x[:self.n_state], self.given(float(s), x[:self.n_state])])
                          for s, x in zip(times, states, strict=True)])
-        leaves = self.module.metadata["event_leaves"]
-        jets = panels.jets(left, right, rows)[leaves].ravel()
         try:
-            bounds = self.module.evaluate(BOUNDS, right, rows[0, :self.n_state], self.p, rows[0, self.n_state:], jets)
+            bounds = self._bounds(right, rows[0, :self.n_state], rows[0, self.n_state:], panels.jets(left, right, rows))
             doubtful = self.bounded & panels.unproved(samples, bounds)
             most = np.abs(samples[:panels.N]).max(axis=0)
             if doubtful.any():
-                doubtful &= most > panels.NOISE * self._noise(right, states[panels.N - 1])
+                doubtful &= most > panels.NOISE * self._rounding(right, states[panels.N - 1])
         except EvaluationError:
             doubtful = self.bounded
         return int(doubtful.argmax()) if doubtful.any() else None
