@@ -88,15 +88,16 @@ class _Arithmetic:
     # -- numbers
 
     def least(self, *values: Any) -> Any:
-        return self._extreme("min", values)
+        return self._extreme("lt", values)
 
     def most(self, *values: Any) -> Any:
-        return self._extreme("max", values)
+        return self._extreme("gt", values)
 
-    def _extreme(self, op: str, values: Sequence[Any]) -> Any:
+    def _extreme(self, comparison: str, values: Sequence[Any]) -> Any:
+        """By comparisons, which are one instruction where C's fmin and fmax, with their rules for NaN, are calls."""
         first, *rest = dict.fromkeys(values)
         for value in rest:
-            first = self.r.apply(op, first, value)
+            first = self.choose(self.r.apply(comparison, first, value), first, value)
         return first
 
     def choose(self, condition: Any, yes: Any, no: Any) -> Any:
