@@ -312,7 +312,7 @@ class System:
                    constraints all else stays. With them, and so in absolute coordinates, what is reset becomes what it says,
                    and the others follow: they change by as little as the constraints allow in the metric of the mass matrix,
                    coordinates first, then speeds. For speeds that is the impact by impulses along what is reset alone, such as
-                   in a joint. What the constraints do not allow ends the run with the reason
+                   in a joint; a speed that is to stay is named, {w: w}. What the constraints do not allow ends the run
         """
         made = make_event(self._faults, name, value, direction, stop, reset)
         if made is not None:

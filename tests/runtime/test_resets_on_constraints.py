@@ -65,6 +65,40 @@ def test_a_joint_speed_in_absolute_coordinates_becomes_what_its_reset_says(backe
 
 
 @pytest.mark.parametrize(("backend", "method"), [("c", "dop853"), ("numpy", "RK45")])
+def test_with_all_joint_speeds_named_all_forms_agree(backend: str, method: str) -> None:
+    """In angles all else stays; in absolute coordinates what is to stay is named."""
+    exact = module_of("embedding", arm({b.dot: -b.dot / 2}), "c").simulate(np.linspace(0, 0.5, 11), rtol=1e-11)
+    module = module_of("absolute", arm({b.dot: -b.dot / 2, a.dot: a.dot}), backend)
+    run = module.simulate(exact.t, rtol=1e-10, method=method)
+    for name in ("om", "y", "angle", "rate"):
+        np.testing.assert_allclose(run.outputs[name], exact.outputs[name], atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau5", "taylor", "RK45", "ggl"])
+def test_a_turn_in_space_with_euler_parameters_takes_all_speeds_along(method: str) -> None:
+    """One freedom, so that the motion after the reset is that in the angle."""
+    def system() -> sd.System:
+        found = sd.System("flap", gravity=[0, 0, -9.81])
+        body = found.add_body("body", 1.5, sp.diag(0.1, 0.2, 0.15), com=[0, 0.4, 0.1])
+        found.add_joint(sd.Revolute("hinge", "ground", body, a, axis=[0.8, 0, 0.6]))
+        found.add_event("stop", a + 0.3, direction=-1, reset={a.dot: -a.dot / 2})
+        found.initial = {a: 0.4, a.dot: -0.5}
+        found.add_output("angle", a)
+        found.add_output("om", a.dot)
+        found.add_output("z", sd.position(body, [0.1, 0.2, 0.3])[2])
+        return found
+
+    if method == "ggl":
+        pytest.importorskip("solve_dae")
+    exact = module_of("embedding", system(), "c").simulate(np.linspace(0, 0.7, 8), rtol=1e-11)
+    assert len(exact.events["stop"].t) == 2
+    run = module_of("absolute", system(), "c").simulate(exact.t, method=method, rtol=1e-6 if method == "ggl" else 1e-10)
+    assert run.success, run.message
+    for name in ("angle", "om", "z"):
+        np.testing.assert_allclose(run.outputs[name], exact.outputs[name], atol=5e-4 if method == "ggl" else 1e-6)
+
+
+@pytest.mark.parametrize(("backend", "method"), [("c", "dop853"), ("numpy", "RK45")])
 def test_a_joint_coordinate_in_absolute_coordinates_becomes_what_its_reset_says(backend: str, method: str) -> None:
     """The arm jumps by the displacement that its masses resist the least: along that of an impulse in the elbow."""
     module = module_of("absolute", arm({b: b - 1e-4, b.dot: 1.5}, sd.t - 0.1), backend)
@@ -80,7 +114,7 @@ def test_a_joint_coordinate_in_absolute_coordinates_becomes_what_its_reset_says(
     assert np.abs(run.constraint_violation).max() < 1e-9 and np.abs(run.velocity_violation).max() < 1e-8
 
 
-def four_bar(reset: dict[Any, Any]) -> sd.System:
+def four_bar(reset: dict[Any, Any], at: Any = a - 1.4) -> sd.System:
     """A closed chain of three links in relative coordinates, of one freedom."""
     system = sd.System("four_bar", gravity=[0, -9.81])
     crank, coupler = system.add_body("crank", 1.0, 0.1, com=[0.15, 0]), system.add_body("coupler", 1.0, 0.2, com=[0.5, 0])
@@ -90,7 +124,7 @@ def four_bar(reset: dict[Any, Any]) -> sd.System:
     system.add_joint(sd.Revolute("pivot", "ground", rocker, c, parent_point=[1.0, 0]))
     system.close_loop(sd.Revolute("knee", coupler, rocker, parent_point=[1.0, 0], child_point=[0.8, 0]))
     system.initial = {a: 0.9, b: -0.2, c: 1.2, a.dot: 3}
-    system.add_event("stop", a - 1.4, direction=1, reset=reset)
+    system.add_event("stop", at, direction=1, reset=reset)
     return system
 
 
@@ -117,6 +151,19 @@ def test_all_speeds_of_a_loop_may_be_reset_together_where_they_fit(backend: str,
     module = four_bar({u.dot: -u.dot / 4 for u in (a, b, c)}).augmented().compile(backend=backend)
     before, after = around(module, "stop", method=method)
     np.testing.assert_allclose(after[3:], -before[3:] / 4, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["dop853", "RK45"])
+def test_a_reset_at_a_jump_of_a_held_input_stays(method: str) -> None:
+    F = sd.inputs("F")
+    system = four_bar({a.dot: -a.dot / 4}, F - 0.15)
+    system.add_joint_force("motor", F)
+    module = system.augmented().compile(backend="c")
+    q, u = module.consistent(keep=["a", "a_dot"])
+    held = sd.Sampled(lambda t, x: float(t > 0.15) / 2, period=0.1)
+    run = module.simulate([0, 0.2 - 1e-10, 0.2 + 1e-10], q, u, inputs={F: held}, method=method, rtol=1e-10)
+    assert run.success and run.events["stop"].t == pytest.approx([0.2])
+    np.testing.assert_allclose(run.x[2][3:], -run.x[1][3:] / 4, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("backend", "method"), [("c", "dop853"), ("c", "RK45"), ("numpy", "RK45")])
