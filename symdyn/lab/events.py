@@ -13,8 +13,8 @@ and of the mass on the spring, where the steps have errors,
 
     swinging   sin t - (1 - d), d between 1e-1 and a thousand times the relative tolerance.
 
-Zeros of `doubles`, `touching`, `pulses` and `swinging` are closed forms. Those of `sines` are found by sampling at 400 points of the
-shortest period, each extreme between samples being refined. A zero is missed if no event is within 1e-6 of the span (of
+Zeros of `doubles`, `touching`, `pulses` and `swinging` are closed forms. Those of `sines` are found by sampling at 400 points of
+the shortest period, each extreme between samples being refined. A zero is missed if no event is within 1e-6 of the span (of
 `swinging`: within what two thousand tolerances move it by), superfluous is an event that no zero is near.
 
     python -m symdyn.lab.events --draws 10

@@ -78,4 +78,5 @@ def _joined(request: Request, parts: list[Outcome], note: str) -> Outcome:
                    n_steps=sum(part.n_steps for part in parts), n_rejected=sum(part.n_rejected for part in parts),
                    n_evaluations=sum(part.n_evaluations for part in parts),
                    seconds=sum(part.seconds or 0.0 for part in parts), corrections=corrections,
-                   happened=[row for part in parts for row in part.happened])
+                   happened=[row for part in parts for row in part.happened],
+                   doubts=tuple(dict.fromkeys(doubt for part in parts for doubt in part.doubts)))
