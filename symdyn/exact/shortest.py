@@ -89,6 +89,10 @@ class Writer:
             self._expressions[letter] = self._made(letter)
         return self._expressions[letter]
 
+    def define(self, letter: int, expression: sp.Expr) -> None:
+        """Write a letter of the caller's as this."""
+        self._expressions[letter] = expression
+
     def _made(self, letter: int) -> sp.Expr:
         if letter in self.letters.turns:
             name, vector = self.letters.turns[letter]
@@ -172,7 +176,7 @@ class Writer:
             base = plain(value.num)
             series = self._over(fourier(base, self.letters) or base, value)
             return a.grouped(series, ("position",), a.factored) or a.factored(series)
-        found = self._representations(value)
+        found = self.representations(value)
         least = min(map(len, found))
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
@@ -182,7 +186,7 @@ class Writer:
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
         return divided(p, value.under, self.exact.ring.factors, self.letters) if value.under else p
 
-    def _representations(self, value: Value) -> list[Polynomial]:
+    def representations(self, value: Value) -> list[Polynomial]:
         """Different polynomials in letters for the same value."""
         num, letters = value.num, self.letters
         base = plain(num)

@@ -128,17 +128,21 @@ class Equations:
         """A tape with the named quantities as outputs."""
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
-    def explicit(self, name: str, simplify: bool = True, form: str = "shortest") -> Any:
+    def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: bool = False) -> Any:
         """The quantity as explicit SymPy in its shortest form, by exact algebra (symdyn.exact).
 
         simplify   False: as it was derived, in any time that this takes
         form       "shortest": of all others, entry by entry; "polynomial" in sines and cosines; "fourier": sums of sines and
                    cosines of sums of angles; "factored"; "speeds", "parameters", "angles": gathered by these; "nested"
+        intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning), constants
+                   of the mechanism first, then sines and cosines, then what stands in several places
         What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
         for an unknown form, for one that is too large, and if the quantity is so long that the time is over before it is
         multiplied into one expression.
         """
         text(name, "the name of a quantity", "M_tilde")
+        if flag(intermediates, "intermediates"):
+            return self._in_intermediates(name)
         if not flag(simplify, "simplify"):
             return expand(self.tape(name).outputs[name], self.printed_leaves())
         key = (name, text(form, "the form", "fourier"))
@@ -160,6 +164,20 @@ class Equations:
                                       "simplify=False)") from None
                 left = self.simplify_seconds - (clock.monotonic() - begin)
                 self._printed[key] = self._simplified(name, limit, left)
+        return self._printed[key]
+
+    def _in_intermediates(self, name: str) -> Any:
+        """The quantity in named intermediates, and these."""
+        from symdyn.exact.ring import TooLarge
+        from symdyn.report.named import with_intermediates
+
+        key = (name, "intermediates")
+        if key not in self._printed:
+            try:
+                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves())
+            except (TooLarge, ZeroDivisionError) as error:
+                raise SymdynError(f"{self.name}: {name} is too large for named intermediates: {error}; print its steps with "
+                                  f"latex({name!r}, intermediates=True)") from None
         return self._printed[key]
 
     def _simplified(self, name: str, limit: float, left: float) -> Any:
