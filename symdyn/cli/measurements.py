@@ -95,6 +95,9 @@ MEASUREMENTS: dict[str, Measurement] = {
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of bodies (default: 2 to 100)"}),
             _folder("growth"))),
+    "printing": Measurement(
+        "symdyn.bench.printing:run", "operations of printed equations in every form, and the time", (
+            _names("--systems", "only", "some of the mechanisms of the catalogue"),)),
     "batch": Measurement(
         "symdyn.bench.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
     "sweep": Measurement(

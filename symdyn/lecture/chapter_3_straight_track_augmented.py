@@ -34,7 +34,7 @@ def _equations() -> tuple:
 
 def _constraint() -> list[Formula]:
     x, y, _, _, theta, x0, y0, xr, yr, eq = _equations()
-    C, tangent = eq.C[0], tan(theta)
+    C, tangent = sp.expand(eq.C[0]), tan(theta)
     A = sp.symbols("A")
     from_hinge = {x: x0 + xr, y: y0 + yr}
     # y as the constraint gives it, C = 0.

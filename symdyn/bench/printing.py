@@ -1,0 +1,90 @@
+"""What printing takes: operations of the quantities of the catalogue in every form, and processor time."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
+from symdyn.systems import get, names
+
+QUANTITIES = ("M_tilde", "k_tilde", "F_tilde", "C", "C_r", "F_d")
+FORMS = ("polynomial", "fourier")
+# Coordinates up to which the three quantities of the equations of motion take LIMIT seconds at most, or LONGER.
+COORDINATES, LIMIT, LONGER = 6, 0.5, {"puma560": 2.0}
+# Seconds after which a form is left out.
+PATIENCE = 30.0
+HEADING = f"{'mechanism':36}{'quantity':10}{'operations':>11}{'polynomial':>12}{'Fourier':>10}{'with names':>12}{'s':>8}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity: operations in its shortest form, in others (None: too large), and in named intermediates together with
+    these; seconds of the processor for the shortest form."""
+
+    mechanism: str
+    quantity: str
+    operations: int
+    others: tuple[int | None, ...]
+    named: int | None
+    seconds: float
+
+    @property
+    def longer(self) -> bool:
+        """Whether another form has fewer operations, which must not be."""
+        return any(count is not None and count < self.operations for count in self.others)
+
+    def __str__(self) -> str:
+        counts = "".join(f"{'-' if count is None else count:>{width}}" for count, width in zip((*self.others, self.named),
+                                                                                             (12, 10, 12), strict=True))
+        return f"{self.mechanism:36}{self.quantity:10}{self.operations:>11}{counts}{self.seconds:>8.2f}"
+
+
+def printed(name: str) -> Iterator[Row]:
+    """A row for each quantity of a mechanism of the catalogue, trees as embedding, all others as augmented equations."""
+    system = get(name)
+    tied = name in names(constrained=True)
+    equations = replace(system.augmented() if tied else system.embedding(), simplify_seconds=PATIENCE)
+    for quantity in QUANTITIES:
+        if quantity in equations.quantities:
+            begin = clock.process_time()
+            operations = int(sp.count_ops(equations.explicit(quantity)))
+            seconds = clock.process_time() - begin
+            yield Row(name, quantity, operations, tuple(_operations(equations, quantity, form) for form in FORMS),
+                      _with_names(equations, quantity), seconds)
+
+
+def _operations(equations: Equations, quantity: str, form: str) -> int | None:
+    try:
+        return int(sp.count_ops(equations.explicit(quantity, form=form)))
+    except SymdynError:
+        return None
+
+
+def _with_names(equations: Equations, quantity: str) -> int | None:
+    try:
+        value, steps = equations.explicit(quantity, intermediates=True)
+    except SymdynError:
+        return None
+    return int(sp.count_ops(value) + sum(sp.count_ops(step.expression) for step in steps))
+
+
+def run(only: Sequence[str] = ()) -> int:
+    """Print the table; returns how many bounds are missed. only: names of mechanisms; default: the catalogue."""
+    missed = 0
+    print(HEADING)
+    for name in only or names():
+        rows = []
+        for row in printed(name):
+            rows.append(row)
+            print(f"{row}{'  another form is shorter' if row.longer else ''}", flush=True)
+            missed += row.longer
+        seconds = sum(row.seconds for row in rows if row.quantity in QUANTITIES[:3])
+        if len(get(name).check().coordinates) <= COORDINATES and seconds > LONGER.get(name, LIMIT):
+            print(f"{name:36}{seconds:.2f} s for M_tilde, k_tilde and F_tilde, above {LONGER.get(name, LIMIT)} s")
+            missed += 1
+    return missed
