@@ -26,7 +26,6 @@ def test_put_together_they_are_the_quantity(name, quantity):
 
 def test_constants_come_first_and_are_named_once():
     value, steps = sd.systems.get("four_bar").augmented().explicit("k_tilde", intermediates=True)
-    l1, l2, lc2, lc3, m2, m3 = sp.symbols("l1 l2 lc2 lc3 m2 m3", positive=True)
     assert [(str(s.symbol), s.meaning) for s in steps[:4]] == [
         ("h_1", "constant of the mechanism"), ("h_2", "constant of the mechanism"), ("h_3", "constant of the mechanism"),
         ("s_{2}", "sine of q2")]
