@@ -91,11 +91,16 @@ class Basis:
                 taken[s], taken[c] = sine.num, cosine.num
         self._taken = taken
 
+    def turned(self, num: Any) -> Any:
+        """The polynomial in sines and cosines of these angles."""
+        ring = self.exact.ring
+        if all(a is b for a, b in zip(self._taken, ring.generators)):
+            return num
+        return ring.reduced(num.compose(*self._taken, ctx=ring.context))
+
     def of(self, num: Any) -> Any:
         """The polynomial in sines and cosines of these angles, with c^2 or s^2 replaced, whichever is shorter."""
-        ring = self.exact.ring
-        if any(a is not b for a, b in zip(self._taken, ring.generators)):
-            num = ring.reduced(num.compose(*self._taken, ctx=ring.context))
+        ring, num = self.exact.ring, self.turned(num)
         degrees = num.degrees() if len(num) else ()
         for s, c in self.exact.sines:
             if not degrees or degrees[c] < 2:
@@ -130,22 +135,23 @@ def better_basis(exact: Exact, letters: Letters, num: Any) -> Basis | None:
     n = len(exact.bases)
     rows = tuple(tuple(int(i == k) for i in range(n)) for k in range(n))
     first = Basis(exact, rows)
-    start = first.of(num)
     counts: dict[Vector, int] = {}
-    for m in contracted(first.plain(start, letters), letters):
+    for m in contracted(first.plain(num, letters), letters):
         for letter, _ in m:
             if letter in letters.turns:
                 vector = letters.turns[letter][1]
                 if sum(map(abs, vector)) > 1:
                     counts[vector] = counts.get(vector, 0) + 1
-    best, length = None, len(start)
+    best, length = None, len(num)
     for vector in sorted(counts, key=lambda v: (-counts[v], v))[:TRIED]:
         for k in range(n):
             if abs(vector[k]) != 1:
                 continue
-            other = Basis(exact, (*rows[:k], vector, *rows[k + 1:])) if _regular(rows, k, vector) else None
-            if other is not None and len(other.of(num)) < length:
-                best, length = other, len(other.of(num))
+            if _regular(rows, k, vector):
+                other = Basis(exact, (*rows[:k], vector, *rows[k + 1:]))
+                terms = len(other.turned(num))
+                if terms < length:
+                    best, length = other, terms
         rows = best.rows if best else rows
     return best
 
