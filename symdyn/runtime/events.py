@@ -302,7 +302,7 @@ class Locator:
         return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))
 
     def _rounding(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The same where quantities are resolved: of those that are bounded no less than what they vary by within the rounding."""
+        """The same where quantities are resolved: of those that are bounded no less than they vary by within the rounding."""
         noise = self._noise(t, x)
         if not self.bounded.any():
             return noise
