@@ -354,8 +354,10 @@ class Arranger:
             number *= scale ** int(power)
             result.append((poly, int(power)))
         if number != 1:  # the sign, at most: contents are taken out before
-            poly, power = next(((f, n) for f, n in result if n % 2), result[0])
-            result = [({m: integer(number * c) for m, c in f.items()}, n) if f is poly else (f, n) for f, n in result]
+            mixed = next((f for f, n in result if n % 2 and len({c < 0 for c in f.values()}) == 2), None)
+            result = [({m: integer(number * c) for m, c in f.items()}, n) if f is mixed else (f, n) for f, n in result]
+            if mixed is None:
+                result.append(({(): integer(number)}, 1))
         self._split[key] = result
         return result
 

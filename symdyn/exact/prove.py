@@ -17,7 +17,7 @@ import sympy as sp
 
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.exact.ring import BOUND, TooLarge
-from symdyn.exact.shortest import Writer
+from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Exact
 from symdyn.model.symbols import symbols_of
@@ -130,7 +130,7 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     reason = ""
     try:
         differences = [recorder.sub(x, y) for x, y in pairs]
-        exact = Exact(differences, bound, unit_vectors)
+        exact = Exact(differences, bound, unit_vectors, not_negative(symbols))
         doubtful = [k for k, value in enumerate(exact.values) if len(value.num)]
         if not doubtful:
             return Proof(True)
@@ -144,7 +144,7 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     except ZeroDivisionError as error:
         return Proof(False, reason=str(error))
     decimal = any(isinstance(a, Fraction) and printed_as_decimal(a) for node in reachable(differences) for a in node.args)
-    k, state = _different(recorder, pairs, doubtful, unit_vectors, ROUNDED if decimal else SAME)
+    k, state = _different(recorder, pairs, doubtful, unit_vectors, ROUNDED if decimal else SAME, symbols)
     if k is None and decimal and exact is not None:
         return Proof(False, reason=f"the sides differ by no more than the rounding of decimal numbers, {ROUNDED:g} of their size")
     if k is None:
@@ -157,7 +157,8 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
 
 
 def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: Sequence[int],
-               unit_vectors: Sequence[Sequence[Node]], same: float) -> tuple[int | None, dict[Node, Any]]:
+               unit_vectors: Sequence[Sequence[Node]], same: float, symbols: Mapping[Node, sp.Expr],
+               ) -> tuple[int | None, dict[Node, Any]]:
     """A pair whose values differ, and the values of the leaves there."""
     taken = range(len(pairs)) if same != SAME else doubtful
     tape = Tape.of(recorder, left=[pairs[k][0] for k in taken], right=[pairs[k][1] for k in taken])
@@ -165,7 +166,7 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
     for attempt in range(STATES):
         # Positive numbers first: roots and logarithms of them are real.
         least = 0.2 if attempt % 2 == 0 else -2.0
-        values = {leaf: draw.uniform(least, 2.0) for leaf in tape.inputs}
+        values = {leaf: _drawn(draw, least, symbols.get(leaf)) for leaf in tape.inputs}
         _normalize(values, unit_vectors)
         found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
@@ -175,6 +176,16 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
             if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest):
                 return taken[place], values
     return None, {}
+
+
+def _drawn(draw: random.Random, least: float, symbol: sp.Expr | None) -> float:
+    """A random number that fulfils what is assumed of the symbol's sign and kind."""
+    value = draw.uniform(least, 2.0)
+    if symbol is not None and symbol.is_integer:
+        value = float(round(3 * value)) or 1.0
+    if symbol is not None and (symbol.is_nonnegative or symbol.is_nonpositive):
+        return abs(value) if symbol.is_nonnegative else -abs(value)
+    return value
 
 
 def _normalize(values: dict[Node, Any], unit_vectors: Sequence[Sequence[Node]]) -> None:

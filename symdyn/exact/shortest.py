@@ -305,7 +305,7 @@ def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str =
     form."""
     if form not in FORMS:
         raise SymdynError(f"the form {shown(form)} was asked for; there are {', '.join(FORMS)}")
-    exact = Exact(entries, BOUND if bound is None else bound)
+    exact = Exact(entries, BOUND if bound is None else bound, positive=not_negative(symbols))
     writer = Writer(exact, symbols, form)
     sizes = _sizes(entries) if form == "shortest" else {}
     known: dict[str, sp.Expr] = {}
@@ -340,6 +340,11 @@ def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "short
         return entries[0]
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
     return sp.Matrix(rows, columns, entries)
+
+
+def not_negative(symbols: Mapping[Node, sp.Expr]) -> set[Node]:
+    """Leaves whose symbols are assumed not to be negative."""
+    return {leaf for leaf, symbol in symbols.items() if symbol.is_nonnegative}
 
 
 def _sizes(entries: Sequence[Any]) -> dict[Node, int]:

@@ -8,13 +8,16 @@ stand for, so that 0.1 is 3602879701896397/2^55 and not 1/10.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from math import gcd, isqrt, lcm
 from typing import Any
 
 from symdyn.exact.angles import Angles, Linear, arguments
-from symdyn.exact.ring import BOUND, Ring, Value
+from symdyn.exact.ring import BOUND, Ring, Value, fraction, rational
 from symdyn.tape.node import Node, exact
+from symdyn.tape.sympy_bridge import printed_as_decimal
 from symdyn.tape.tape import reachable
 
 _ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
@@ -39,8 +42,10 @@ class Exact:
     bases    base angles, each a sum of terms; sines: generators of sine and cosine of each
     """
 
-    def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = ()) -> None:
-        """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters.
+    def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = (),
+                 positive: Collection[Node] = ()) -> None:
+        """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters; positive: leaves that are not
+        negative, so that roots of their squares are themselves.
 
         Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
@@ -72,10 +77,20 @@ class Exact:
                 return done[a]
             return a if isinstance(a, bool) else ring.number(exact(a))
 
+        free_of_sign = [k for k, leaf in self.leaves.items() if leaf in positive]
+
         def function(node: Node) -> Value:
             item = node.args[1] if node.op == "item" else None
             args = done[node.args[0]] if node.op == "item" else tuple(map(take, node.args))
-            atom = Atom("call" if node.op == "item" else node.op, args, item)
+            if node.op == "sqrt" and not args[0].under and len(args[0].num):
+                outside, inside = square_taken_out(ring, args[0].num, free_of_sign)
+                if inside.is_one():
+                    return Value(outside)
+                return ring.mul(Value(outside), of_atom(Atom("sqrt", (Value(inside),))))
+            return of_atom(Atom("call" if node.op == "item" else node.op, args, item))
+
+        def of_atom(atom: Atom) -> Value:
+            args, item = atom.args, atom.item
             key = f"{atom.op}{item}({','.join(self._key(a) for a in args)})"
             if key not in known:
                 k = next(free)
@@ -130,3 +145,32 @@ class Exact:
             si = si if sign > 0 else ring.neg(si)
             self._pairs[vector] = (ring.add(ring.mul(s, ci), ring.mul(c, si)), ring.sub(ring.mul(c, ci), ring.mul(s, si)))
         return self._pairs[vector]
+
+
+def square_taken_out(ring: Ring, p: Any, positive: Sequence[int]) -> tuple[Any, Any]:
+    """x and y with p = x^2 y: squares of numbers, and of generators that are not negative, that all terms have in common."""
+    content = p.term_content()
+    powers = content.degrees()
+    outside, square = ring.context.constant(1), ring.context.constant(1)
+    for k in positive:
+        half = int(powers[k]) // 2
+        outside, square = outside * ring.generators[k] ** half, square * ring.generators[k] ** (2 * half)
+    numbers = [fraction(c) for c in p.coeffs()]
+    if not any(map(printed_as_decimal, numbers)):
+        above, below = gcd(*[c.numerator for c in numbers]), lcm(*[c.denominator for c in numbers])
+        # sqrt(a / b) = sqrt(a b) / b
+        root = _root_of_square_in(above * below)
+        factor = rational(Fraction(root, below))
+        outside, square = outside * factor, square * factor**2
+    return outside, divmod(p, square)[0]
+
+
+def _root_of_square_in(n: int) -> int:
+    """The largest k, but for large primes, whose square divides n."""
+    if isqrt(n) ** 2 == n:
+        return isqrt(n)
+    root = 1
+    for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31):
+        while n % prime**2 == 0:
+            n, root = n // prime**2, root * prime
+    return root * isqrt(n) if isqrt(n) ** 2 == n else root

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import sympy as sp
 
 from symdyn.exact.arrange import Arranger, Letter, Monomial, Polynomial, integer, multiplied, stripped, total
-from symdyn.exact.shortest import Writer
+from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.walk import Exact
 from symdyn.model.symbols import symbols_of
 from symdyn.report.shorthand import Shorthand
@@ -36,7 +36,7 @@ def with_intermediates(output: Output, symbols: Mapping[Node, sp.Expr]) -> tuple
     """An output of a tape as SymPy in named intermediates, and these in an order to read.
 
     Raises TooLarge beyond the bound on terms, UnsupportedExpression for what has no explicit form."""
-    exact = Exact(output.entries)
+    exact = Exact(output.entries, positive=not_negative(symbols))
     writer = Writer(exact, symbols)
     polynomials = [min(writer.representations(value), key=len) if len(value.num) else {} for value in exact.values]
     constants: dict[tuple[Monomial, frozenset], int] = {}
