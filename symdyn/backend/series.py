@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 LANES, MOST_VECTORS = 4, 4
 # Up to so many sums, orders are written out one by one, without vectors: 1.3 times as fast for pendulums.
 FEW_SUMS = 2
+# Highest order.
+ORDERS = 30
 
 
 def gather_series(content: Content, program: Program, dialect: Dialect, places: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
@@ -38,12 +40,17 @@ def gather_series(content: Content, program: Program, dialect: Dialect, places: 
     n_lanes = 1 if made.n_s <= FEW_SUMS else LANES
     n_block = max(made.n_s, 1) if n_lanes == 1 else LANES * min(MOST_VECTORS, -(-made.n_s // LANES))
     zeros = (0,) * ((-made.n_s % n_block) if made.n_s else 1)
-    row = Output("series_next", (2 * (made.n_s + len(zeros)) + made.n_x,), (*left, *zeros, *right, *zeros, *rates))
-    whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": row}))
+    entries = (*left, *zeros, *right, *zeros, *rates)
+    factors = Output("series_next", (len(entries),), entries)
+    whole = balance(Tape(rhs.recorder, {**made.start.outputs, "series_next": factors}))
     tapes = {name: whole.prune((name,)) for name in ("series_start", "series_next")}
     written = build(dialect, tapes, {name: name for name in tapes}, {**places, **made.places}, program.reasons)
     start, following = written.functions
     stretches = [part for f in (start, following) for part in (f.parts or (f,))]
     uses = {"uses_parts": bool(start.parts or following.parts), "uses_sincos": "symdyn_sincos(" in repr(stretches)}
-    return {"series": written, "series_start": start, "series_next": following, "n_0": made.n_0,
-            "n_sums": made.n_s + len(zeros), "n_block": n_block, "n_lanes": n_lanes, **{k: v for k, v in uses.items() if v}}
+    n_sums = made.n_s + len(zeros)
+    # An odd number of cache lines, so that rows do not compete for the same places of the cache.
+    row = 2 * n_sums + made.n_x if n_lanes == 1 else (2 * n_sums + made.n_x + 7) // 16 * 16 + 8
+    return {"series": written, "series_sizes": {"orders": ORDERS, "row": row}, "series_start": start,
+            "series_next": following, "n_0": made.n_0,
+            "n_sums": n_sums, "n_block": n_block, "n_lanes": n_lanes, **{k: v for k, v in uses.items() if v}}

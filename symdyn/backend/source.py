@@ -20,7 +20,10 @@ from symdyn import panels
 from symdyn.backend.batch import Batch, batch_of
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.function import Function, Part
-from symdyn.backend.methods import method_of
+from symdyn.backend.integrated import Shape, functions, switches
+from symdyn.backend.integrated import sizes as runtime_sizes
+from symdyn.backend.methods import Method, method_of
+from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
 from symdyn.backend.user_functions import header as header_of_user_functions
@@ -129,8 +132,9 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     integrator = integrator and "rhs" in content.tapes
     context = _context(content, program, dialect, standalone, integrator, lanes, method, states)
     gather = method_of(method).gather
-    if integrator and backend == "c" and gather is not None:
-        context |= gather(content, program, dialect, places)
+    gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
+    context |= gathered
+    context |= _runtime(environment, content, context, method_of(method), gathered)
     files = {}
     wanted = dialect.files or {}
     if not standalone:
@@ -147,6 +151,23 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
 def _environment(*folders: Path) -> jinja2.Environment:
     return jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined,
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+
+
+def _runtime(environment: jinja2.Environment, content: Content, context: Mapping[str, Any], method: Method,
+             gathered: Mapping[str, Any]) -> dict[str, Any]:
+    """The parts of the runtime in C, and what they are given of the mechanism."""
+    def read(name: str) -> str:
+        assert environment.loader is not None
+        return environment.loader.get_source(environment, f"c/runtime/{name}")[0]
+
+    groups = ("q", "u", "z", "inputs")
+    n_rows = context["projection"]["n_rows"] if context["projection"] else 0
+    shape = Shape({g: len(content.groups[g]) for g in groups}, n_rows, context["unit_groups"],
+                  content.events if context["has_events"] else (), content.event_leaves if context["has_events"] else (),
+                  "reset_directions" in context["arguments_of"])
+    called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
+    return {"runtime": Parts(read, switches(method, shape, gathered)), "runtime_sizes": runtime_sizes(method, shape, gathered),
+            "integrated": called, "resets": shape.resets, "held": shape.held}
 
 
 # Reading the templates takes longer than filling them in, and the shipped ones stay as they are.
@@ -183,7 +204,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
     n_x = sizes["q"] + sizes["u"] + sizes["z"]
     # A file with the name of a standard module would be imported in its place by whatever runs beside it.
-    name = identifier(content.name, set(sys.stdlib_module_names))
+    # The runtime in C has names that begin with symdyn_.
+    name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
     written = [way for f in program.functions for way in (f, f.regular, f.otherwise) if way is not None]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
     reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if standalone else None
@@ -244,7 +266,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
     return {
         "name": name, "formulation": content.formulation, "version": symdyn.__version__,
-        "method": method_of(method), "m": f"{name}_{method}", "has_events": EVENTS in uses, "events": content.events,
+        "method": method_of(method), "has_events": EVENTS in uses, "events": content.events,
         "event_leaves": content.event_leaves,
         "panels": panels,
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
@@ -259,12 +281,25 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
+        "solver_sizes": _solver_sizes(program.kernels),
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call, "arguments_of": uses, "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
         "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),
     }
+
+
+def _solver_sizes(kernels: Mapping[str, Sequence[int]]) -> list[tuple[str, str]]:
+    """Macros that the solvers in C read: their largest sizes, their numbers."""
+    result: dict[str, str] = {}
+    for kernel, numbers in (("saddle", {"LOOSE": LOOSE, "MASSLESS": MASSLESS, "ROUNDS": ROUNDS}),
+                            ("multipliers", {"SMOOTHED": SMOOTHED, "ROUNDS": ROUNDS, "CLEANINGS": CLEANINGS})):
+        if f"symdyn_{kernel}" in kernels:
+            n, m = kernels[f"symdyn_{kernel}"]
+            result |= {f"SYMDYN_{kernel.upper()}_N": repr(n), f"SYMDYN_{kernel.upper()}_M": repr(max(m, 1)),
+                       **{f"SYMDYN_{key}": repr(value) for key, value in numbers.items()}}
+    return list(result.items())
 
 
 def _shape_text(f: Function) -> str:

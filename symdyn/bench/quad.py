@@ -11,7 +11,6 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any, TypeVar
 
-import jinja2
 from mpmath import libmp
 
 from symdyn.bench.precise import Lost
@@ -189,8 +188,7 @@ def source(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[st
 
 def _kernel(name: str) -> str:
     """The text of a numeric algorithm, its doubles made these numbers."""
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(templates_folder() / "c"), keep_trailing_newline=True)
-    text = re.sub(r"//.*", "", environment.get_template(f"{name}.c.jinja").render())
+    text = re.sub(r"//.*|#.*", "", (templates_folder() / "c" / "runtime" / f"{name}.h").read_text(encoding="utf-8"))
     text = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)", lambda m: _FINER.get(m[1], m[1]) + "Q", text)
     return re.sub(r"\b(fabs|sqrt|tanh|log1p)(?=\()", r"\1q", re.sub(r"\bdouble\b", "quad", text))
 

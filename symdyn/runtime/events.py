@@ -137,7 +137,7 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
 
 
 class Locator:
-    """Looks for events in the steps of a run: the algorithm is that of c/events.c.jinja.
+    """Looks for events in the steps of a run: the algorithm is that of c/runtime/events.h.
 
     p        parameters; look: which events, (n_e,) of bool; given: inputs at (t, x)
     n_state  entries of x that are the mechanism's state; span: of the run, s; spacing: of samples at the most, s, 0: any

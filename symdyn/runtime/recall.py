@@ -97,6 +97,7 @@ def _state_of_symdyn() -> str:
     package = Path(symdyn.__file__).parent
     # In a checkout the templates lie beside the package, in an installation inside it.
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
-    files = sorted(p for folder in folders for ending in ("*.py", "*.jinja", "*.toml") for p in folder.rglob(ending))
+    endings = ("*.py", "*.jinja", "*.toml", "*.h", "*.c")
+    files = sorted(p for folder in folders for ending in endings for p in folder.rglob(ending))
     seen = [(str(p), found.st_size, found.st_mtime_ns) for p in files for found in [p.stat()]]
     return hashlib.sha256(repr((symdyn.__version__, sys.version, seen)).encode()).hexdigest()

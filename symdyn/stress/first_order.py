@@ -23,7 +23,7 @@ from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape, reachable
 
 # Half units in the last place that sines and cosines, and other functions, are off by: of C's library and symdyn's own (the GNU C
-# library's manual, "Known Maximum Errors in Math Functions"; templates/c/sincos.c.jinja), and of NumPy's vector instructions.
+# library's manual, "Known Maximum Errors in Math Functions"; templates/c/runtime/sincos.h), and of NumPy's vector instructions.
 LIBRARY = {"c": (2.0, 4.0), "numpy": (8.0, 8.0)}
 # Of what underflows a number of this size is lost.
 TINY = 2.0**-1074

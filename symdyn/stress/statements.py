@@ -71,7 +71,7 @@ def written_out(tape: Tape) -> Statements:
 
 
 def _saddle(r: Recorder, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
-    """Saddle as templates/c/symdyn_saddle.c.jinja has it."""
+    """Saddle as templates/c/runtime/symdyn_saddle.h has it."""
     assert isinstance(kernel, Saddle)
     n, m = kernel.sizes
     M_in, C_in, s, w, f, d = kernel.split(values)
@@ -113,7 +113,7 @@ def _saddle(r: Recorder, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
 
 
 def _multipliers(r: Recorder, kernel: Kernel, values: Sequence[Any]) -> list[Any]:
-    """Multipliers as templates/c/symdyn_multipliers.c.jinja has it."""
+    """Multipliers as templates/c/runtime/symdyn_multipliers.h has it."""
     assert isinstance(kernel, Multipliers)
     n, m = kernel.sizes
     C_in, s, w, g = kernel.split(values)

@@ -140,7 +140,7 @@ def test_symmetric_entries_are_formed_once(derived: Callable[..., Any]) -> None:
 def test_no_inputs_no_input_handling(derived: Callable[..., Any]) -> None:
     quiet, driven = (next(iter(emit(derived(n), "c", ["rhs"], standalone=False).files.values()))
                      for n in ("pendulum", "driven_oscillator"))
-    assert "pendulum_inputs_at" not in quiet and "driven_oscillator_inputs_at" in driven
+    assert "symdyn_inputs_at" not in quiet and "symdyn_inputs_at" in driven
 
 
 def test_integrator_only_with_the_right_hand_side() -> None:

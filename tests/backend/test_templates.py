@@ -123,6 +123,15 @@ def test_an_included_file(derived: Callable[..., Any], tmp_path: Path) -> None:
     assert "// no integrator for pendulum\n" in text and "dop853" not in text
 
 
+def test_a_part_of_the_runtime(derived: Callable[..., Any], tmp_path: Path) -> None:
+    """Parts in C are looked for in the user's folder first, as templates are."""
+    (tmp_path / "c" / "runtime").mkdir(parents=True)
+    part = (SHIPPED / "c" / "runtime" / "steps.h").read_text()
+    (tmp_path / "c" / "runtime" / "steps.h").write_text(part.replace("// Control of the steps", "// My control of the steps"))
+    text = emit(derived("pendulum"), "c", templates=tmp_path).files["pendulum.c"]
+    assert "// My control of the steps" in text and text.count("static void symdyn_judge(") == 1
+
+
 def test_a_module_from_own_templates(derived: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "numpy").mkdir()
     text = (SHIPPED / "numpy" / "model.py.jinja").read_text()

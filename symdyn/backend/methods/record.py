@@ -58,7 +58,7 @@ class Method:
 
     name       in C and for `simulate`, an identifier; title: for the generated file, a line
     order      the error of a step goes with h^order: what the step control takes the root by
-    template   c/methods/TEMPLATE.c.jinja; source: where the method is from
+    template   c/methods/TEMPLATE.c.jinja, with its coefficients; source: where the method is from
     needs      functions of the module besides rhs that are generated with it, of the right-hand side that is integrated
     own_step   it proposes the length of its steps itself
     gather     what its template gets besides, by name, from the content, the program, the dialect and the places of leaves that

@@ -46,7 +46,7 @@ def code() -> str:
     # In a checkout the templates lie beside the package, in an installation inside it.
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
     return digest({path.relative_to(folder).as_posix(): path for folder in folders
-                   for ending in ("*.py", "*.jinja", "*.toml") for path in folder.rglob(ending)
+                   for ending in ("*.py", "*.jinja", "*.toml", "*.h", "*.c") for path in folder.rglob(ending)
                    if path.relative_to(folder).parts[0] not in _BESIDE})
 
 

@@ -1,0 +1,134 @@
+"""What the parts of the runtime in C are given of a mechanism: sizes, switches, and the functions they call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from symdyn.backend.methods import Method
+
+# The functions that a projection calls, besides those that a method needs.
+OF_PROJECTION = ("position_correction", "velocity_correction", "violation")
+OF_EVENTS = ("events", "event_resets", "reset_directions")
+# Functions of bounds, six of each leaf in the place of ud.
+OF_BOUNDS = ("event_ranges", "event_bounds")
+# Events that wait until they are taken are rows of which, time, state before, state after.
+_NOTE = 2
+# Most of them, besides three of each kind.
+_WAITING = 64
+
+
+@dataclass(frozen=True)
+class Integrated:
+    """A function that the integrator calls: its name there, its own, its arguments; whether it reads inputs.
+
+    bounded   whether it is called for bounds, at t and x else
+    """
+
+    called: str
+    name: str
+    call: str
+    inputs: bool
+    bounded: bool = False
+
+    @property
+    def signature(self) -> str:
+        at = "const double *ud" if self.bounded else "double t, const double *x"
+        return f"int symdyn_{self.called}(const symdyn_problem *problem, {at}, double *out)"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What decides the text of an integrator besides its method.
+
+    sizes      of the groups q, u, z, inputs
+    n_rows     rows of the constraints, 0 without a projection
+    events     records with direction, stop and reset
+    leaves     what values at events are bounded by: 0 for t, then come x and the inputs
+    directed   whether there are directions in which the constraints let entries of [q; u] be reset
+    """
+
+    sizes: Mapping[str, int]
+    n_rows: int
+    unit_groups: Sequence[Sequence[int]]
+    events: Sequence[Mapping[str, Any]]
+    leaves: Sequence[int] = ()
+    directed: bool = False
+
+    @property
+    def n_x(self) -> int:
+        return self.sizes["q"] + self.sizes["u"] + self.sizes["z"]
+
+    @property
+    def projects(self) -> bool:
+        return self.n_rows > 0 or bool(self.unit_groups)
+
+    @property
+    def resets(self) -> list[int]:
+        """The entries of x that events reset, of one event after the other."""
+        return [place for event in self.events for place in event["reset"]]
+
+    @property
+    def held(self) -> list[int]:
+        """The entries of [q; u] that events reset and that stay when constraints are met, in order."""
+        middle = self.sizes["q"] + self.sizes["u"]
+        return sorted({place for place in self.resets if place < middle}) if self.n_rows and self.directed else []
+
+
+def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: Callable[[str, str], str], n_in: int,
+              projects: bool) -> list[Integrated]:
+    """The functions that an integrator calls, of those that there are.
+
+    call   (name, result) -> arguments of a call at t and x
+    """
+    names = ("rhs", *method.needs, *OF_EVENTS, *(OF_PROJECTION if projects else ()))
+    at = [Integrated("field" if name == "rhs" else f"{name}_at", name, call(name, "out"),
+                     n_in > 0 and (name == "rhs" or "inputs" in arguments_of[name]))
+          for name in names if name in arguments_of]
+    return at + [Integrated(f"{name}_of", name, call(name, "out"), False, True) for name in OF_BOUNDS if name in arguments_of]
+
+
+def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tuple[str, int]]:
+    """Macros of the sizes that the parts read, and of switches that they read as numbers.
+
+    gathered   what the method's template gets besides
+    """
+    result = [("SYMDYN_NX", shape.n_x), ("SYMDYN_NQ", shape.sizes["q"]), ("SYMDYN_NU", shape.sizes["u"]),
+              ("SYMDYN_NIN", shape.sizes["inputs"]), ("SYMDYN_ORDER", method.order),
+              ("SYMDYN_SLOPE_AT_END", int(method.slope_at_end))]
+    if method.tableau is not None:
+        result.append(("SYMDYN_SECOND_ERROR", int(method.tableau.second is not None)))
+    if "second_order" in gathered:
+        result.append(("SYMDYN_SECOND_ORDER", int(gathered["second_order"])))
+    if shape.n_rows:
+        result.append(("SYMDYN_ROWS", shape.n_rows))
+    if shape.unit_groups:
+        result += [("SYMDYN_UNIT_GROUPS", len(shape.unit_groups)), ("SYMDYN_UNIT_SIZE", max(map(len, shape.unit_groups)))]
+    if shape.events:
+        result += [("SYMDYN_N_EVENTS", len(shape.events)), ("SYMDYN_NOTE", _NOTE + 2 * shape.n_x),
+                   ("SYMDYN_NOTES", _WAITING + 3 * len(shape.events))]
+    for name, entries in (("SYMDYN_RESETS", shape.resets), ("SYMDYN_HELD", shape.held), ("SYMDYN_LEAVES", shape.leaves)):
+        if entries:
+            result.append((name, len(entries)))
+    return result
+
+
+def switches(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> dict[str, bool]:
+    """Macros by which parts are left out.
+
+    gathered   what the method's template gets besides
+    """
+    tableau = method.tableau
+    return {"SYMDYN_EXPLICIT": tableau is not None, "SYMDYN_RADAU": method.template == "radau",
+            "SYMDYN_GAUSS": method.template == "gauss", "SYMDYN_TAYLOR": method.template == "taylor",
+            "SYMDYN_OWN_STEP": method.own_step, "SYMDYN_SLOPE_AT_END": method.slope_at_end,
+            "SYMDYN_ORDER_8": method.order == 8,
+            "SYMDYN_SECOND_ERROR": tableau is not None and tableau.second is not None,
+            "SYMDYN_DENSE_STAGES": tableau is not None and bool(tableau.dense_stages),
+            "SYMDYN_SECOND_ORDER": bool(gathered.get("second_order")), "SYMDYN_UNROLLED": gathered.get("n_lanes") == 1,
+            "SYMDYN_CROSSES": method.crosses and shape.projects, "SYMDYN_PROJECTS": shape.projects,
+            "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0, "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
+            "SYMDYN_HAS_INPUTS": shape.sizes["inputs"] > 0, "SYMDYN_EVENTS": bool(shape.events),
+            "SYMDYN_HAS_RESETS": bool(shape.resets), "SYMDYN_KEEPS_RESETS": bool(shape.held),
+            "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves)}

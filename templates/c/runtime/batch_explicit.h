@@ -1,0 +1,160 @@
+// Integration of many trajectories by the explicit method of one, each with its own steps: the same steps, to the same bits. A
+// lane that ends takes the next trajectory. Starts, failures and outputs within a step are left to the integrator of one.
+#pragma once
+
+#include "batch.h"
+#include "simulate.h"
+
+// Zeros until batch_start.
+typedef struct {
+    symdyn_states lanes;
+    symdyn_vector k[SYMDYN_STAGES + 1][SYMDYN_NX];
+    symdyn_run run[SYMDYN_WIDTH];
+    double numbers[SYMDYN_WIDTH][SYMDYN_NUMBERS];
+    long row[SYMDYN_WIDTH], written[SYMDYN_WIDTH];  // -1: no trajectory
+    symdyn_table given[3];
+    const double *span, *atol, *t_out;
+    double *x_out, *report;
+    long n, n_out, next, n_done;
+} symdyn_batch;
+
+enum { SYMDYN_BATCH_NO_CONSTANTS = -7 };
+
+// Write the requested times that a lane has passed. Report on its trajectory if that has ended (its status, then as
+// simulation_report), and begin the next that does not end at once, if there is one.
+static void symdyn_batch_next(symdyn_batch *batch, int l) {
+    symdyn_run *run = batch->run + l;
+    double x0[SYMDYN_NX], *p = batch->numbers[l], *c = p + SYMDYN_NP;
+    const symdyn_problem problem = {.p = p, .c = c, .inputs = c + SYMDYN_NC};
+    for (;;) {
+        const long row = batch->row[l];
+        if (row >= 0) {
+            double *x = batch->x_out + row * batch->n_out * SYMDYN_NX, *report = batch->report + row * (17 + 2 * SYMDYN_NX);
+            const int bad = run->status < 0 ? 0 : symdyn_serve(run, batch->t_out, batch->n_out, x, batch->written + l);
+            if (bad) run->status = bad;
+            if (run->status == SYMDYN_STEP_LIMIT) return;
+            report[0] = run->status;
+            batch->row[l] = -1;
+            batch->n_done++;
+            SYMDYN_NAME(simulation_report)(run, report + 1);
+        }
+        if (batch->next >= batch->n) return;
+        const long i = batch->row[l] = batch->next++;
+        const int code = symdyn_lanes_take(&batch->lanes, l, i, batch->given + 1, p);
+        batch->written[l] = 0;
+        for (int k = 0; k < SYMDYN_NX; k++) x0[k] = batch->given->at[i * batch->given->row + k * batch->given->entry];
+        SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, batch->atol);
+        if (code) {
+            run->status = SYMDYN_BATCH_NO_CONSTANTS;
+            run->reason = code;
+        }
+        for (int k = 0; k < SYMDYN_NX; k++) {
+            LANE(batch->lanes.x[k], l) = run->x[k];
+            LANE(batch->k[0][k], l) = run->xd[k];
+        }
+    }
+}
+
+// The right-hand side; lanes where `failure` is set are skipped, those that fail set it.
+static void symdyn_batch_eval(symdyn_batch *batch, symdyn_vector t, const symdyn_vector *y, symdyn_vector *yd, int *failure) {
+    symdyn_lanes fault = symdyn_lanes_rhs(&batch->lanes, t, y, yd);
+    symdyn_vector rest = VECTOR(0.0);
+    for (int i = 0; i < SYMDYN_NX; i++) rest = MADD(y[i] + yd[i], 0.0, rest);
+    fault |= NOT_ZERO(rest);
+    for (int l = 0; l < SYMDYN_WIDTH; l++)
+        if (LANE(fault, l) && !failure[l]) {
+            double one[SYMDYN_NX], result[SYMDYN_NX];
+            for (int i = 0; i < SYMDYN_NX; i++) one[i] = LANE(y[i], l);
+            failure[l] = symdyn_eval(batch->run + l, LANE(t, l), one, result);
+            for (int i = 0; i < SYMDYN_NX; i++) LANE(yd[i], l) = result[i];
+        }
+}
+
+// Stage j: where it is evaluated, then its slope.
+#define SYMDYN_BATCH_STAGE(j)                                                                                                    \
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + h * (SYMDYN_A_##j(k, i));                                                  \
+    symdyn_batch_eval(batch, SYMDYN_C_##j(t, h, t_new), y, k[j], failure);
+
+// Try one step in every lane.
+static void symdyn_batch_attempt(symdyn_batch *batch) {
+    const symdyn_vector *x = batch->lanes.x;
+    symdyn_vector(*k)[SYMDYN_NX] = batch->k;
+    symdyn_vector t = VECTOR(0.0), h = t, t_new = t, sum = t, sum2 = t, y[SYMDYN_NX];
+    double err[SYMDYN_WIDTH];
+    int failure[SYMDYN_WIDTH], late[SYMDYN_WIDTH];
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        if ((failure[l] = batch->row[l] < 0)) continue;
+        symdyn_propose(batch->run + l);
+        LANE(t, l) = batch->run[l].t;
+        LANE(h, l) = batch->run[l].h_try;
+        LANE(t_new, l) = batch->run[l].t_new;
+    }
+    SYMDYN_EACH_STAGE(SYMDYN_BATCH_STAGE)
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        const symdyn_vector e = SYMDYN_E(k, i);
+        const symdyn_vector slope = SYMDYN_B(k, i);
+        const symdyn_vector e2 = SYMDYN_SECOND(k, i, slope);
+        symdyn_vector size = x[i], scale;
+        y[i] = x[i] + h * slope;
+        for (int l = 0; l < SYMDYN_WIDTH; l++)
+            LANE(size, l) = fabs(LANE(x[i], l)) > fabs(LANE(y[i], l)) ? fabs(LANE(x[i], l)) : fabs(LANE(y[i], l));
+        scale = 1.0 / (batch->atol[i] + batch->span[2] * size + 1e-300);
+        sum += (e * scale) * (e * scale);
+        sum2 += (e2 * scale) * (e2 * scale);
+    }
+    sum2 = sum + 0.01 * sum2;
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        err[l] = LANE(sum2, l) > 0.0 ? fabs(LANE(h, l)) * LANE(sum, l) / sqrt(LANE(sum2, l) * SYMDYN_NX) : 0.0;
+        late[l] = failure[l] || !(err[l] <= 1.0);
+    }
+    symdyn_batch_eval(batch, t_new, y, k[SYMDYN_STAGES], late);
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        symdyn_run *run = batch->run + l;
+        const double root = symdyn_root(err[l] > 1e-8 ? err[l] : 1e-8);
+        double x_new[SYMDYN_NX], xd_new[SYMDYN_NX];
+        if (batch->row[l] < 0) continue;
+        for (int i = 0; i < SYMDYN_NX; i++) {
+            x_new[i] = LANE(y[i], l);
+            xd_new[i] = LANE(k[SYMDYN_STAGES][i], l);
+        }
+        symdyn_judge(run, failure[l] ? failure[l] : err[l] <= 1.0 ? late[l] : 0, err[l], root, x_new, xd_new);
+        if (!run->rejected) {
+            const long next = batch->written[l];
+            if (next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0)
+                for (int j = 0; j < SYMDYN_STAGES; j++)
+                    for (int i = 0; i < SYMDYN_NX; i++) run->method.k[j][i] = LANE(k[j][i], l);
+            for (int i = 0; i < SYMDYN_NX; i++) {
+                LANE(batch->lanes.x[i], l) = x_new[i];
+                LANE(k[0][i], l) = xd_new[i];
+            }
+        }
+        symdyn_batch_next(batch, l);
+    }
+}
+
+SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_batch); }
+
+// given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP); counts: trajectories, output times; real: span (t0,
+// t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), reports. All
+// have to stay.
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
+    symdyn_batch *batch, const symdyn_table *given, const long *counts, const double *const *real, double *const *out) {
+    for (int k = 0; k < 3; k++) batch->given[k] = given[k];
+    batch->n = counts[0];
+    batch->n_out = counts[1];
+    batch->span = real[0];
+    batch->atol = real[1];
+    batch->t_out = real[2];
+    batch->x_out = out[0];
+    batch->report = out[1];
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        batch->row[l] = -1;
+        symdyn_batch_next(batch, l);
+    }
+}
+
+// At most so many steps in every lane; returns how many trajectories have ended.
+SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(symdyn_batch *batch, long max_steps) {
+    for (; max_steps > 0 && batch->n_done < batch->n; max_steps--) symdyn_batch_attempt(batch);
+    return batch->n_done;
+}

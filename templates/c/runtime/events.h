@@ -1,0 +1,487 @@
+// Where quantities of events pass zero within a step. Their order is that of the functions events and event_resets; the numbers
+// of the test that finds zeros between samples are those of symdyn/panels.py.
+#pragma once
+
+#include "start.h"
+#if SYMDYN_KEEPS_RESETS
+#include "resets.h"
+#endif
+
+// Values of all quantities at (t, x). Returns 0 or the failure, and records it with the first that is not finite.
+static int symdyn_event_values(symdyn_run *run, double t, const double *x, double *values) {
+    const int reason = symdyn_events_at(&run->problem, t, x, values);
+    long bad = -1;
+    for (int k = (SYMDYN_N_EVENTS - 1); k >= 0; k--)
+        if (run->events.look[k] && !(fabs(values[k]) <= symdyn_huge)) bad = k;
+    return reason || bad >= 0 ? symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, reason ? -1 : bad, t, x) : 0;
+}
+
+// What the quantities change by with the rounding of t and of a state x within the latest step. Returns 0 or the failure.
+static int symdyn_event_noise(symdyn_run *run, double t, const double *x, double *noise) {
+    double y[SYMDYN_NX], there[SYMDYN_N_EVENTS];
+    int failure;
+    for (int i = 0; i < SYMDYN_NX; i++)
+        y[i] = x[i] + symdyn_eps * symdyn_roundings[i] * fmax(fabs(run->x_old[i]), fabs(run->x[i]));
+    if ((failure = symdyn_event_values(run, t, x, there))) return failure;
+    if ((failure = symdyn_event_values(run, t + 2.0 * symdyn_eps * t, y, noise))) return failure;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) noise[k] = fabs(noise[k] - there[k]);
+    return 0;
+}
+
+// At the start of the run and after a reset, before it: note on which side of zero every quantity is, or, at zero, which it goes
+// to within a small step (0: that is not known yet). What has just vanished counts as zero, whatever rounding has left of it,
+// unless its reset has moved it from there. Zero counts where a quantity goes on in the direction of its event, of what has just
+// vanished only where its reset has stopped it; before: the changes of that within the same step before the reset.
+static int symdyn_event_sides(symdyn_run *run, double t, const double *x, const double *xd, double step, const double *before) {
+    double *const now = run->events.now, then[SYMDYN_N_EVENTS], y[SYMDYN_NX], noise[SYMDYN_N_EVENTS];
+    int failure;
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + step * xd[i];
+    if ((failure = symdyn_event_values(run, t, x, now))) return failure;
+    if ((failure = symdyn_event_values(run, t + step, y, then))) return failure;
+    if ((failure = symdyn_event_noise(run, t, x, noise))) return failure;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+        const double change = then[k] - now[k], left = 2.0 * fabs(run->events.left[k]) + fabs(change);
+        const int fired = run->events.fired[k], zero = fabs(now[k]) <= noise[k] || (fired && fabs(now[k]) <= left);
+        const int side = (int)run->events.side[k], way = symdyn_event[k].direction;
+        const int stopped = symdyn_event[k].resets && fabs(change) <= 1e-6 * fabs(before[k]);
+        const int kept = run->events.kept && !fired && side != 0;
+        run->events.leaving[k] = !zero || kept ? 0 : fired ? stopped * side : (side != way) * way;
+        if (!kept) run->events.side[k] = zero ? (change > 0.0) - (change < 0.0) : now[k] > 0.0 ? 1.0 : -1.0;
+    }
+    run->events.kept = 0;
+    return 0;
+}
+
+// The zero of quantity k, which leaves its side between a and b, by regula falsi with halved ends (Illinois), from its values
+// times that side there: at_a > 0 >= at_b, but at_a = 0 where the step begins at the zero.
+static int symdyn_event_root(symdyn_run *run, int k, double a, double b, double at_a, double at_b, double least, double *root) {
+    double values[SYMDYN_N_EVENTS], x[SYMDYN_NX];
+    int failure, last = 0;
+    for (int round = 0; round < 200; round++) {
+        const double close = 4.0 * symdyn_eps * fmax(fabs(a), fabs(b)), inside = b > a ? close : -close;
+        if (fabs(b - a) <= close || at_b == 0.0 || (at_a <= 0.0 && fabs(b - a) <= least)) break;
+        double s = at_a > 0.0 && round < 100 ? b - at_b * (b - a) / (at_b - at_a) : 0.5 * (a + b);
+        if (!(fabs(s - a) > 0.25 * close && fabs(s - b) > 0.25 * close)) s = fabs(s - a) < fabs(s - b) ? a + inside : b - inside;
+        if ((failure = symdyn_state_at(run, s, x)) || (failure = symdyn_event_values(run, s, x, values))) return failure;
+        const double value = values[k] * run->events.side[k];
+        if (value > 0.0) {
+            a = s;
+            at_a = value;
+            at_b *= last == 1 ? 0.5 : 1.0;
+            last = 1;
+        } else {
+            b = s;
+            at_b = value;
+            at_a *= last == -1 ? 0.5 : 1.0;
+            last = -1;
+        }
+    }
+    *root = at_a <= 0.0 && fabs(b - a) <= least ? a : b;
+    return 0;
+}
+
+// Samples of a panel, with the states there; those at its start are known.
+static int symdyn_event_samples(
+    symdyn_run *run, double left, double right, double (*v)[SYMDYN_N_EVENTS], double (*states)[SYMDYN_NX]) {
+    int failure;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) v[0][k] = run->events.now[k];
+    for (int j = 1; j < SYMDYN_PANEL + 1; j++) {
+        const double s = j == SYMDYN_PANEL - 1 ? right : left + symdyn_node[j] * (right - left);
+        double *const y = states[j];
+        if (s == run->t)
+            for (int i = 0; i < SYMDYN_NX; i++) y[i] = run->x[i];
+        else if ((failure = symdyn_state_at(run, s, y)))
+            return failure;
+        if ((failure = symdyn_event_values(run, s, y, v[j]))) return failure;
+    }
+    return 0;
+}
+
+// The same where quantities are resolved: of those that are bounded no less than what they vary by within the rounding.
+static int symdyn_event_rounding(symdyn_run *run, double t, const double *x, double *noise) {
+    int failure = symdyn_event_noise(run, t, x, noise);
+#if SYMDYN_HAS_BOUNDS
+    double ud[6 * SYMDYN_LEAVES], ranges[2 * SYMDYN_N_EVENTS];
+#if SYMDYN_BOUNDED_INPUTS
+    double inputs[SYMDYN_NIN];
+    if (failure || (failure = symdyn_inputs_at(&run->problem, t, x, inputs))) return failure;
+#endif
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        const int place = symdyn_event_leaf[l];
+#if SYMDYN_BOUNDED_INPUTS
+        const double at = place == 0 ? t : place > SYMDYN_NX ? inputs[place - (SYMDYN_NX + 1)] : x[place - 1];
+#else
+        const double at = place == 0 ? t : x[place - 1];
+#endif
+        const double size =
+            place == 0 || place > SYMDYN_NX ? fabs(at) : fmax(fabs(run->x_old[place - 1]), fabs(run->x[place - 1]));
+        const double radius = symdyn_eps * (place == 0 ? 2.0 : SYMDYN_PANEL_DENSE) * size;
+        ud[6 * l] = at - radius;
+        ud[6 * l + 1] = at + radius;
+    }
+    if (failure || symdyn_event_ranges_of(&run->problem, ud, ranges)) return failure;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+        if (symdyn_event_enclosed[k]) noise[k] = fmax(noise[k], ranges[2 * k + 1] - ranges[2 * k]);
+#endif
+    return failure;
+}
+
+// The first quantity that may have zeros on a panel which the signs at its ends do not show, -1 if there is none: see
+// symdyn/panels.py. What is no larger than its rounding is not resolved any further.
+static int symdyn_event_undecided(symdyn_run *run, double right, double (*v)[SYMDYN_N_EVENTS], const double *x) {
+    double noise[SYMDYN_N_EVENTS];
+    int known = 0;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+        if (run->events.look[k]) {
+            double c[SYMDYN_PANEL] = {0.0}, s[SYMDYN_PANEL - 1] = {0.0}, check = v[SYMDYN_PANEL][k], rest = 0.0, rise = 0.0;
+            for (int j = 0; j < SYMDYN_PANEL; j++) {
+                for (int i = 0; i < SYMDYN_PANEL; i++) c[i] += symdyn_chebyshev[i][j] * v[j][k];
+                for (int i = 0; i < SYMDYN_PANEL - 1; i++) s[i] += symdyn_slopes[i][j] * v[j][k];
+                check -= symdyn_at_check[j] * v[j][k];
+            }
+            for (int i = 1; i < SYMDYN_PANEL; i++) rest += fabs(c[i]);
+            for (int i = 1; i < SYMDYN_PANEL - 1; i++) rise += fabs(s[i]);
+            const double tail = fabs(c[SYMDYN_PANEL - 2]) + fabs(c[SYMDYN_PANEL - 1]);
+            const double error = SYMDYN_PANEL_TAIL * tail + SYMDYN_PANEL_CHECK * fabs(check);
+            if (fabs(c[0]) - rest > error || fabs(s[0]) - rise > SYMDYN_PANEL_SLOPE * error || fabs(c[0]) + rest == 0.0) continue;
+            if (!known && symdyn_event_rounding(run, right, x, noise)) return k;
+            known = 1;
+            if (fabs(c[0]) + rest > SYMDYN_PANEL_NOISE * noise[k]) return k;
+        }
+    return -1;
+}
+
+#if SYMDYN_HAS_BOUNDS
+// The values l of what is bounded at the samples of a panel: w. Returns 0, or 1 where an input has none.
+static int symdyn_event_leaves(
+    symdyn_run *run, double left, double right, double (*states)[SYMDYN_NX], double (*w)[SYMDYN_PANEL + 1]) {
+#if SYMDYN_BOUNDED_INPUTS
+    double inputs[SYMDYN_PANEL + 1][SYMDYN_NIN];
+    for (int j = 0; j < SYMDYN_PANEL + 1; j++) {
+        const double s = j == SYMDYN_PANEL - 1 ? right : left + symdyn_node[j] * (right - left);
+        if (symdyn_inputs_at(&run->problem, s, states[j], inputs[j])) return 1;
+    }
+#else
+    (void)run;
+    (void)left;
+    (void)right;
+#endif
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        const int place = symdyn_event_leaf[l];
+        if (place == 0) continue;
+        for (int j = 0; j < SYMDYN_PANEL + 1; j++)
+#if SYMDYN_BOUNDED_INPUTS
+            w[l][j] = place > SYMDYN_NX ? inputs[j][place - (SYMDYN_NX + 1)] : states[j][place - 1];
+#else
+            w[l][j] = states[j][place - 1];
+#endif
+    }
+    return 0;
+}
+
+// The first quantity that may have zeros between the samples of a panel, -1 if there is none: see symdyn/panels.py. Bounds of the
+// values alone, which are quick, leave little to do.
+static int symdyn_event_unproved(
+    symdyn_run *run, double left, double right, double (*v)[SYMDYN_N_EVENTS], double (*states)[SYMDYN_NX]) {
+    double ud[6 * SYMDYN_LEAVES], bounds[6 * SYMDYN_N_EVENTS], ranges[2 * SYMDYN_N_EVENTS], noise[SYMDYN_N_EVENTS];
+    double w[SYMDYN_LEAVES][SYMDYN_PANEL + 1], error[SYMDYN_LEAVES];
+    int known = 0, open = 0;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) open |= symdyn_event_enclosed[k] && run->events.look[k];
+    if (!open || symdyn_event_leaves(run, left, right, states, w)) return -1;
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        double *const jet = ud + 6 * l, c[SYMDYN_PANEL] = {0.0};
+        if (symdyn_event_leaf[l] == 0) {
+            jet[0] = fmin(left, right);
+            jet[1] = fmax(left, right);
+            jet[2] = jet[3] = 0.5 * (right - left);
+            jet[4] = jet[5] = 0.0;
+            continue;
+        }
+        double check = w[l][SYMDYN_PANEL];
+        for (int j = 0; j < SYMDYN_PANEL; j++) {
+            for (int i = 0; i < SYMDYN_PANEL; i++) c[i] += symdyn_chebyshev[i][j] * w[l][j];
+            check -= symdyn_at_check[j] * w[l][j];
+        }
+        double radius = error[l] = SYMDYN_PANEL_CHECK * fabs(check);
+        for (int i = 1; i < SYMDYN_PANEL; i++) radius += fabs(c[i]);
+        jet[0] = c[0] - radius;
+        jet[1] = c[0] + radius;
+    }
+    open = symdyn_event_ranges_of(&run->problem, ud, ranges);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+        open |= symdyn_event_enclosed[k] && run->events.look[k] && !(ranges[2 * k] > 0.0 || ranges[2 * k + 1] < 0.0);
+    if (!open) return -1;
+    for (int l = 0; l < SYMDYN_LEAVES; l++)
+        if (symdyn_event_leaf[l]) {
+            double *const jet = ud + 6 * l, s[SYMDYN_PANEL - 1] = {0.0}, b[SYMDYN_PANEL - 2] = {0.0};
+            for (int j = 0; j < SYMDYN_PANEL; j++) {
+                for (int i = 0; i < SYMDYN_PANEL - 1; i++) s[i] += symdyn_slopes[i][j] * w[l][j];
+                for (int i = 0; i < SYMDYN_PANEL - 2; i++) b[i] += symdyn_bends[i][j] * w[l][j];
+            }
+            double slope = SYMDYN_PANEL_SLOPE * error[l], bend = SYMDYN_PANEL_BEND * error[l];
+            for (int i = 1; i < SYMDYN_PANEL - 1; i++) slope += fabs(s[i]);
+            for (int i = 1; i < SYMDYN_PANEL - 2; i++) bend += fabs(b[i]);
+            jet[2] = s[0] - slope;
+            jet[3] = s[0] + slope;
+            jet[4] = b[0] - bend;
+            jet[5] = b[0] + bend;
+        }
+    const int failed = symdyn_event_bounds_of(&run->problem, ud, bounds);
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+        if (symdyn_event_enclosed[k] && run->events.look[k]) {
+            const double *const of = bounds + 6 * k, beta = fmax(fabs(of[4]), fabs(of[5]));
+            int proved = !failed;
+            double most = 0.0;
+            if (!failed && (of[0] > 0.0 || of[1] < 0.0 || of[2] > 0.0 || of[3] < 0.0 || of[4] > 0.0 || of[5] < 0.0)) continue;
+            for (int j = 0; j < SYMDYN_PANEL - 1; j++) {
+                const double at = v[j][k], then = v[j + 1][k], allowance = symdyn_node_gap[j] * symdyn_node_gap[j] * beta;
+                const int clear = at * then > 0.0 && fmin(fabs(at), fabs(then)) > 0.125 * allowance;
+                proved &= clear || fabs(at - then) > 0.5 * allowance;
+                most = fmax(most, fmax(fabs(at), fabs(then)));
+            }
+            if (proved || most == 0.0) continue;
+            if (!known && symdyn_event_rounding(run, right, states[SYMDYN_PANEL - 1], noise)) return k;
+            known = 1;
+            if (most > SYMDYN_PANEL_NOISE * noise[k]) return k;
+        }
+    return -1;
+}
+#endif
+
+// Note event k, or, as -1 - k, that its zeros were not resolved, as -1 - SYMDYN_N_EVENTS - k, that it was not proved that they
+// are.
+static void symdyn_event_note(symdyn_run *run, int k, double t, const double *before, const double *after) {
+    double *const note = run->events.noted + SYMDYN_NOTE * run->events.n_noted++;
+    note[0] = k;
+    note[1] = t;
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        note[2 + i] = before[i];
+        note[(2 + SYMDYN_NX) + i] = after[i];
+    }
+}
+
+// The state after the resets of the events at (t, x), on the constraints, whatever keeps the steps there. Returns 0 or a failure.
+static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double *after) {
+    for (int i = 0; i < SYMDYN_NX; i++) after[i] = x[i];
+#if SYMDYN_HAS_RESETS
+    double becomes[SYMDYN_RESETS];
+#if SYMDYN_KEEPS_RESETS
+    int asked[SYMDYN_HELD] = {0};
+    const int failure = symdyn_correct(run, t, after);
+    if (failure) return failure;
+#endif
+    const int reason = symdyn_event_resets_at(&run->problem, t, after, becomes);
+    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    for (int k = 0, r = 0; k < SYMDYN_N_EVENTS; k++)
+        for (int end = r + symdyn_event[k].resets; r < end; r++)
+            if (run->events.fired[k]) {
+                after[symdyn_reset_index[r]] = becomes[r];
+#if SYMDYN_KEEPS_RESETS
+                for (int i = 0; i < SYMDYN_HELD; i++) asked[i] |= symdyn_held[i] == symdyn_reset_index[r];
+#endif
+            }
+#endif
+#if SYMDYN_KEEPS_RESETS
+    return symdyn_keep_resets(run, t, x, after, asked);
+#endif
+#if SYMDYN_PROJECTS && !SYMDYN_KEEPS_RESETS
+    return symdyn_correct(run, t, after);
+#endif
+#if !SYMDYN_PROJECTS
+    (void)run;
+    (void)t;
+    return 0;
+#endif
+}
+
+// Look for events in the latest step: note them, and end the step at the first that stops the motion or changes its state.
+// Panels are divided until it is certain what happens in each, the rest of the step waiting in `ends`.
+static void symdyn_look_for_events(symdyn_run *run) {
+    const double least =
+        1e-14 * run->h_floor / (symdyn_eps * symdyn_eps);  // times that are closer count as one: 1e-14 of the span
+    double left = run->t_old, ends[64] = {run->t}, v[SYMDYN_PANEL + 1][SYMDYN_N_EVENTS];
+    double states[SYMDYN_PANEL + 1][SYMDYN_NX], xd[SYMDYN_NX], *const x = states[SYMDYN_PANEL - 1];
+    int failure = 0, n = 1;
+    run->events.divisions = run->events.proofs = 0;
+    for (int i = 0; i < SYMDYN_NX; i++) states[0][i] = run->x_old[i];
+    while (run->events.looking && n) {
+        const double right = ends[n - 1], middle = 0.5 * (left + right), width = fabs(right - left);
+        double first = right, root[SYMDYN_N_EVENTS];
+        int passed[SYMDYN_N_EVENTS], any = 0, cut = 0, resets = 0, again = 0;
+        const int divisible = n < 64 && width > fmax(2.0 * least, 16.0 * symdyn_eps * fabs(right));
+        if (divisible && run->events.spacing > 0.0 && SYMDYN_PANEL_WIDEST * width > run->events.spacing) {
+            ends[n++] = middle;
+            continue;
+        }
+        if ((failure = symdyn_event_samples(run, left, right, v, states))) {
+            if (!divisible || width < SYMDYN_PANEL_EVALUATED * fabs(run->t - run->t_old)) break;
+            ends[n++] = middle;
+            failure = 0;
+            continue;
+        }
+        const int wavy = divisible ? symdyn_event_undecided(run, right, v, x) : -1;
+        const int most = run->events.coarse ? SYMDYN_FEW_DIVISIONS : SYMDYN_MOST_DIVISIONS;
+        if (wavy >= 0 && run->events.divisions++ < most) {
+            ends[n++] = middle;
+            continue;
+        }
+        if (wavy >= 0 && !run->events.unresolved[wavy]) {
+            run->events.unresolved[wavy] = run->events.coarse = 1;
+            symdyn_event_note(run, -1 - wavy, left, run->x_old, run->x_old);
+        }
+#if SYMDYN_HAS_BOUNDS
+        const int hidden = divisible && wavy < 0 ? symdyn_event_unproved(run, left, right, v, states) : -1;
+        const int most_proofs = hidden >= 0 && run->events.unproved[hidden] ? SYMDYN_FEW_DIVISIONS : SYMDYN_MOST_PROOFS;
+        if (hidden >= 0 && run->events.proofs++ < most_proofs) {
+            ends[n++] = middle;
+            continue;
+        }
+        if (hidden >= 0 && !run->events.unproved[hidden]) {
+            run->events.unproved[hidden] = 1;
+            symdyn_event_note(run, -1 - SYMDYN_N_EVENTS - hidden, left, run->x_old, run->x_old);
+        }
+#endif
+        const double *const values = v[SYMDYN_PANEL - 1];
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+            const double side = (values[k] > 0.0) - (values[k] < 0.0), leaving = run->events.leaving[k];
+            if (run->events.side[k] == 0.0) run->events.side[k] = side;
+            const double before = run->events.side[k];
+            const int leaves = before != 0.0 && before == leaving;
+            passed[k] = run->events.look[k]
+                && (leaves
+                    || (before != 0.0 && side != before
+                        && (symdyn_event[k].direction == 0 || symdyn_event[k].direction == -before)));
+            root[k] = left;
+            if (before != 0.0 && !leaves) run->events.leaving[k] = 0;
+            if (passed[k] && !leaves && !failure)
+                failure = symdyn_event_root(run, k, left, right, before * v[0][k], before * values[k], least, &root[k]);
+            if (passed[k] && (root[k] - first) * run->direction < 0.0) first = root[k];
+            any |= passed[k];
+        }
+        if (!any) {
+            for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+                if (values[k] != 0.0) run->events.side[k] = values[k] > 0.0 ? 1.0 : -1.0;
+                run->events.now[k] = values[k];
+            }
+            for (int i = 0; i < SYMDYN_NX; i++) states[0][i] = x[i];
+            left = right;
+            n--;
+            continue;
+        }
+        if (failure || (failure = symdyn_state_at(run, first, x))) break;
+        if ((failure = symdyn_event_values(run, first, x, run->events.left))) break;
+        const int no_time = fabs(first - run->events.t) <= least;  // since the latest reset
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+            const int fires = passed[k] && fabs(root[k] - first) <= least;
+            const int leaves = run->events.leaving[k] != 0 && run->events.leaving[k] == run->events.side[k];
+            again |= fires && run->events.fired[k] && symdyn_event[k].resets && no_time && !leaves;
+            run->events.fired[k] = fires;
+            if (fires && !leaves) run->events.side[k] = -run->events.side[k];
+            cut |= run->events.fired[k] && symdyn_event[k].stops;
+            resets |= run->events.fired[k] ? symdyn_event[k].resets : 0;
+        }
+        if (cut || !resets)
+            for (int i = 0; i < SYMDYN_NX; i++) run->events.after[i] = x[i];
+        else
+            failure = symdyn_event_reset(run, first, x, run->events.after);
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+            if (run->events.fired[k]) symdyn_event_note(run, k, first, x, run->events.after);
+        left = first;
+        if (failure) break;
+        if (resets) {
+            // Again at once, although its reset sends it away from zero: it goes less far than is resolved.
+            run->events.at_once = again ? 5 : fabs(first - run->events.t) <= 1e4 * least ? run->events.at_once + 1 : 1;
+            run->events.t = first;
+        }
+        for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+            if (run->events.fired[k]) run->events.leaving[k] = 0;
+            run->events.now[k] = run->events.left[k];
+        }
+        if (cut || resets || run->events.n_noted >= 64) {
+            run->unstored = first != run->t_old;  // else it is
+            run->t = first;
+            run->t_low = 0.0;
+            run->events.pending = !cut;
+            run->events.resetting = resets != 0;
+            for (int i = 0; i < SYMDYN_NX; i++) run->x[i] = x[i];
+            run->status = first == run->t_end ? SYMDYN_DONE : SYMDYN_STEP_LIMIT;
+            if (cut || run->events.at_once >= 5) run->status = cut ? SYMDYN_STOPPED : SYMDYN_EVENT_AT_ONCE;
+            if (cut || !resets) return;
+            // What the quantities change by in a small step before.
+            const double earlier = first - run->direction * fmin(1e-6 * fabs(run->h_old), fabs(first - run->t_old));
+            failure = symdyn_state_at(run, earlier, xd) || symdyn_event_values(run, earlier, xd, run->events.now);
+            for (int k = 0; k < SYMDYN_N_EVENTS; k++)
+                run->events.now[k] = failure ? 0.0 : run->events.left[k] - run->events.now[k];
+            return;
+        }
+        for (int i = 0; i < SYMDYN_NX; i++) states[0][i] = x[i];
+        run->events.divisions = run->events.proofs = 0;
+        if (first == right) n--;
+    }
+    if (!failure) return;
+    // What is trusted: up to there the quantities were known.
+    if (left == run->t_old || symdyn_state_at(run, left, x)) {
+        left = run->t_old;
+        run->unstored = 0;
+        for (int i = 0; i < SYMDYN_NX; i++) x[i] = run->x_old[i];
+    }
+    run->t = left;
+    run->t_low = 0.0;
+    run->status = failure;
+    for (int i = 0; i < SYMDYN_NX; i++) run->x[i] = x[i];
+}
+
+// Before a step: begin to look, or go on from an event, before whose reset event_now has the changes of a small step. Returns 1
+// if there is to be no step now.
+static int symdyn_resume(symdyn_run *run) {
+    const double step = run->events.begun ? 1e-6 * run->h_old : 1e-9 * (run->t_end - run->t);
+    const int pending = run->events.pending;
+    double before[SYMDYN_N_EVENTS];
+    int failure = 0;
+    if (!run->events.looking || (run->events.begun && !pending && run->events.n_noted < 64)) return 0;
+    if (run->events.n_noted >= 64) {  // until they are taken
+        run->status = SYMDYN_STORE_FULL;
+        return 1;
+    }
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) before[k] = pending ? run->events.now[k] : step * run->events.now[k];
+    run->events.pending = 0;
+    if (pending && symdyn_restart(run, run->t, run->events.after, 0.0)) return 1;
+    if (!pending) run->events.t = -run->direction * symdyn_huge;
+    run->events.begun = 1;
+    if (pending && !run->events.resetting) return 1;
+    if ((failure = symdyn_event_sides(run, run->t, run->x, run->xd, step, before))) run->status = failure;
+    return failure || pending;
+}
+
+// Which of the SYMDYN_N_EVENTS events to look for, after the start, by samples no further apart than spacing, s (0: any).
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(symdyn_run *run, const int *look, double spacing) {
+    run->events.spacing = spacing;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.looking |= run->events.look[k] = look[k];
+}
+
+// Go on from the end of another run, after simulation_look: known: the sides of the quantities there, 0 where unknown, of those
+// that have just vanished the rates, NaN of all others, and what was left of them; reset: whether the state was changed since.
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(symdyn_run *run, const double *known, int reset) {
+    const double *const sides = known, *const rates = known + SYMDYN_N_EVENTS, *const left = known + 2 * SYMDYN_N_EVENTS;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+        const int fired = run->events.fired[k] = rates[k] == rates[k];
+        run->events.left[k] = left[k];
+        run->events.now[k] = fired ? rates[k] : 0.0;
+        run->events.side[k] = fired ? (rates[k] * run->direction > 0.0) - (rates[k] * run->direction < 0.0) : sides[k];
+    }
+    run->events.kept = !reset;
+}
+
+// By how much what was refused as a reset is off.
+SYMDYN_EXPORT double SYMDYN_NAME(simulation_reset_gap)(const symdyn_run *run) { return run->events.reset_gap; }
+
+// Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
+// too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
+// on. Returns how many.
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(symdyn_run *run, double *rows) {
+    const int n = run->events.n_noted;
+    for (int k = 0; k < n * SYMDYN_NOTE; k++) rows[k] = run->events.noted[k];
+    run->events.n_noted = 0;
+    if (run->status == SYMDYN_STORE_FULL) run->status = SYMDYN_STEP_LIMIT;
+    return n;
+}

@@ -1,0 +1,20 @@
+// Memory of the search for events in a run.
+#pragma once
+
+typedef struct {
+    int looking, look[SYMDYN_N_EVENTS];                   // whether for any, for which
+    double side[SYMDYN_N_EVENTS], left[SYMDYN_N_EVENTS];  // sign of each quantity; what is left of those that vanished last
+    double now[SYMDYN_N_EVENTS];                          // values at the start of what is searched next
+    int leaving[SYMDYN_N_EVENTS];             // of what is zero: the side that counts as an event where it goes there; or 0
+    int fired[SYMDYN_N_EVENTS], at_once;      // at the latest time; resets with hardly any time between
+    int kept;                                 // the sides are those at the end of another run, whose state this one begins with
+    int begun, pending, resetting;            // the sides are known; a state waits to be gone on from, with a reset
+    int divisions, proofs;                    // of the latest step: for samples, for proofs
+    int unresolved[SYMDYN_N_EVENTS], coarse;  // quantities that vary too quickly, whether there are any
+    int unproved[SYMDYN_N_EVENTS];            // of which it is not proved that the samples show all zeros
+    double spacing;                           // of samples at the most, s; 0: any
+    double t, after[SYMDYN_NX];               // of the latest reset; the state after it
+    double reset_gap;                         // by how much what was refused as a reset is off
+    int n_noted;
+    double noted[SYMDYN_NOTES * SYMDYN_NOTE];  // events, times, states before and after them, until they are taken
+} symdyn_events;

@@ -1,0 +1,43 @@
+// What the right-hand side needs besides t and x.
+#pragma once
+
+#include "prelude.h"
+
+// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
+// cubic, its ends held), constants.
+typedef struct {
+    const double *p, *c, *inputs;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
+    int (*function)(double t, const double *x, double *inputs);
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} symdyn_problem;
+
+enum { SYMDYN_INPUT_STOPPED = 100000 };
+
+#if SYMDYN_HAS_INPUTS
+// Inputs at (t, x), out: SYMDYN_NIN. Returns 0 or INPUT_STOPPED.
+static inline int symdyn_inputs_at(const symdyn_problem *problem, double t, const double *x, double *out) {
+    const double *at = problem->breaks;
+    long low = 0, high = problem->n_pieces;
+    if (problem->function) return problem->function(t, x, out) ? SYMDYN_INPUT_STOPPED : 0;
+    if (high == 0) {
+        for (int k = 0; k < SYMDYN_NIN; k++) out[k] = problem->inputs[k];
+        return 0;
+    }
+    const double inside = t <= at[0] ? at[0] : t >= at[high] ? at[high] : t;
+    while (high - low > 1) {
+        const long middle = low + (high - low) / 2;
+        if (at[middle] <= inside)
+            low = middle;
+        else
+            high = middle;
+    }
+    const double d = inside - at[low], *c = problem->pieces + 4 * SYMDYN_NIN * low;
+    for (int k = 0; k < SYMDYN_NIN; k++) out[k] = c[4 * k] + d * (c[4 * k + 1] + d * (c[4 * k + 2] + d * c[4 * k + 3]));
+    return 0;
+}
+#endif

@@ -1,0 +1,13 @@
+// Memory of implicit collocation in a run. Matrices are stored by columns.
+#pragma once
+
+typedef struct {
+    double z[2][SYMDYN_STAGES][SYMDYN_NX],
+        e[2][2][SYMDYN_NX];              // of the latest steps tried and accepted: stages less x; error, gap
+    int accepted, tried, warm, current;  // which is accepted; since the start one was tried, accepted; the Jacobian is that at x
+    double gap, h_gap, h_quiet;          // of the latest step tried: its gap, its length; of shorter ones gaps are rounding
+    double ease, tolerance;  // the estimate is of lower order than the step: ease 10 r^(1/4) of it counts; r/ease, r as rtol
+    double eta, theta;       // of Newton's iteration: its error by the latest change, its rate
+    double jacobian[SYMDYN_NX * SYMDYN_NX], re[SYMDYN_ROOTS][SYMDYN_NX * SYMDYN_NX], im[SYMDYN_ROOTS][SYMDYN_NX * SYMDYN_NX];
+    int order[SYMDYN_ROOTS][SYMDYN_NX];
+} symdyn_method;

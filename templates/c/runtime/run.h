@@ -1,0 +1,109 @@
+// A run of the integrator: its memory, failures, the right-hand side, norms. Nothing is allocated or global: a run lives in one
+// struct, and one that was interrupted continues to the same bits.
+#pragma once
+
+#include "problem.h"
+
+enum {
+    // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.
+    SYMDYN_DONE = 0,
+    SYMDYN_STEP_LIMIT = 1,
+    SYMDYN_STORE_FULL = 2,
+    SYMDYN_STOPPED = 3,
+    // Failures are negative, and final but for BAD_OUTPUT_TIME. Even at the smallest step:
+    SYMDYN_FIELD_FAILED = -1,       // the right-hand side cannot be evaluated
+    SYMDYN_STEP_TOO_SMALL = -2,     // the tolerance is not met
+    SYMDYN_STATE_NOT_FINITE = -3,   // NaN or Inf
+    SYMDYN_BAD_ARGUMENT = -4,       // start: a time, state, tolerance or step makes no sense
+    SYMDYN_BAD_OUTPUT_TIME = -5,    // a requested time lies before the latest step
+    SYMDYN_PROJECTION_FAILED = -6,  // even at the smallest step, no way back onto the constraints
+    SYMDYN_EVENT_FAILED = -7,       // a quantity of an event is not finite
+    SYMDYN_EVENT_AT_ONCE = -8,      // events again and again with hardly any time between
+    SYMDYN_NO_SERIES = -9,          // there is a right-hand side but no series of it
+    SYMDYN_RESET_REFUSED = -10      // the constraints do not let an entry be what a reset makes it
+};
+
+typedef struct {
+    symdyn_problem problem;
+    double t, t_low;          // present time, and what rounding has cut off it: the time is t + t_low
+    double t_end, direction;  // where the run ends, hit exactly; sign of t_end - t0 (0 if they are equal)
+    double t_slack, h_floor;  // times closer than this to an end count as the end; shortest step near t = 0, else 16 ulp of t
+    double h, h_max;          // length >= 0 of the step to be tried next; longest step (the last one may be 1 % longer)
+    double h_try, h_min, t_new, t_new_low;  // the step that is tried: its length with sign, the shortest one, its end
+    double h_cut;                           // its length, had it not to end at a kink of the inputs ahead or with the run; else 0
+    double rtol, atol[SYMDYN_NX];           // tolerated error of a step: atol[i] + rtol*|x[i]| in the root mean square
+    double root_old;                        // error of the latest accepted step (tolerated: 1) to the 1/SYMDYN_ORDER
+    double x[SYMDYN_NX], xd[SYMDYN_NX];     // state at t and its derivative
+    double t_old, h_old, x_old[SYMDYN_NX];  // start of the latest accepted step, its length, with sign, the state there
+    int dense_ready, unstored;              // what is needed within the latest step is prepared; (t, x) is not stored yet
+    int rejected, status;                   // the latest attempt was rejected: do not lengthen the step
+    long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
+    // The latest evaluation that failed, and the run if status says so. reason: what a function returned, 0: results not finite,
+    // or a correction too far. bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
+    int reason;
+    long bad_index;
+    double t_fail, x_fail[SYMDYN_NX];
+    // Of the latest projection: norms of the changes of q and of u; where it failed, the largest residual, m, or of_speeds, m/s,
+    // and its row, else -1. Of all: the largest changes after a step, steps whose end was moved, calls of the corrections.
+    double dq, du, residual, largest_dq, largest_du;
+    int worst, of_speeds;
+    long n_corrected, n_corrections, n_jacobians, n_factorizations;
+    double before[SYMDYN_NX];  // what was projected last
+    double x_end[SYMDYN_NX];   // the latest step's end before projection: what is within it ends here
+    int end_moved;             // by more than a thousandth of the tolerance
+    // Steps tried across a singular configuration; whether the one that is tried, the latest one goes across one.
+    int n_crossing, crossing, crossed;
+    double bad_crossing, h_crossing;  // the best of those tried
+    symdyn_method method;
+#if SYMDYN_EVENTS
+    symdyn_events events;
+#endif
+} symdyn_run;
+
+static const double symdyn_eps = 2.220446049250313e-16, symdyn_huge = 1.7976931348623157e308;
+
+// Record a failure; returns its status.
+static int symdyn_fail(symdyn_run *run, int status, int reason, long bad_index, double t, const double *x) {
+    run->reason = reason;
+    run->bad_index = bad_index;
+    run->t_fail = t;
+    for (int i = 0; i < SYMDYN_NX; i++) run->x_fail[i] = x[i];
+    return status;
+}
+
+// The right-hand side at (t, y) into xd. Returns 0 or the failure. The only call of the field.
+static int symdyn_eval(symdyn_run *run, double t, const double *y, double *xd) {
+    int bad = 0, first = 0;
+    run->n_evaluations++;
+    const int reason = symdyn_field(&run->problem, t, y, xd);
+    for (int i = 0; i < SYMDYN_NX; i++)  // comparisons with NaN are false
+        bad |= !(fabs(y[i]) <= symdyn_huge) | !(fabs(xd[i]) <= symdyn_huge);
+    if (!reason && !bad) return 0;
+    while (!reason && fabs(y[first]) <= symdyn_huge && fabs(xd[first]) <= symdyn_huge) first++;
+    return symdyn_fail(run, reason ? SYMDYN_FIELD_FAILED : SYMDYN_STATE_NOT_FINITE, reason, reason ? -1 : first, t, y);
+}
+
+// One over the tolerated error of state i in a step from run->x to x_new; finite also for x = 0 without atol.
+static inline double symdyn_scale(const symdyn_run *run, int i, double x_new) {
+    const double size = fabs(run->x[i]) > fabs(x_new) ? fabs(run->x[i]) : fabs(x_new);
+    return 1.0 / (run->atol[i] + run->rtol * size + 1e-300);
+}
+
+// The mean square of v, 1 where it is the tolerated error of a step to x_new. What is 0, without atol, does not count.
+static double symdyn_square(const symdyn_run *run, const double *v, const double *x_new) {
+    double sum = 0.0;
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        const double a = v[i] * symdyn_scale(run, i, x_new[i]);
+        sum += run->atol[i] + fabs(run->x[i]) + fabs(x_new[i]) > 0.0 ? a * a : 0.0;
+    }
+    return sum / SYMDYN_NX;
+}
+
+// v^(1/SYMDYN_ORDER)
+static inline double symdyn_root(double v) {
+#if SYMDYN_ORDER_8
+    return sqrt(sqrt(sqrt(v)));
+#else
+    return pow(v, 1.0 / SYMDYN_ORDER);
+#endif
+}

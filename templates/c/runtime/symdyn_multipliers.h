@@ -1,0 +1,38 @@
+// Multipliers of least norm; see Multipliers in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
+// all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M.
+#pragma once
+
+#include "symdyn_factors.h"
+
+// lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
+// in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = SYMDYN_SMOOTHED.
+static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
+    const double *const rows = in + m * n, *const columns = rows + m, *const g = columns + n;
+    const double smoothed = SYMDYN_SMOOTHED * SYMDYN_SMOOTHED;
+    double A[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_M], C[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_N],
+        r[SYMDYN_MULTIPLIERS_M] = {0.0};
+    for (int k = 0; k < m; k++) {
+        lam[k] = 0.0;
+        for (int j = 0; j < n; j++) C[k][j] = rows[k] * columns[j] * in[k * n + j];
+    }
+    for (int i = 0; i < m; i++)
+        for (int j = 0; j <= i; j++) {
+            A[i][j] = i == j ? smoothed : 0.0;
+            for (int k = 0; k < n; k++) A[i][j] += C[i][k] * C[j][k];
+        }
+    if (symdyn_factorize(m, SYMDYN_MULTIPLIERS_M, A[0], 0.0)) return 1;
+    // Later rounds leave in r what rounding has made of lam outside the range of C; it is taken off.
+    for (int round = 0; round < (1 + SYMDYN_CLEANINGS) * SYMDYN_ROUNDS; round++) {
+        const int cleans = round >= SYMDYN_ROUNDS, first = round % SYMDYN_ROUNDS == 0,
+                  last = round % SYMDYN_ROUNDS == SYMDYN_ROUNDS - 1;
+        for (int k = 0; k < m; k++) r[k] = cleans ? smoothed * (first ? lam[k] : r[k]) : 0.0;
+        for (int j = 0; j < n && !cleans; j++) {
+            const double rest = symdyn_less(columns[j] * g[j], m, &C[0][j], SYMDYN_MULTIPLIERS_N, lam);
+            for (int k = 0; k < m; k++) r[k] += C[k][j] * rest;
+        }
+        symdyn_substitute(m, SYMDYN_MULTIPLIERS_M, A[0], r);
+        for (int k = 0; k < m; k++) lam[k] += !cleans ? r[k] : last ? -r[k] : 0.0;
+    }
+    for (int k = 0; k < m; k++) lam[k] *= rows[k];
+    return 0;
+}

@@ -1,0 +1,74 @@
+// The iterated augmented Lagrangian; see Saddle in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
+// all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M.
+#pragma once
+
+#include "symdyn_factors.h"
+
+// Whether a pivot of the symmetric A, which is used up, is next to nothing of its entry: nothing holds some direction then.
+// The pivot that is the largest part of its entry goes first, so that rounding stays small.
+static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
+    double entries[SYMDYN_SADDLE_N];
+    int gone[SYMDYN_SADDLE_N] = {0};
+    for (int i = 0; i < n; i++) entries[i] = A[i][i];
+    for (int step = 0; step < n; step++) {
+        int p = -1;
+        for (int i = 0; i < n; i++)
+            if (!gone[i] && (p < 0 || A[i][i] * entries[p] > A[p][p] * entries[i])) p = i;
+        if (A[p][p] <= SYMDYN_LOOSE * entries[p] || A[p][p] <= 0.0) return 1;
+        gone[p] = 1;
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n && !gone[i]; j++)
+                if (!gone[j]) A[i][j] -= A[i][p] * A[p][j] / A[p][p];
+    }
+    return 0;
+}
+
+// x (n) of M x + C^T lam = f, C x = d; M (n x n) symmetric, perhaps singular; the m rows of C perhaps dependent.
+// in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
+// (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
+// residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
+static int symdyn_saddle(int n, int m, const double *in, double *x) {
+    const double *const m_in = in + 1, *const c_in = m_in + n * (n + 1) / 2, *const s = c_in + m * n, *const w = s + m;
+    const double *const f = w + n, *const d = f + n;
+    double M[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], B[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N],
+        C[SYMDYN_SADDLE_M][SYMDYN_SADDLE_N], rows[SYMDYN_SADDLE_M] = {0.0}, columns[SYMDYN_SADDLE_N], lighter[SYMDYN_SADDLE_N];
+    double r[SYMDYN_SADDLE_N], lam[SYMDYN_SADDLE_M] = {0.0}, largest = 0.0;
+    // Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
+    for (int i = 0; i < n; i++) {
+        columns[i] = w[i] * w[i] * m_in[i * (i + 1) / 2 + i];
+        largest = columns[i] > largest ? columns[i] : largest;
+    }
+    largest = largest > 0.0 ? largest : 1.0;
+    for (int i = 0; i < n; i++) {
+        lighter[i] = columns[i] > SYMDYN_MASSLESS * largest ? sqrt(largest / columns[i]) : 1.0;
+        columns[i] = w[i] * lighter[i];
+        x[i] = 0.0;
+    }
+    const double a = largest / (in[0] * in[0]);
+    for (int k = 0; k < m; k++) {
+        double most = 1.0;
+        for (int j = 0; j < n; j++) most = c_in[k * n + j] != 0.0 && lighter[j] > most ? lighter[j] : most;
+        rows[k] = s[k] / most;
+        for (int j = 0; j < n; j++) C[k][j] = rows[k] * columns[j] * c_in[k * n + j];
+    }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = 0.0;
+            M[i][j] = M[j][i] = columns[i] * columns[j] * m_in[i * (i + 1) / 2 + j];
+            for (int k = 0; k < m; k++) sum += C[k][i] * C[k][j];
+            A[i][j] = B[i][j] = B[j][i] = M[i][j] + a * sum;
+        }
+    if (symdyn_loose(n, B) || symdyn_factorize(n, SYMDYN_SADDLE_N, A[0], 0.0)) return 1;
+    for (int round = 0; round < SYMDYN_ROUNDS; round++) {
+        for (int i = 0; i < n; i++) r[i] = symdyn_less(columns[i] * f[i], n, M[i], 1, x);
+        for (int k = 0; k < m; k++) {
+            const double gap = a * symdyn_less(rows[k] * d[k], n, C[k], 1, x) - lam[k];
+            for (int j = 0; j < n; j++) r[j] += C[k][j] * gap;
+        }
+        symdyn_substitute(n, SYMDYN_SADDLE_N, A[0], r);
+        for (int i = 0; i < n; i++) x[i] += r[i];
+        for (int k = 0; k < m; k++) lam[k] -= a * symdyn_less(rows[k] * d[k], n, C[k], 1, x);
+    }
+    for (int i = 0; i < n; i++) x[i] *= columns[i];
+    return 0;
+}

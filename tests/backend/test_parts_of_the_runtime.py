@@ -1,0 +1,59 @@
+"""Parts of the runtime put into one text, and what is said of parts that cannot be."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from symdyn.backend.parts import Parts
+from symdyn.errors import SymdynError
+
+RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
+
+
+def parts(files: dict[str, str], **switches: bool) -> Parts:
+    return Parts(files.__getitem__, switches)
+
+
+def test_each_part_stands_once_where_it_is_first_included() -> None:
+    files = {"a.h": "#pragma once\n// a", "b.h": '#pragma once\n#include "a.h"\n// b',
+             "c.c": '#include "b.h"\n#include "a.h"\n// c'}
+    one = parts(files)
+    assert one.text("c.c") == "// a\n\n// b\n\n// c\n"
+    assert one.text("a.h") == ""
+
+
+@pytest.mark.parametrize(("condition", "kept"), [
+    ("A", True), ("!A", False), ("A && B", False), ("A && !B", True), ("B || A", True), ("B || !A", False)])
+def test_conditions_of_switches_are_resolved(condition: str, kept: bool) -> None:
+    text = parts({"a": f"#if {condition}\nyes\n#else\nno\n#endif\nend"}, A=True, B=False).text("a")
+    assert text == ("yes\nend\n" if kept else "no\nend\n")
+
+
+def test_other_conditions_stay_also_around_those_that_are_resolved() -> None:
+    text = "#if defined(__GNUC__)\n#if A\n1\n#endif\n#elif X\n#if !A\n2\n#if X\n3\n#endif\n#endif\n#endif"
+    assert parts({"a": text}, A=True).text("a") == "#if defined(__GNUC__)\n1\n#elif X\n#endif\n"
+    assert parts({"a": text}, A=False).text("a") == "#if defined(__GNUC__)\n#elif X\n2\n#if X\n3\n#endif\n#endif\n"
+
+
+def test_a_part_that_is_left_out_is_not_read() -> None:
+    assert parts({"a": '#if A\n#include "missing"\n#endif\n1'}, A=False).text("a") == "1\n"
+
+
+def test_a_text_for_a_macro() -> None:
+    assert parts({"a": "1\n#include MODEL\n2"}).text("a", MODEL="model\n") == "1\n\nmodel\n\n2\n"
+    with pytest.raises(SymdynError, match=r"a: #include MODEL, but there is no text of MODEL; pass one"):
+        parts({"a": "#include MODEL"}).text("a")
+
+
+def test_a_condition_that_is_not_closed() -> None:
+    with pytest.raises(SymdynError, match="a: #if without #endif; close the condition"):
+        parts({"a": "#if A\n1"}, A=True).text("a")
+
+
+@pytest.mark.parametrize("path", sorted(RUNTIME.iterdir()), ids=lambda path: path.name)
+def test_parts_are_plain_c(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"\{\{ |\{%|\{#", text) and text.startswith("//") and max(map(len, text.splitlines())) <= 130
