@@ -26,6 +26,7 @@ from symdyn.backend.methods import Method, method_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
 from symdyn.backend.reference import DIGITS, make_reference
+from symdyn.backend.units import divided, whole
 from symdyn.backend.user_functions import header as header_of_user_functions
 from symdyn.backend.user_functions import texts as texts_of_user_functions
 from symdyn.errors import SymdynError
@@ -134,7 +135,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     gather = method_of(method).gather
     gathered = gather(content, program, dialect, places) if integrator and backend == "c" and gather is not None else {}
     context |= gathered
-    context |= _runtime(environment, content, context, method_of(method), gathered)
+    context |= _runtime(environment, backend, content, context, method_of(method), gathered)
     files = {}
     wanted = dialect.files or {}
     if not standalone:
@@ -144,6 +145,8 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
             text = environment.get_template(f"{backend}/{template}").render(context)
         except (jinja2.TemplateError, TypeError, ValueError, LookupError, AttributeError) as error:
             raise SymdynError(_template_fault(f"{backend}/{template}", error)) from error
+        if backend == "c":
+            text = divided(text) if context["divided"] else whole(text)
         files[target.format(name=context["name"])] = text
     return Source(backend, files, program, dict(context["metadata_record"]))
 
@@ -153,7 +156,7 @@ def _environment(*folders: Path) -> jinja2.Environment:
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
 
 
-def _runtime(environment: jinja2.Environment, content: Content, context: Mapping[str, Any], method: Method,
+def _runtime(environment: jinja2.Environment, backend: str, content: Content, context: Mapping[str, Any], method: Method,
              gathered: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of the runtime in C, and what they are given of the mechanism."""
     def read(name: str) -> str:
@@ -165,9 +168,13 @@ def _runtime(environment: jinja2.Environment, content: Content, context: Mapping
     shape = Shape({g: len(content.groups[g]) for g in groups}, n_rows, context["unit_groups"],
                   content.events if context["has_events"] else (), content.event_leaves if context["has_events"] else (),
                   "reset_directions" in context["arguments_of"])
+    # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
+    units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
+             and method.template != "taylor")
     called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
     return {"runtime": Parts(read, switches(method, shape, gathered)), "runtime_sizes": runtime_sizes(method, shape, gathered),
-            "integrated": called, "resets": shape.resets, "held": shape.held}
+            "integrated": called, "resets": shape.resets, "held": shape.held,
+            "divided": units, "linked": "SYMDYN_HIDDEN" if units else "static"}
 
 
 # Reading the templates takes longer than filling them in, and the shipped ones stay as they are.

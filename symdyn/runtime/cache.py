@@ -5,15 +5,11 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
-import hashlib
 import os
-import platform
 import re
 import shlex
 import shutil
 import stat
-import struct
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,8 +18,9 @@ from pathlib import Path
 
 from symdyn.errors import CacheError, CompileError
 from symdyn.runtime.cache_folder import cache_dir
-from symdyn.runtime.compiler import LINUX, WINDOWS, Compiler, flags
-from symdyn.runtime.stored import PRIVATE, digest, write_whole, writers
+from symdyn.runtime.compiler import LINUX, WINDOWS, Compiler, flags, link_flags
+from symdyn.runtime.objects import built_from_units, is_whole, key_of, run, seal_of
+from symdyn.runtime.stored import PRIVATE, digest, write_whole
 from symdyn.shown import shown
 
 SUFFIX = ".dll" if WINDOWS else ".dylib" if sys.platform == "darwin" else ".so"
@@ -40,7 +37,7 @@ def build(source: str, stem: str, compiler: Compiler) -> Path:
     folder does not take the library.
     """
     target = _target(source, stem, compiler)
-    if not _is_whole(target):
+    if not is_whole(target):
         _compile(source, target, compiler, replace=False)
     return target
 
@@ -48,12 +45,12 @@ def build(source: str, stem: str, compiler: Compiler) -> Path:
 def discard(library: Path) -> None:
     """Remove a built library."""
     library.unlink(missing_ok=True)
-    _seal(library).unlink(missing_ok=True)
+    seal_of(library).unlink(missing_ok=True)
 
 
 def is_built(source: str, stem: str, compiler: Compiler) -> bool:
     """Whether the shared library of this source is there already, whole to the last bit."""
-    return _is_whole(_target(source, stem, compiler))
+    return is_whole(_target(source, stem, compiler))
 
 
 def load(source: str, stem: str, compiler: Compiler) -> ctypes.CDLL:
@@ -88,44 +85,9 @@ def writing(path: Path) -> Iterator[None]:
         raise CacheError(f"{path.name} cannot be put into the cache folder {path.parent}: {why}") from error
 
 
-def _seal(library: Path) -> Path:
-    """The file that holds a library's digest; it is not put into the library itself, whose format signatures may cover."""
-    return library.with_name(f"{library.name}.sha256")
-
-
-def _is_whole(library: Path) -> bool:
-    """Whether a library is as it was built, and nobody else could write to it.
-
-    The system's loader does not look: damaged code ends the process, or computes something else.
-    """
-    try:
-        sealed = _seal(library).read_bytes()
-        return sealed == digest(library.name, library.read_bytes()).encode() and not writers(library)
-    except OSError:
-        return False
-
-
 def _target(source: str, stem: str, compiler: Compiler) -> Path:
-    machine = (_cpu(), sys.platform, platform.machine(), str(struct.calcsize("P")))
-    parts = (source, *flags(compiler), *compiler.command, compiler.version, *machine)
-    key = hashlib.sha256("\0".join(parts).encode("utf-8")).hexdigest()[:16]
+    key = key_of(source, compiler, *flags(compiler), *link_flags(compiler))
     return cache_dir() / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', stem)[:LONGEST]}-{key}{SUFFIX}"
-
-
-@functools.cache
-def _cpu() -> str:
-    """What tells apart CPUs that may not run each other's native code."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-            block: list[str] = []
-            for line in lines:  # the first core's block is enough; there may be hundreds
-                if not line.strip():
-                    break
-                block.append(line)
-    except OSError:
-        return platform.processor()
-    telling = ("model name", "flags", "Features", "CPU implementer", "CPU part", "CPU variant", "cpu", "isa")
-    return "".join(line for line in block if line.partition(":")[0].strip() in telling)
 
 
 def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> None:
@@ -138,46 +100,30 @@ def _compile(source: str, target: Path, compiler: Compiler, replace: bool) -> No
     with writing(target), tempfile.TemporaryDirectory(prefix="build-", dir=cache, ignore_cleanup_errors=True) as folder:
         text, library = Path(folder, target.stem + ".c"), Path(folder, target.name)
         text.write_text(source, encoding="utf-8", newline="\n")
-        fault, output = _run(_command(compiler, text, library), cache)
-        if not fault and not library.is_file():
-            fault = "it reported success but wrote no library"
+        fault, output = "", ""
+        # What several units cannot be made of is compiled as one, whose messages are those to show.
+        if not built_from_units(source, library, compiler, cache):
+            fault, output = run(_command(compiler, text, library), cache)
+            if not fault and not library.is_file():
+                fault = "it reported success but wrote no library"
         if fault:
             kept = target.with_suffix(".c")
             os.replace(text, kept)
             raise CompileError(_failure(compiler, kept, target, fault, output))
         with library.open("r+b") as written:  # a power cut must not leave the name on an empty file
             os.fsync(written.fileno())
-        if not replace and _is_whole(target):  # another process was quicker
+        if not replace and is_whole(target):  # another process was quicker
             return
         library.chmod(stat.S_IRWXU)
         sealed = digest(target.name, library.read_bytes()).encode()
         try:
             os.replace(library, target)
         except PermissionError:  # Windows: another process was first and has loaded it
-            if not _is_whole(target):
+            if not is_whole(target):
                 raise
             return
         # Whoever looks before the digest is there takes the library for a damaged one and builds it, too: time is lost, no more.
-        write_whole(_seal(target), lambda file: file.write(sealed), PRIVATE, sync=False)
-
-
-def _run(command: list[str], cache: Path) -> tuple[str, str]:
-    """(what went wrong, or "", and the compiler's output)."""
-    # zig keeps files between runs; they belong with ours, also where the home folder cannot be written.
-    environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache / "zig"), **os.environ}
-    try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env=environment,
-        )
-    except OSError as error:
-        return "it did not start", str(error)
-    return f"it ended with code {done.returncode}" if done.returncode else "", done.stdout
+        write_whole(seal_of(target), lambda file: file.write(sealed), PRIVATE, sync=False)
 
 
 def _failure(compiler: Compiler, kept: Path, target: Path, fault: str, output: str) -> str:
@@ -193,7 +139,7 @@ def _failure(compiler: Compiler, kept: Path, target: Path, fault: str, output: s
 
 
 def _command(compiler: Compiler, source: Path, library: Path) -> list[str]:
-    return [*compiler.command, "-o", str(library), str(source), *flags(compiler)]
+    return [*compiler.command, "-o", str(library), str(source), *flags(compiler), *link_flags(compiler)]
 
 
 def _sweep(folder: Path) -> None:

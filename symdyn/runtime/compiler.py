@@ -89,6 +89,11 @@ def flags(compiler: Compiler) -> list[str]:
     ]
 
 
+def link_flags(compiler: Compiler) -> list[str]:
+    """What links a library further: on Linux its functions call each other directly, not by a table that may be changed."""
+    return ["-Wl,-Bsymbolic-functions"] if LINUX and compiler.kind in ("gcc", "clang") else []
+
+
 def _family(flag: str) -> tuple[str, ...]:
     """How options start that say the same as this one."""
     if flag in ("-march=native", "-mcpu=native"):

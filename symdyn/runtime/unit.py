@@ -19,6 +19,7 @@ from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler
 from symdyn.runtime.raised import in_prologue, raise_by_text
 from symdyn.runtime.stored import PRIVATE, import_text, write_whole
+from symdyn.translation_units import translation_units
 
 NOT_FINITE = -1
 
@@ -64,13 +65,16 @@ class CUnit:
     def __init__(self, source: str, metadata: Mapping[str, Any], compiler: Compiler) -> None:
         self.metadata = metadata
         self.source = source
+        # The integrator in a unit of its own has the same names for all mechanisms.
+        self._of_runtime = "symdyn" if len(translation_units(source)) > 1 else metadata["name"]
         self.library = cache.load(source, metadata["name"], compiler)
         # Evaluations are too short to be worth releasing the interpreter lock for; integrations are not.
         self.quick = ctypes.PyDLL(self.library._name)
 
     def function(self, name: str, quick: bool = False) -> Any:
         """An exported function of the library, without the module's prefix."""
-        return getattr(self.quick if quick else self.library, f"{self.metadata['name']}_{name}")
+        prefix = self._of_runtime if name.startswith("simulation_") else self.metadata["name"]
+        return getattr(self.quick if quick else self.library, f"{prefix}_{name}")
 
     def reason(self, code: int) -> str:
         """What a return code means."""

@@ -69,6 +69,33 @@ static inline int symdyn_all_finite(const double *values, int n) {
     return 1;
 }
 
+#define SYMDYN_NAME(function) four_bar_##function
+#define SYMDYN_NX 6
+#define SYMDYN_NQ 3
+#define SYMDYN_NU 3
+#define SYMDYN_NIN 0
+#define SYMDYN_ORDER 8
+#define SYMDYN_SLOPE_AT_END 0
+#define SYMDYN_SECOND_ERROR 1
+
+// What the right-hand side needs besides t and x.
+
+// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
+// cubic, its ends held), constants.
+typedef struct {
+    const double *p, *c, *inputs;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
+    int (*function)(double t, const double *x, double *inputs);
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} symdyn_problem;
+
+enum { SYMDYN_INPUT_STOPPED = 100000 };
+
+#define SYMDYN_SOLVER static
 #define SYMDYN_SADDLE_N 3
 #define SYMDYN_SADDLE_M 2
 #define SYMDYN_LOOSE 1e-14
@@ -164,7 +191,7 @@ static void symdyn_substitute(int n, int row, const double *A, double *r) {
 
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
 // in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = SYMDYN_SMOOTHED.
-static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
+SYMDYN_SOLVER int symdyn_multipliers(int n, int m, const double *in, double *lam) {
     const double *const rows = in + m * n, *const columns = rows + m, *const g = columns + n;
     const double smoothed = SYMDYN_SMOOTHED * SYMDYN_SMOOTHED;
     double A[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_M], C[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_N],
@@ -221,7 +248,7 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
 // residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
-static int symdyn_saddle(int n, int m, const double *in, double *x) {
+SYMDYN_SOLVER int symdyn_saddle(int n, int m, const double *in, double *x) {
     const double *const m_in = in + 1, *const c_in = m_in + n * (n + 1) / 2, *const s = c_in + m * n, *const w = s + m;
     const double *const f = w + n, *const d = f + n;
     double M[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], B[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N],
@@ -1289,7 +1316,6 @@ typedef struct {
     long failed;
 } four_bar_frame;
 
-
 SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame);
 SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
@@ -1350,40 +1376,6 @@ SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame) {
     return 0;
 }
 
-// ---- Integration of x_dot = four_bar_rhs without leaving this file: dop853
-// Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
-// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
-// Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
-// error estimate, p. 254). The coefficients are those of the authors' code DOP853.
-
-#define SYMDYN_NAME(function) four_bar_##function
-#define SYMDYN_NX 6
-#define SYMDYN_NQ 3
-#define SYMDYN_NU 3
-#define SYMDYN_NIN 0
-#define SYMDYN_ORDER 8
-#define SYMDYN_SLOPE_AT_END 0
-#define SYMDYN_SECOND_ERROR 1
-
-// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
-
-// What the right-hand side needs besides t and x.
-
-// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
-// cubic, its ends held), constants.
-typedef struct {
-    const double *p, *c, *inputs;
-    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
-    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
-    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
-    const double *stops;
-    int (*function)(double t, const double *x, double *inputs);
-    int project;    // whether states are kept on what holds for them after every step
-    double length;  // that residuals are measured by, m
-} symdyn_problem;
-
-enum { SYMDYN_INPUT_STOPPED = 100000 };
-
 // The functions that the integrator calls, at t and x, or for bounds in place of these.
 static int symdyn_field(const symdyn_problem *problem, double t, const double *x, double *out) {
     (void)problem;
@@ -1391,6 +1383,14 @@ static int symdyn_field(const symdyn_problem *problem, double t, const double *x
     (void)x;
     return four_bar_rhs(x, x + 3, problem->p, problem->c, out);
 }
+
+// ---- Integration of x_dot = f(t, x) without leaving this file: dop853
+// Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
+// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
+// Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
+// error estimate, p. 254). The coefficients are those of the authors' code DOP853.
+
+// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
 
 // Coefficients of the method: numbers of stages, of slopes, of rows of the dense output; times and slopes of stages.
 #define SYMDYN_STAGES 12

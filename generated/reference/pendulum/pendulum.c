@@ -52,6 +52,32 @@ static inline int symdyn_all_finite(const double *values, int n) {
     return 1;
 }
 
+#define SYMDYN_NAME(function) pendulum_##function
+#define SYMDYN_NX 2
+#define SYMDYN_NQ 1
+#define SYMDYN_NU 1
+#define SYMDYN_NIN 0
+#define SYMDYN_ORDER 8
+#define SYMDYN_SLOPE_AT_END 0
+#define SYMDYN_SECOND_ERROR 1
+
+// What the right-hand side needs besides t and x.
+
+// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
+// cubic, its ends held), constants.
+typedef struct {
+    const double *p, *c, *inputs;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
+    int (*function)(double t, const double *x, double *inputs);
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} symdyn_problem;
+
+enum { SYMDYN_INPUT_STOPPED = 100000 };
+
 // Sines and cosines of several angles at once.
 
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
@@ -255,7 +281,6 @@ typedef struct {
     long failed;
 } pendulum_frame;
 
-
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame);
 SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
@@ -326,40 +351,6 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
     return 0;
 }
 
-// ---- Integration of x_dot = pendulum_rhs without leaving this file: dop853
-// Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
-// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
-// Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
-// error estimate, p. 254). The coefficients are those of the authors' code DOP853.
-
-#define SYMDYN_NAME(function) pendulum_##function
-#define SYMDYN_NX 2
-#define SYMDYN_NQ 1
-#define SYMDYN_NU 1
-#define SYMDYN_NIN 0
-#define SYMDYN_ORDER 8
-#define SYMDYN_SLOPE_AT_END 0
-#define SYMDYN_SECOND_ERROR 1
-
-// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
-
-// What the right-hand side needs besides t and x.
-
-// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
-// cubic, its ends held), constants.
-typedef struct {
-    const double *p, *c, *inputs;
-    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
-    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
-    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
-    const double *stops;
-    int (*function)(double t, const double *x, double *inputs);
-    int project;    // whether states are kept on what holds for them after every step
-    double length;  // that residuals are measured by, m
-} symdyn_problem;
-
-enum { SYMDYN_INPUT_STOPPED = 100000 };
-
 // The functions that the integrator calls, at t and x, or for bounds in place of these.
 static int symdyn_field(const symdyn_problem *problem, double t, const double *x, double *out) {
     (void)problem;
@@ -367,6 +358,14 @@ static int symdyn_field(const symdyn_problem *problem, double t, const double *x
     (void)x;
     return pendulum_rhs(x, x + 1, problem->p, problem->c, out);
 }
+
+// ---- Integration of x_dot = f(t, x) without leaving this file: dop853
+// Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
+// E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
+// Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
+// error estimate, p. 254). The coefficients are those of the authors' code DOP853.
+
+// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
 
 // Coefficients of the method: numbers of stages, of slopes, of rows of the dense output; times and slopes of stages.
 #define SYMDYN_STAGES 12

@@ -6,7 +6,7 @@
 
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
 // in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = SYMDYN_SMOOTHED.
-static int symdyn_multipliers(int n, int m, const double *in, double *lam) {
+SYMDYN_SOLVER int symdyn_multipliers(int n, int m, const double *in, double *lam) {
     const double *const rows = in + m * n, *const columns = rows + m, *const g = columns + n;
     const double smoothed = SYMDYN_SMOOTHED * SYMDYN_SMOOTHED;
     double A[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_M], C[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_N],
