@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# The line that a further unit begins with, and what follows it where other mechanisms have the same unit.
-MARK = "// ==== Translation unit"
-SHARED = f"{MARK}, the same for all mechanisms of these sizes"
+# The line that a further unit begins with.
+_MARK = re.compile(r"^// ==== Translation unit(?P<shared> shared)?(?: (?P<level>-O\d))?\n", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class TranslationUnit:
-    """A text that compiles by itself; shared: other mechanisms have the same."""
+    """A text that compiles by itself.
+
+    shared   other mechanisms have the same
+    level    the option of its optimization, if it is not that of all
+    """
 
     text: str
     shared: bool = False
+    level: str = ""
 
 
 def joined(units: Sequence[TranslationUnit]) -> str:
     """One text; `translation_units` gives them again."""
-    return units[0].text + "".join(f"{SHARED if unit.shared else MARK}\n{unit.text}" for unit in units[1:])
+    marks = (f"// ==== Translation unit{' shared' * unit.shared}{f' {unit.level}' * bool(unit.level)}\n" for unit in units[1:])
+    return units[0].text + "".join(mark + unit.text for mark, unit in zip(marks, units[1:], strict=True))
 
 
 def translation_units(text: str) -> list[TranslationUnit]:
     """The units of a text, the first without a mark."""
-    units: list[TranslationUnit] = []
-    lines: list[str] = []
-    shared = False
-    for line in text.splitlines(keepends=True):
-        if line.rstrip("\n") in (MARK, SHARED):
-            units.append(TranslationUnit("".join(lines), shared))
-            lines, shared = [], line.rstrip("\n") == SHARED
-        else:
-            lines.append(line)
-    return [*units, TranslationUnit("".join(lines), shared)]
+    first, *rest = _MARK.split(text)
+    further = zip(rest[::3], rest[1::3], rest[2::3], strict=True)
+    return [TranslationUnit(first), *(TranslationUnit(text, bool(shared), level or "") for shared, level, text in further)]

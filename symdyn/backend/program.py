@@ -25,6 +25,7 @@ class Program:
 
     reasons   what the return codes 1, 2, ... mean
     kernels   numeric algorithms that are called: name -> largest size of each kind
+    one_size  those of them that are called with one size only
     user_functions   functions of the user that are called, by name
     n_c       number of constants that the prologue computes
     """
@@ -35,6 +36,7 @@ class Program:
     reasons: tuple[str, ...]
     kernels: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     user_functions: tuple[UserFunction, ...] = ()
+    one_size: frozenset[str] = frozenset()
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
@@ -63,7 +65,7 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
         else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
     prologue = Writer(dialect, whole, places, {}, codes, late).prologue(constants)
-    return Program(functions, prologue, len(constants), tuple(codes), _kernels(whole), called(whole))
+    return Program(functions, prologue, len(constants), tuple(codes), *_kernels(whole))
 
 
 def _late(whole: Tape, tapes: Mapping[str, Tape], otherwise: Mapping[str, Tape]) -> set[Node]:
@@ -88,13 +90,14 @@ def _either(name: str, title: str, regular: Function, otherwise: Function) -> Fu
                     regular.longest_chain, regular=regular, otherwise=otherwise)
 
 
-def _kernels(tape: Tape) -> dict[str, tuple[int, ...]]:
-    sizes: dict[str, tuple[int, ...]] = {}
+def _kernels(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction, ...], frozenset[str]]:
+    """Numeric algorithms with their largest sizes, functions of the user, and the algorithms that are called with one size."""
+    sizes: dict[str, set[tuple[int, ...]]] = {}
     for node in tape.steps:
         if node.op == "call" and not isinstance(node.args[0], UserFunction):
-            kernel = node.args[0]
-            sizes[kernel.name] = tuple(map(max, zip(kernel.sizes, sizes.get(kernel.name, kernel.sizes), strict=True)))
-    return dict(sorted(sizes.items()))
+            sizes.setdefault(node.args[0].name, set()).add(tuple(node.args[0].sizes))
+    largest = {name: tuple(map(max, zip(*found, strict=True))) for name, found in sorted(sizes.items())}
+    return largest, called(tape), frozenset(name for name, found in sizes.items() if len(found) == 1)
 
 
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],

@@ -288,7 +288,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
-        "solver_sizes": _solver_sizes(program.kernels),
+        "solver_sizes": _solver_sizes(program),
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call, "arguments_of": uses, "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
@@ -297,14 +297,16 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     }
 
 
-def _solver_sizes(kernels: Mapping[str, Sequence[int]]) -> list[tuple[str, str]]:
-    """Macros that the solvers in C read: their largest sizes, their numbers."""
+def _solver_sizes(program: Program) -> list[tuple[str, str]]:
+    """Macros that the solvers in C read: their largest sizes, whether all calls have these, their numbers."""
     result: dict[str, str] = {}
     for kernel, numbers in (("saddle", {"LOOSE": LOOSE, "MASSLESS": MASSLESS, "ROUNDS": ROUNDS}),
                             ("multipliers", {"SMOOTHED": SMOOTHED, "ROUNDS": ROUNDS, "CLEANINGS": CLEANINGS})):
-        if f"symdyn_{kernel}" in kernels:
-            n, m = kernels[f"symdyn_{kernel}"]
+        if f"symdyn_{kernel}" in program.kernels:
+            n, m = program.kernels[f"symdyn_{kernel}"]
+            one_size = f"symdyn_{kernel}" in program.one_size and m > 0
             result |= {f"SYMDYN_{kernel.upper()}_N": repr(n), f"SYMDYN_{kernel.upper()}_M": repr(max(m, 1)),
+                       f"SYMDYN_{kernel.upper()}_ONE_SIZE": repr(int(one_size)),
                        **{f"SYMDYN_{key}": repr(value) for key, value in numbers.items()}}
     return list(result.items())
 

@@ -1,8 +1,8 @@
 """Divides the text of a mechanism in C into translation units that compilers take side by side.
 
 A template marks its stretches by lines: `//: base`, what every unit needs; `//: head`, what functions of the model need besides;
-`//: piece`, one of these functions; `//: unit`, a unit of its own; `//: shared`, one that needs the base only and that other
-mechanisms have, too.
+`//: piece`, one of these functions; `//: shared`, a unit that needs the base only and that other mechanisms have, too, with its
+level of optimization if that is not the usual one; `//: common`, what further shared units need besides.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from collections.abc import Iterator, Sequence
 from symdyn.translation_units import TranslationUnit, joined
 
 # Lines of functions that make a unit of the model worth the start of a compiler, and most units of these.
-LEAST_LINES, MOST_UNITS = 350, 8
-_MARK = re.compile(r"^//: (\w+)\n", re.MULTILINE)
-_SOLVER = "SYMDYN_SOLVER "
-_GUARD = "SYMDYN_WHOLE_FILE"
+LEAST_LINES, MOST_UNITS = 600, 8
+_MARK = re.compile(r"^//: (\w+)(?: (-O\d)?)?\n", re.MULTILINE)
+_LINKED = re.compile(r"^SYMDYN_LINKED int symdyn_(?:saddle|multipliers|catenary|cube)\(.*\)(?= \{$)", re.MULTILINE)
+# Defined at the ends of units in one file.
+_MODEL, _COMMON = "SYMDYN_MODEL_ABOVE", "SYMDYN_COMMON_ABOVE"
 
 
 def whole(text: str) -> str:
@@ -27,22 +28,27 @@ def whole(text: str) -> str:
 def divided(text: str) -> str:
     """The text as several units, marked for `translation_units`; as one unit it compiles, too."""
     heading, *rest = _MARK.split(text)
-    stretches = list(zip(rest[::2], rest[1::2], strict=True))
-    base = "".join(t for kind, t in stretches if kind == "base")
-    head = "".join(t for kind, t in stretches if kind == "head")
-    pieces = [t for kind, t in stretches if kind == "piece"]
-    declared = "".join(f"{line};\n" for piece in pieces for line in _signatures(piece))
+    stretches = list(zip(rest[::3], rest[1::3], rest[2::3], strict=True))
+    base, head = ("".join(t for kind, _, t in stretches if kind == wanted) for wanted in ("base", "head"))
+    pieces = [t for kind, _, t in stretches if kind == "piece"]
+    linked = "".join(f"{line};\n" for kind, _, t in stretches if kind == "shared" for line in _LINKED.findall(t))
+    declared = linked + "".join(f"{line};\n" for piece in pieces for line in _signatures(piece))
     first, *others = _packed(pieces)
-    solvers = [t for kind, t in stretches if kind == "shared"]
-    prototypes = "".join(f"{line};\n" for t in solvers for line in _signatures(t) if line.startswith(_SOLVER))
-    units = [TranslationUnit(f"{heading}{base}{head}\n{prototypes}{declared}{first}#define {_GUARD}\n")]
-    units += [TranslationUnit(f"{_guarded(base + head)}{prototypes}{declared}{piece}") for piece in others]
-    units += [TranslationUnit(f"{_guarded(base)}{t}", True) for t in solvers]
+    units = [TranslationUnit(f"{heading}{base}{head}\n{declared}{first}#define {_MODEL}\n")]
+    units += [TranslationUnit(f"{_unless(_MODEL, base + head)}{declared}{piece}") for piece in others]
+    common = ""
+    for kind, level, t in stretches:
+        if kind == "common":
+            common = t
+        elif kind == "shared":
+            before = _unless(_MODEL, base) + (_unless(_COMMON, common) if common else "")
+            units.append(TranslationUnit(f"{before}{t}{f'#define {_COMMON}' if common else ''}\n", True, level or ""))
     return joined(units)
 
 
-def _guarded(text: str) -> str:
-    return f"#if !defined({_GUARD})\n{text}#endif\n"
+def _unless(macro: str, text: str) -> str:
+    """Text that counts unless an earlier unit in the same file has it."""
+    return f"#if !defined({macro})\n{text}#endif\n"
 
 
 def _signatures(piece: str) -> Iterator[str]:

@@ -189,7 +189,7 @@ def source(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[st
 def _kernel(name: str) -> str:
     """The text of a numeric algorithm, its doubles made these numbers."""
     text = re.sub(r"//.*|#.*", "", (templates_folder() / "c" / "runtime" / f"{name}.h").read_text(encoding="utf-8"))
-    text = text.replace("SYMDYN_SOLVER ", "static ")
+    text = text.replace("SYMDYN_LINKED ", "static ")
     text = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)", lambda m: _FINER.get(m[1], m[1]) + "Q", text)
     return re.sub(r"\b(fabs|sqrt|tanh|log1p)(?=\()", r"\1q", re.sub(r"\bdouble\b", "quad", text))
 

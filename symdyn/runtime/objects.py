@@ -29,8 +29,9 @@ _WITH_OBJECTS = ("gcc", "clang")
 
 @dataclass(frozen=True)
 class _Job:
-    """A unit that is compiled: its text and its object; kept: where the object goes in the cache."""
+    """A unit that is compiled: its options, text and object; kept: where the object goes in the cache."""
 
+    options: list[str]
     source: Path
     made: Path
     kept: Path | None
@@ -50,7 +51,7 @@ def built_from_units(source: str, library: Path, compiler: Compiler, cache: Path
             continue
         text = folder / f"unit_{k}.c"
         text.write_text(unit.text, encoding="utf-8", newline="\n")
-        jobs.append(_Job(text, folder / f"unit_{k}.o", kept))
+        jobs.append(_Job(_object_flags(compiler, unit), text, folder / f"unit_{k}.o", kept))
         objects.append(jobs[-1].made)
     # Long texts first, so that no core waits for one of them at the end.
     jobs.sort(key=lambda job: -job.source.stat().st_size)
@@ -67,7 +68,7 @@ def built_from_units(source: str, library: Path, compiler: Compiler, cache: Path
 
 
 def _kept(unit: TranslationUnit, compiler: Compiler, cache: Path) -> Path | None:
-    return cache / f"unit-{key_of(unit.text, compiler, *_object_flags(compiler))}.o" if unit.shared else None
+    return cache / f"unit-{key_of(unit.text, compiler, *_object_flags(compiler, unit))}.o" if unit.shared else None
 
 
 def _keep(made: Path, kept: Path) -> None:
@@ -79,9 +80,10 @@ def _keep(made: Path, kept: Path) -> None:
         write_whole(seal_of(kept), lambda file: file.write(sealed), PRIVATE, sync=False)
 
 
-def _object_flags(compiler: Compiler) -> list[str]:
-    """Flags for one object: those for a library without the library's."""
-    return ["-c", *(flag for flag in flags(compiler) if flag != "-shared" and not flag.startswith("-l"))]
+def _object_flags(compiler: Compiler, unit: TranslationUnit) -> list[str]:
+    """Flags for the object of a unit: those for a library without the library's, with the unit's level of optimization."""
+    chosen = [flag for flag in flags(compiler) if flag != "-shared" and not flag.startswith("-l")]
+    return ["-c", *(unit.level if unit.level and flag.startswith("-O") else flag for flag in chosen)]
 
 
 def _compiled(jobs: Iterable[_Job], compiler: Compiler, cache: Path) -> bool:
@@ -93,7 +95,7 @@ def _compiled(jobs: Iterable[_Job], compiler: Compiler, cache: Path) -> bool:
             while (waiting and good) or running:
                 while waiting and good and len(running) < _cores():
                     job = waiting.pop(0)
-                    command = [*compiler.command, "-o", str(job.made), str(job.source), *_object_flags(compiler)]
+                    command = [*compiler.command, "-o", str(job.made), str(job.source), *job.options]
                     running.append((job, _started(command, cache, output)))
                 for entry in list(running):
                     if entry[1].poll() is not None:

@@ -78,6 +78,8 @@ typedef struct {
 
 enum { SYMDYN_INPUT_STOPPED = 100000 };
 
+#define SYMDYN_LINKED static
+
 // Sines and cosines of several angles at once.
 
 // Sine and cosine of an angle x, |x| <= 2^16*pi/2. Measured, the error is below 0.8 ulp.
@@ -352,20 +354,19 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
 }
 
 // The functions that the integrator calls, at t and x, or for bounds in place of these.
-static int symdyn_field(const symdyn_problem *problem, double t, const double *x, double *out) {
+SYMDYN_LINKED int symdyn_field(const symdyn_problem *problem, double t, const double *x, double *out) {
     (void)problem;
     (void)t;
     (void)x;
     return pendulum_rhs(x, x + 1, problem->p, problem->c, out);
 }
-
 // ---- Integration of x_dot = f(t, x) without leaving this file: dop853
 // Dormand-Prince 8(5,3): order 8, error estimates of orders 5 and 3, dense output of order 7
 // E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I: Nonstiff Problems, 2nd ed.,
 // Springer 1993: sections II.4 (step size; first step, p. 169), II.6 (dense output, p. 194), II.10 (method and
 // error estimate, p. 254). The coefficients are those of the authors' code DOP853.
 
-// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
+// What all parts of the integrator of one mechanism need. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
 
 // Coefficients of the method: numbers of stages, of slopes, of rows of the dense output; times and slopes of stages.
 #define SYMDYN_STAGES 12
@@ -547,8 +548,10 @@ static inline double symdyn_root(double v) {
     for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + h * (SYMDYN_A_##j(k, i));                                                  \
     if ((failure = symdyn_eval(run, SYMDYN_C_##j(t, h, t_new), y, k[j]))) return failure;
 
+// A step of an embedded explicit Runge-Kutta pair, and its polynomial.
+
 // The step of length h (with sign) from run->t to t_new: its end and the error relative to the tolerance.
-static int symdyn_try(
+SYMDYN_LINKED int symdyn_try(
     symdyn_run *run, double h, double t_new, double *restrict x_new, double *restrict xd_new, double *restrict err) {
     const double t = run->t, *restrict const x = run->x;
     double (*restrict const k)[SYMDYN_NX] = run->method.k, y[SYMDYN_NX], sum = 0.0, sum2 = 0.0;
@@ -570,37 +573,9 @@ static int symdyn_try(
     return 0;
 }
 
-// The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
-static int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err) {
-    symdyn_run again = *run;
-    double xd[SYMDYN_NX];
-    again.t = from_end ? run->t : run->t_old;
-    for (int i = 0; i < SYMDYN_NX; i++) again.x[i] = from_end ? run->x[i] : run->x_old[i];
-    int failure = symdyn_eval(&again, again.t, again.x, again.xd);
-    if (!failure) failure = symdyn_try(&again, s - again.t, s, x_out, xd, err);
-    run->n_evaluations = again.n_evaluations;
-    return failure ? symdyn_fail(run, failure, again.reason, again.bad_index, again.t_fail, again.x_fail) : 0;
-}
-
-// Whether the polynomial of the latest step is off by some ten tolerances, by its defect a quarter into it. Where stability
-// limits steps it swings: what is left of stiff motion, which the end damps, grows within the step.
-static int symdyn_is_rough(symdyn_run *run) {
-    const double theta = 0.25, t = run->t_old + theta * run->h_old;
-    double y[SYMDYN_NX], f[SYMDYN_NX], slope[SYMDYN_NX];
-    for (int i = 0; i < SYMDYN_NX; i++) {
-        double value = run->method.dense[SYMDYN_DENSE - 1][i], rate = 0.0;
-        for (int j = SYMDYN_DENSE - 2; j >= 0; j--) {  // by theta, or by 1 - theta, and the polynomials of higher order
-            const double factor = j % 2 ? theta : 1.0 - theta;
-            rate = factor * rate + (j % 2 ? value : -value);
-            value = run->method.dense[j][i] + factor * value;
-        }
-        y[i] = run->x_old[i] + theta * value;
-        slope[i] = (value + theta * rate) / run->h_old;
-    }
-    if (symdyn_eval(run, t, y, f)) return 1;
-    for (int i = 0; i < SYMDYN_NX; i++) f[i] = 0.25 * run->h_old * (f[i] - slope[i]);
-    return symdyn_square(run, f, run->x_old) > 100.0;
-}
+// See explicit_again.h.
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err);
+SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run);
 
 // Row j of the dense output.
 #define SYMDYN_DENSE_ROW(j) d[(j) + 3][i] = h * (SYMDYN_D_##j(k, i));
@@ -628,7 +603,7 @@ static int symdyn_prepare_dense(symdyn_run *run) {
 }
 
 // The state at s within the latest step.
-static int symdyn_between(symdyn_run *run, double s, double *x_out) {
+SYMDYN_LINKED int symdyn_between(symdyn_run *run, double s, double *x_out) {
     const double theta = (s - run->t_old) / run->h_old, rest = 1.0 - theta;
     int failure;
     if (!run->dense_ready && (failure = symdyn_prepare_dense(run))) return failure;
@@ -642,6 +617,42 @@ static int symdyn_between(symdyn_run *run, double s, double *x_out) {
         x_out[i] = run->x_old[i] + theta * value;
     }
     return 0;
+}
+
+// The parts of the integrator of one mechanism, in order.
+
+// Where the polynomial of an embedded explicit Runge-Kutta pair is not good enough, and steps across singular configurations.
+
+// The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
+SYMDYN_LINKED int symdyn_by_a_step(symdyn_run *run, int from_end, double s, double *x_out, double *err) {
+    symdyn_run again = *run;
+    double xd[SYMDYN_NX];
+    again.t = from_end ? run->t : run->t_old;
+    for (int i = 0; i < SYMDYN_NX; i++) again.x[i] = from_end ? run->x[i] : run->x_old[i];
+    int failure = symdyn_eval(&again, again.t, again.x, again.xd);
+    if (!failure) failure = symdyn_try(&again, s - again.t, s, x_out, xd, err);
+    run->n_evaluations = again.n_evaluations;
+    return failure ? symdyn_fail(run, failure, again.reason, again.bad_index, again.t_fail, again.x_fail) : 0;
+}
+
+// Whether the polynomial of the latest step is off by some ten tolerances, by its defect a quarter into it. Where stability
+// limits steps it swings: what is left of stiff motion, which the end damps, grows within the step.
+SYMDYN_LINKED int symdyn_is_rough(symdyn_run *run) {
+    const double theta = 0.25, t = run->t_old + theta * run->h_old;
+    double y[SYMDYN_NX], f[SYMDYN_NX], slope[SYMDYN_NX];
+    for (int i = 0; i < SYMDYN_NX; i++) {
+        double value = run->method.dense[SYMDYN_DENSE - 1][i], rate = 0.0;
+        for (int j = SYMDYN_DENSE - 2; j >= 0; j--) {  // by theta, or by 1 - theta, and the polynomials of higher order
+            const double factor = j % 2 ? theta : 1.0 - theta;
+            rate = factor * rate + (j % 2 ? value : -value);
+            value = run->method.dense[j][i] + factor * value;
+        }
+        y[i] = run->x_old[i] + theta * value;
+        slope[i] = (value + theta * rate) / run->h_old;
+    }
+    if (symdyn_eval(run, t, y, f)) return 1;
+    for (int i = 0; i < SYMDYN_NX; i++) f[i] = 0.25 * run->h_old * (f[i] - slope[i]);
+    return symdyn_square(run, f, run->x_old) > 100.0;
 }
 
 // States within the latest step, and the start of a run.

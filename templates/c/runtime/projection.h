@@ -5,7 +5,7 @@
 
 #if SYMDYN_HAS_UNIT_GROUPS
 // Divide vectors of length 1 by their norm.
-static void symdyn_normalise(double *x) {
+SYMDYN_LINKED void symdyn_normalise(double *x) {
     for (int group = 0; group < SYMDYN_UNIT_GROUPS; group++) {
         const int *const index = symdyn_unit_groups[group];
         double square = x[index[0]] * x[index[0]];
@@ -96,7 +96,7 @@ static int symdyn_corrections(symdyn_run *run, double t, double *x) {
 #endif
 
 // Project x at t, in place: q first, then u. Returns 0 or PROJECTION_FAILED.
-static int symdyn_correct(symdyn_run *run, double t, double *x) {
+SYMDYN_LINKED int symdyn_correct(symdyn_run *run, double t, double *x) {
     run->dq = run->du = run->residual = 0.0;
     run->reason = run->of_speeds = 0;
     run->worst = -1;
@@ -116,7 +116,7 @@ static int symdyn_correct(symdyn_run *run, double t, double *x) {
 }
 
 // Project the end x of the step under way from run->x; xd becomes the derivative there. Returns 0 or a failure.
-static int symdyn_project_end(symdyn_run *run, double t, double *x, double *xd) {
+SYMDYN_LINKED int symdyn_project_end(symdyn_run *run, double t, double *x, double *xd) {
     double way = 0.0, size = 0.0, far[2] = {0.0, 0.0};
     int failure, moved = 0;
     run->end_moved = 0;

@@ -1,28 +1,14 @@
-// The parts of the integrator of one mechanism, in order. SYMDYN_MODEL: its sizes, tables and the functions that are integrated.
+// The parts of the integrator of one mechanism, in order.
 
-#include "problem.h"
-#include SYMDYN_MODEL
+#include "common.h"
 #if SYMDYN_EXPLICIT
-#include "explicit_state.h"
+#include "explicit.h"
 #endif
-#if SYMDYN_RADAU
-#include "radau_state.h"
-#endif
-#if SYMDYN_GAUSS
-#include "gauss_state.h"
-#endif
-#if SYMDYN_TAYLOR
-#include "taylor_state.h"
-#endif
-#if SYMDYN_EVENTS
-#include "events_state.h"
-#endif
-#include "run.h"
 #if SYMDYN_PROJECTS
 #include "projection.h"
 #endif
 #if SYMDYN_EXPLICIT
-#include "explicit.h"
+#include "explicit_again.h"
 #endif
 #if SYMDYN_RADAU
 #include "radau.h"

@@ -6,7 +6,7 @@
 // out: horizontal and vertical force at the fairlead of a line at rest, over its weight w L. in: horizontal and vertical distance
 // from the anchor over its length L; w L / EA; friction with the seabed. Newton's method for what Jonkman, NREL/TP-500-41958
 // (2007), writes for both cases: part of the line rests on the seabed, or none.
-SYMDYN_SOLVER int symdyn_catenary(int seabed, const double *in, double *out) {
+SYMDYN_LINKED int symdyn_catenary(int seabed, const double *in, double *out) {
     const double x = in[0], z = in[1], e = in[2], friction = in[3], d = sqrt(x * x + z * z);
     if (!(e >= 0.0 && friction >= 0.0 && d < 1e100) || (seabed && !(z > 0.0))) return 1;
     const double hanging =

@@ -32,7 +32,7 @@ static double symdyn_cube_corner(double a, double b, double s, double h, double 
 // the cut e.r = 0, by the length of (e1, e2, e3), which are the derivatives of the former by e_j; order 2: (20) the derivatives
 // of the latter by e_k. Returns 1 if e1, e2, e3 are 0, or anything is no number.
 // The cut is the graph z = h(x, y), along z depth changes most, over P, what the lines h = -1/2 and h = 1/2 leave of the square.
-SYMDYN_SOLVER int symdyn_cube(int order, const double *in, double *out) {
+SYMDYN_LINKED int symdyn_cube(int order, const double *in, double *out) {
     int x = 2, y = 3, z = 1, n = 0;
     if (fabs(in[2]) > fabs(in[1])) {
         z = 2;

@@ -1,12 +1,16 @@
 // Multipliers of least norm; see Multipliers in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
-// all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M.
+// all calls are SYMDYN_MULTIPLIERS_N and SYMDYN_MULTIPLIERS_M, with SYMDYN_MULTIPLIERS_ONE_SIZE those of each.
 #pragma once
 
 #include "symdyn_factors.h"
 
 // lam (m) of C^T lam = g of least norm after scaling; the rows of C (m x n) perhaps dependent.
 // in: C, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam), e = SYMDYN_SMOOTHED.
-SYMDYN_SOLVER int symdyn_multipliers(int n, int m, const double *in, double *lam) {
+SYMDYN_LINKED int symdyn_multipliers(int n, int m, const double *in, double *lam) {
+#if SYMDYN_MULTIPLIERS_ONE_SIZE
+    n = SYMDYN_MULTIPLIERS_N;
+    m = SYMDYN_MULTIPLIERS_M;
+#endif
     const double *const rows = in + m * n, *const columns = rows + m, *const g = columns + n;
     const double smoothed = SYMDYN_SMOOTHED * SYMDYN_SMOOTHED;
     double A[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_M], C[SYMDYN_MULTIPLIERS_M][SYMDYN_MULTIPLIERS_N],

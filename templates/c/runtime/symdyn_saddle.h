@@ -1,5 +1,5 @@
 // The iterated augmented Lagrangian; see Saddle in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of
-// all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M.
+// all calls are SYMDYN_SADDLE_N and SYMDYN_SADDLE_M, with SYMDYN_SADDLE_ONE_SIZE those of each.
 #pragma once
 
 #include "symdyn_factors.h"
@@ -27,7 +27,11 @@ static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
 // in: e, M lower triangle, C, scales of the rows (m) and columns (n) of C, f, d. Returns 1 if nothing holds some direction.
 // (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d), scaled, with a = M_kk/e^2; each round takes the
 // residual anew. Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988).
-SYMDYN_SOLVER int symdyn_saddle(int n, int m, const double *in, double *x) {
+SYMDYN_LINKED int symdyn_saddle(int n, int m, const double *in, double *x) {
+#if SYMDYN_SADDLE_ONE_SIZE
+    n = SYMDYN_SADDLE_N;
+    m = SYMDYN_SADDLE_M;
+#endif
     const double *const m_in = in + 1, *const c_in = m_in + n * (n + 1) / 2, *const s = c_in + m * n, *const w = s + m;
     const double *const f = w + n, *const d = f + n;
     double M[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N], B[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N],

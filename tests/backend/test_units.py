@@ -1,0 +1,129 @@
+"""Translation units of what is only loaded: each compiles by itself, all of them as one file; what is shared is the same text."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import symdyn as sd
+from symdyn.backend.units import LEAST_LINES
+from symdyn.pipeline import emit
+from symdyn.runtime import objects
+from symdyn.runtime.compiler import find_compiler, require_compiler
+from symdyn.runtime.unit import CUnit
+from symdyn.translation_units import TranslationUnit, joined, translation_units
+from tests.runtime.test_events import ball
+
+needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable", "-Werror")
+
+
+def text_of(equations: Any, method: str = "dop853") -> str:
+    names = [n for n in ("rhs", "position_correction", "velocity_correction", "length", "events", "event_resets")
+             if n == "rhs" or n in equations.quantities]
+    return next(iter(emit(equations, "c", names, standalone=False, method=method).files.values()))
+
+
+def compiled(text: str, folder: Path) -> None:
+    (folder / "unit.c").write_text(text)
+    done = subprocess.run([*require_compiler().command, *STRICT, "-fPIC", "-c", "-o", folder / "unit.o", folder / "unit.c"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_units_of_a_text() -> None:
+    units = [TranslationUnit("a\n"), TranslationUnit("b\n", True), TranslationUnit("c\n", True, "-O2"), TranslationUnit("d\n")]
+    assert translation_units(joined(units)) == units
+    assert translation_units("one\n") == [TranslationUnit("one\n")]
+
+
+@needs_c
+@pytest.mark.parametrize("method", ["dop853", "bs54", "radau5", "gauss"])
+@pytest.mark.parametrize("system", ["pendulum", "four_bar", "ball", "double_wishbone"])
+def test_each_unit_compiles_and_so_do_all_in_one_file(system: str, method: str, tmp_path: Path) -> None:
+    equations = ball().embedding() if system == "ball" else sd.systems.get(system).augmented() if system != "pendulum" else \
+        sd.systems.get(system).embedding()
+    text = text_of(equations, method)
+    units = translation_units(text)
+    assert len(units) >= (3 if method in ("dop853", "bs54") else 2)
+    for unit in units:
+        compiled(unit.text, tmp_path)
+    compiled(text, tmp_path)
+
+
+def test_long_models_have_several_units() -> None:
+    short, long = (translation_units(text_of(sd.systems.get(n).augmented())) for n in ("four_bar", "double_wishbone"))
+    own = [unit for unit in long if not unit.shared]
+    assert sum(not unit.shared for unit in short) == 1 < len(own)
+    assert all(unit.text.count("\n") < 4 * LEAST_LINES for unit in own)
+
+
+def test_what_is_shared_has_no_name_of_the_mechanism(derived: Callable[..., Any]) -> None:
+    first, second = ([unit.text for unit in translation_units(text_of(equations)) if unit.shared]
+                     for equations in (derived("double_pendulum"), sd.systems.get("n_link_pendulum", n=2).embedding()))
+    assert first == second and first
+    assert not any("double_pendulum" in text for text in first)
+
+
+def test_series_stay_in_one_unit(derived: Callable[..., Any]) -> None:
+    assert len(translation_units(text_of(derived("double_pendulum"), "taylor"))) == 1
+
+
+# -- objects in the cache
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def compilations(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    seen: list[list[str]] = []
+    original = objects._started
+    monkeypatch.setattr(objects, "_started", lambda command, *rest: (seen.append(command), original(command, *rest))[1])
+    return seen
+
+
+@needs_c
+def test_shared_units_are_compiled_once(cache: Path, derived: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    if require_compiler().kind not in ("gcc", "clang"):
+        pytest.skip("units are for gcc and clang")
+    seen = compilations(monkeypatch)
+    module = derived("double_pendulum").compile(backend="c")
+    a = module.simulate((0, 1), rtol=1e-9)
+    first = len(seen)
+    other = sd.systems.get("n_link_pendulum", n=2).embedding().compile(backend="c")
+    other.simulate((0, 1))
+    assert first == 3 and len(seen) == 4
+    for kept in cache.glob("unit-*.o"):
+        kept.write_bytes(b"damaged")
+    for library in cache.glob("double_pendulum-*"):
+        library.unlink()
+    again = derived("double_pendulum").compile(backend="c").simulate((0, 1), rtol=1e-9)
+    assert len(seen) == 7 and (again.x == a.x).all()
+
+
+@needs_c
+def test_units_and_one_file_give_the_same_bits(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    equations = sd.systems.get("double_wishbone").augmented()
+    apart = equations.compile(backend="c").simulate((0, 0.05))
+    monkeypatch.setattr(objects, "_WITH_OBJECTS", ())
+    for library in cache.iterdir():
+        if library.is_file():
+            library.unlink()
+    whole = equations.compile(backend="c").simulate((0, 0.05))
+    assert (whole.x == apart.x).all()
+
+
+@needs_c
+def test_a_unit_that_does_not_compile_is_reported_as_one_file(cache: Path, derived: Callable[..., Any]) -> None:
+    source = emit(derived("double_pendulum"), "c", ("rhs",), standalone=False)
+    text = next(iter(source.files.values())).replace("symdyn_propose(run);", "symdyn_propose(walk);")
+    with pytest.raises(sd.CompileError, match=r"(?s)Source kept at: .*double_pendulum-\w+\.c.*walk"):
+        CUnit(text, source.metadata, require_compiler())
+    assert not list(cache.glob("unit-*.o"))
