@@ -32,8 +32,8 @@ def divided(text: str) -> str:
     base, head = ("".join(t for kind, _, t in stretches if kind == wanted) for wanted in ("base", "head"))
     pieces = [t for kind, _, t in stretches if kind == "piece"]
     linked = "".join(f"{line};\n" for kind, _, t in stretches if kind == "shared" for line in _LINKED.findall(t))
-    declared = linked + "".join(f"{line};\n" for piece in pieces for line in _signatures(piece))
     first, *others = _packed(pieces)
+    declared = linked + "".join(f"{line};\n" for piece in pieces * bool(others) for line in _signatures(piece))
     units = [TranslationUnit(f"{heading}{base}{head}\n{declared}{first}#define {_MODEL}\n")]
     units += [TranslationUnit(f"{_unless(_MODEL, base + head)}{declared}{piece}") for piece in others]
     common = ""

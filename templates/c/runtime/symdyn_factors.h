@@ -1,6 +1,8 @@
 // Factors of symmetric matrices: shared by symdyn_saddle.h and symdyn_multipliers.h.
 #pragma once
 
+#include "prelude.h"
+
 // start - a_0 x_0 - ... - a_(n - 1) x_(n - 1), where the a are `step` numbers apart.
 static inline double symdyn_less(double start, int n, const double *a, int step, const double *x) {
     for (int i = 0; i < n; i++) start -= a[i * step] * x[i];

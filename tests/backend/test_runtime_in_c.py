@@ -1,0 +1,339 @@
+"""The runtime's C files as they are, with small models written by hand: known motions, a circle, a cubic, linear algebra."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symdyn import panels
+from symdyn.backend.integrated import Shape, sizes, switches
+from symdyn.backend.methods import METHODS
+from symdyn.backend.methods.gauss import COEFFICIENTS
+from symdyn.backend.source import _shipped, template_folders
+from symdyn.runtime.compiled import Problem
+from symdyn.runtime.compiler import find_compiler, require_compiler
+
+RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
+STRICT = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable",
+          "-Werror", "-fPIC", "-shared")
+SIGNATURE = "(const symdyn_problem *problem, double t, const double *x, double *out)"
+BOUNDED = "(const symdyn_problem *problem, const double *ud, double *out)"
+OSCILLATOR = {"field": "out[0] = x[1]; out[1] = -x[0];", "jacobian_x_at": "out[0] = 0; out[1] = 1; out[2] = -1; out[3] = 0;"}
+
+pytestmark = pytest.mark.skipif(find_compiler() is None or require_compiler().kind not in ("gcc", "clang"),
+                                reason="no compiler that takes these options")
+Build = Callable[..., ctypes.CDLL]
+
+
+@pytest.fixture
+def build(tmp_path: Path) -> Build:
+    """build(text): the library of a text that includes parts."""
+    def library(text: str, *options: str) -> ctypes.CDLL:
+        (tmp_path / "main.c").write_text(text)
+        made = tmp_path / "main.so"
+        done = subprocess.run([*require_compiler().command, *STRICT, *options, f"-I{RUNTIME}", f"-I{tmp_path}", "-o", made,
+                               tmp_path / "main.c", "-lm"], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return ctypes.CDLL(str(made))
+
+    return library
+
+
+def integrator(method: str, shape: Shape, functions: dict[str, str], tmp_path: Path, further: str = "",
+               **tables: Any) -> str:
+    """A text that includes runtime.c with a model: statements of its functions by their names."""
+    record = METHODS[method]
+    gathered = {"second_order": True} if method == "gauss" else {}
+    context = {"method": record, "unit_groups": shape.unit_groups, "projection": tables.get("projection"), "panels": panels,
+               "has_events": bool(shape.events), "events": shape.events, "resets": shape.resets, "n_x": shape.n_x,
+               "held": shape.held, "event_leaves": shape.leaves, "gauss": COEFFICIENTS}
+    if method.startswith("radau"):
+        assert record.gather is not None
+        context |= record.gather(None, None, None, None)
+    tables_text = _shipped(*template_folders()).get_template("c/interface.c.jinja").render(context)
+    bodies = "".join(f"static int symdyn_{name}{BOUNDED if name.endswith('_of') else SIGNATURE} {{\n(void)problem;\n"
+                     f"{'' if name.endswith('_of') else '(void)t, (void)x;'}\n{body}\nreturn 0;\n}}\n"
+                     for name, body in functions.items())
+    (tmp_path / "model.h").write_text(bodies + tables_text)
+    macros = dict(sizes(record, shape, gathered))
+    macros = {name: int(on) for name, on in switches(record, shape, gathered).items()} | macros
+    head = "".join(f"#define {name} {value}\n" for name, value in macros.items())
+    return (f'{head}#define SYMDYN_NAME(function) symdyn_##function\n#define SYMDYN_LINKED static\n'
+            f'#define SYMDYN_MODEL "model.h"\n#include "runtime.c"\n{further}')
+
+
+class Run:
+    """A run of a library made of runtime.c."""
+
+    def __init__(self, library: ctypes.CDLL, x0: list[float], span: tuple[float, float], rtol: float, first: float = 0.0,
+                 project: bool = False, look: int = 0) -> None:
+        self.library, self.n = library, len(x0)
+        library.symdyn_simulation_size.restype = ctypes.c_long
+        self.memory = ctypes.create_string_buffer(library.symdyn_simulation_size() + 64)
+        self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
+        self.problem = Problem(project=int(project), length=1.0)
+        given = [np.array(a, dtype=float) for a in ([*span, rtol, first, 0.0], x0, [rtol] * len(x0))]
+        assert library.symdyn_simulation_start(self.address, ctypes.byref(self.problem), *map(pointer, given)) == 0
+        if look:
+            library.symdyn_simulation_look(self.address, pointer(np.ones(look, dtype=np.intc)), ctypes.c_double(0.0))
+
+    def events(self, n_events: int) -> np.ndarray:
+        """Rows of which, time, state before, state after."""
+        rows = np.zeros((64 + 3 * n_events, 2 + 2 * self.n))
+        self.library.symdyn_simulation_events.restype = ctypes.c_long
+        return rows[:self.library.symdyn_simulation_events(self.address, pointer(rows))]
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """States at the times, after which the run is over."""
+        x, written = np.full((len(times), self.n), np.nan), ctypes.c_long(0)
+        given = ctypes.c_long(100_000), pointer(times), ctypes.c_long(len(times)), pointer(x), ctypes.byref(written)
+        status = self.library.symdyn_simulation_go(self.address, 0, *given)
+        assert status == 0 and written.value == len(times)
+        return x
+
+    def report(self) -> np.ndarray:
+        out = np.zeros(16 + 2 * self.n)
+        self.library.symdyn_simulation_report(self.address, pointer(out))
+        return out
+
+
+def pointer(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+# Steps of "taylor" need series: see tests/runtime/test_taylor.py.
+@pytest.mark.parametrize("method", [m for m in METHODS if m != "taylor"])
+def test_an_oscillator(method: str, build: Build, tmp_path: Path) -> None:
+    needed = {name: body for name, body in OSCILLATOR.items() if name == "field" or method.startswith("radau")}
+    library = build(integrator(method, Shape({"q": 1, "u": 1, "z": 0, "inputs": 0}, 0, (), ()), needed, tmp_path))
+    times = np.linspace(0, 10, 41)
+    run = Run(library, [1.0, 0.0], (0.0, 10.0), 1e-11)
+    np.testing.assert_allclose(run.at(times), np.column_stack([np.cos(times), -np.sin(times)]), rtol=0, atol=2e-8)
+    report = run.report()
+    assert report[0] == 10.0 and report[2] > 5 and report[4] > report[2]
+    back = Run(library, [np.cos(10.0), -np.sin(10.0)], (10.0, 0.0), 1e-11).at(np.array([0.0]))
+    np.testing.assert_allclose(back, [[1.0, 0.0]], rtol=0, atol=2e-8)
+
+
+CIRCLE = {
+    "field": "const double v = x[2]*x[2] + x[3]*x[3]; out[0] = x[2]; out[1] = x[3]; out[2] = -v*x[0]; out[3] = -v*x[1];",
+    "position_correction_at": "const double s = x[0]*x[0] + x[1]*x[1], c = 0.5*(s - 1.0); out[0] = c; out[1] = -c*x[0]/s; "
+                              "out[2] = -c*x[1]/s;",
+    "velocity_correction_at": "const double s = x[0]*x[0] + x[1]*x[1], c = x[0]*x[2] + x[1]*x[3]; "
+                              "out[0] = c; out[1] = -c*x[0]/s; out[2] = -c*x[1]/s;",
+    "violation_at": "out[0] = 0.5*(x[0]*x[0] + x[1]*x[1] - 1.0); out[1] = x[0]*x[2] + x[1]*x[3];"}
+
+
+@pytest.mark.parametrize(("project", "least", "most"), [(True, 0.0, 1e-12), (False, 1e-9, 1.0)])
+def test_projection_onto_a_circle(project: bool, least: float, most: float, build: Build, tmp_path: Path) -> None:
+    shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), ())
+    tables = {"n_rows": 1, "turning": [0, 0], "angles": [0, 0]}
+    library = build(integrator("bs54", shape, CIRCLE, tmp_path, projection=tables))
+    run = Run(library, [1.0, 0.0, 0.0, 1.0], (0.0, 50.0), 1e-5, project=project)
+    x = run.at(np.linspace(0, 50, 101))
+    off = np.abs((x[:, :2]**2).sum(axis=1) - 1).max()
+    assert least <= off <= most
+    assert (run.report()[-6] > 0) == project  # steps whose end was moved
+
+
+def test_a_unit_vector_keeps_its_length(build: Build, tmp_path: Path) -> None:
+    field = {"field": "out[0] = -x[1] + 1e-3*x[0]; out[1] = x[0] + 1e-3*x[1]; out[2] = 0;"}
+    shape = Shape({"q": 3, "u": 0, "z": 0, "inputs": 0}, 0, [[0, 1]], ())
+    run = Run(build(integrator("dop853", shape, field, tmp_path)), [1.0, 0.0, 2.0], (0.0, 5.0), 1e-9, project=True)
+    x = run.at(np.linspace(0, 5, 11))
+    np.testing.assert_allclose((x[:, :2]**2).sum(axis=1), 1, rtol=0, atol=1e-15)
+    assert (x[:, 2] == 2).all()
+
+
+def test_zeros_of_a_cubic_and_a_reset(build: Build, tmp_path: Path) -> None:
+    events = [{"direction": 0, "stop": False, "reset": []}, {"direction": 1, "stop": False, "reset": [1]}]
+    functions = {"field": "out[0] = 1.0; out[1] = 1.0;",
+                 "events_at": "out[0] = (x[0] - 0.3)*(x[0] - 0.50001)*(x[0] - 0.5); out[1] = x[1] - 0.75;",
+                 "event_resets_at": "out[0] = -1.0;"}
+    shape = Shape({"q": 1, "u": 1, "z": 0, "inputs": 0}, 0, (), events)
+    library = build(integrator("dop853", shape, functions, tmp_path))
+    run = Run(library, [0.0, 0.0], (0.0, 1.0), 1e-9, look=2)
+    x = run.at(np.array([0.2, 1.0]))
+    rows = run.events(2)
+    assert rows[:, 0].tolist() == [0, 0, 0, 1]
+    np.testing.assert_allclose(rows[:, 1], [0.3, 0.5, 0.50001, 0.75], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rows[3, 2:], [0.75, 0.75, 0.75, -1.0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(x, [[0.2, 0.2], [1.0, -0.75]], rtol=0, atol=1e-12)
+
+
+ROOF = "double d[2] = {ud[0] - 0.5003, ud[1] - 0.5003}; const double far = fmax(fabs(d[0]), fabs(d[1])); " \
+       "const double near = d[0] < 0.0 && d[1] > 0.0 ? 0.0 : fmin(fabs(d[0]), fabs(d[1])); " \
+       "out[0] = fmax(1e-3 - far, -0.01); out[1] = fmax(1e-3 - near, -0.01);"
+# On a side of the roof, between its kinks, rates and bends are those of the leaf, behind its top with the sign changed.
+BENDS = ROOF + " const double s = d[0] > 0.0 ? -1.0 : 1.0; const int kinks = near == 0.0 || far > 0.011; " \
+               "out[2] = kinks ? -1e9 : s > 0.0 ? ud[2] : -ud[3]; out[3] = kinks ? 1e9 : s > 0.0 ? ud[3] : -ud[2]; " \
+               "out[4] = kinks ? -1e9 : s > 0.0 ? ud[4] : -ud[5]; out[5] = kinks ? 1e9 : s > 0.0 ? ud[5] : -ud[4];"
+
+
+@pytest.mark.parametrize("bounded", [True, False])
+def test_a_pulse_between_samples_is_found_by_bounds(bounded: bool, build: Build, tmp_path: Path) -> None:
+    events = [{"direction": 0, "stop": False, "reset": [], "enclosed": bounded}]
+    functions = {"field": "out[0] = 1.0;", "events_at": "out[0] = fmax(1e-3 - fabs(x[0] - 0.5003), -0.01);"}
+    functions |= {"event_ranges_of": ROOF, "event_bounds_of": BENDS} if bounded else {}
+    shape = Shape({"q": 1, "u": 0, "z": 0, "inputs": 0}, 0, (), events, (1,) if bounded else ())
+    run = Run(build(integrator("dop853", shape, functions, tmp_path)), [0.0], (0.0, 10.0), 1e-9, look=1)
+    run.at(np.array([10.0]))
+    rows = run.events(1)
+    assert rows[:, 0].tolist() == ([0, 0] if bounded else [])
+    np.testing.assert_allclose(rows[:, 1], [0.4993, 0.5013][:len(rows)], rtol=0, atol=1e-12)
+
+
+def test_a_reset_on_a_circle_takes_the_other_speed_along(build: Build, tmp_path: Path) -> None:
+    functions = CIRCLE | {"events_at": "out[0] = x[0] - 0.5;", "event_resets_at": "out[0] = -x[2];",
+                          "reset_directions_at": "out[0] = out[1] = 0.0; out[2] = x[1]*x[1]; out[3] = -x[1]*x[0];"}
+    shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), [{"direction": -1, "stop": False, "reset": [2]}], (), True)
+    tables = {"n_rows": 1, "turning": [0, 0], "angles": [0, 0]}
+    library = build(integrator("dop853", shape, functions, tmp_path, projection=tables))
+    run = Run(library, [1.0, 0.0, 0.0, 1.0], (0.0, 2 * np.pi / 3), 1e-11, project=True, look=1)
+    x = run.at(np.array([2 * np.pi / 3]))
+    rows, v = run.events(1), [-np.sqrt(0.75), 0.5]
+    place = [0.5, np.sqrt(0.75)]
+    np.testing.assert_allclose(rows, [[0, np.pi / 3, *place, *v, *place, -v[0], -v[1]]], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(x, [[1.0, 0.0, 0.0, -1.0]], rtol=0, atol=1e-8)
+
+
+def test_an_input_by_pieces(build: Build, tmp_path: Path) -> None:
+    text = ('#define SYMDYN_HAS_INPUTS 1\n#define SYMDYN_NIN 1\n#include "problem.h"\n'
+            "int at(const symdyn_problem *p, double t, double *out) { return symdyn_inputs_at(p, t, out, out); }\n")
+    library = build(text)
+    breaks, pieces = np.array([0.0, 1.0, 3.0]), np.array([[1.0, 2.0, 0.5, 0.25], [3.75, 0.0, 1.0, 0.0]])
+    problem = Problem(n_pieces=2, breaks=breaks.ctypes.data, pieces=pieces.ctypes.data)
+
+    def at(t: float) -> float:
+        out = np.zeros(1)
+        assert library.at(ctypes.byref(problem), ctypes.c_double(t), pointer(out)) == 0
+        return float(out[0])
+
+    assert [at(t) for t in (-1.0, 0.0, 0.5, 1.0, 2.0, 3.0, 9.0)] == [1.0, 1.0, 2.15625, 3.75, 4.75, 7.75, 7.75]
+
+
+def test_sines_and_cosines(build: Build) -> None:
+    library = build('#include "sincos.h"\nvoid at(int n, const double *a, double *s, double *c) { symdyn_sincos(n, a, s, c); }\n')
+    angles = np.concatenate([np.linspace(-20, 20, 997), [0.0, 1e5, 1e9, np.pi, 1e-300]])
+    sines, cosines = np.zeros(len(angles)), np.zeros(len(angles))
+    library.at(len(angles), pointer(angles), pointer(sines), pointer(cosines))
+    np.testing.assert_allclose(sines, np.sin(angles), rtol=0, atol=2.3e-16)
+    np.testing.assert_allclose(cosines, np.cos(angles), rtol=0, atol=2.3e-16)
+
+
+SOLVERS = """#define SYMDYN_LINKED
+#define SYMDYN_LOOSE 1e-14
+#define SYMDYN_MASSLESS 1e-14
+#define SYMDYN_SMOOTHED 1e-4
+#define SYMDYN_ROUNDS 5
+#define SYMDYN_CLEANINGS 1
+#define SYMDYN_SADDLE_N 4
+#define SYMDYN_SADDLE_M 3
+#define SYMDYN_SADDLE_ONE_SIZE {one_size}
+#define SYMDYN_MULTIPLIERS_N 4
+#define SYMDYN_MULTIPLIERS_M 3
+#define SYMDYN_MULTIPLIERS_ONE_SIZE {one_size}
+#include "symdyn_saddle.h"
+#include "symdyn_multipliers.h"
+#include "symdyn_cube.h"
+#include "symdyn_catenary.h"
+"""
+
+
+@pytest.mark.parametrize("one_size", [0, 1])
+@pytest.mark.parametrize("dependent", [False, True])
+def test_solvers(one_size: int, dependent: bool, build: Build) -> None:
+    library = build(SOLVERS.format(one_size=one_size))
+    rng = np.random.default_rng(1)
+    root, C = rng.uniform(-1, 1, (4, 4)), rng.uniform(-1, 1, (3, 4))
+    if dependent:
+        C[2] = C[0] - 2 * C[1]
+    M, f = root @ root.T + np.eye(4), rng.uniform(-1, 1, 4)
+    d = C @ rng.uniform(-1, 1, 4)
+    given = np.concatenate([[1e-4], M[np.tril_indices(4)], C.ravel(), np.ones(3), 1 / np.sqrt(np.diag(M)), f, d])
+    x, lam = np.zeros(4), np.zeros(3)
+    assert library.symdyn_saddle(4, 3, pointer(given), pointer(x)) == 0
+    rank = 2 if dependent else 3
+    whole = np.block([[M, C[:rank].T], [C[:rank], np.zeros((rank, rank))]])
+    np.testing.assert_allclose(x, np.linalg.solve(whole, [*f, *d[:rank]])[:4], rtol=0, atol=1e-11)
+    g = C.T @ rng.uniform(-1, 1, 3)
+    given = np.concatenate([C.ravel(), np.ones(3), np.ones(4), g])
+    assert library.symdyn_multipliers(4, 3, pointer(given), pointer(lam)) == 0
+    np.testing.assert_allclose(lam, np.linalg.pinv(C.T) @ g, rtol=0, atol=1e-9)
+
+
+def test_a_cube_and_a_line(build: Build) -> None:
+    library = build(SOLVERS.format(one_size=0))
+    out = np.zeros(4)
+    for depth, volume in ((2.0, 1.0), (0.25, 0.75), (-2.0, 0.0)):
+        assert library.symdyn_cube(0, pointer(np.array([depth, 0.0, 0.0, -1.0])), pointer(out)) == 0
+        assert out[0] == volume
+    stiff = np.array([0.8, 0.5, 1e-12, 0.0])
+    assert library.symdyn_catenary(0, pointer(stiff), pointer(out)) == 0
+    h, v = out[:2]  # Irvine: without stretch x = h (asinh(v/h) - asinh((v - 1)/h)), z = sqrt(h^2 + v^2) - sqrt(h^2 + (v - 1)^2)
+    np.testing.assert_allclose([h * (np.arcsinh(v / h) - np.arcsinh((v - 1) / h)), np.hypot(h, v) - np.hypot(h, v - 1)],
+                               stiff[:2], rtol=0, atol=1e-9)
+
+
+LANES = """
+#define SYMDYN_NP 1
+#define SYMDYN_NC 0
+static int symdyn_prologue(const double *p, double *c) { (void)c; return !(p[0] > 0.0); }
+#include "vectors.h"
+static symdyn_lanes symdyn_lanes_rhs(const symdyn_states *lanes, symdyn_vector t, const symdyn_vector *x, symdyn_vector *out) {
+    symdyn_lanes fault = {0};
+    (void)t;
+    out[0] = x[1];
+    out[1] = -lanes->p[0]*x[0];
+    return fault;
+}
+static int symdyn_one(double t, const double *x, const double *inputs, const double *p, const double *c, double *out) {
+    (void)t, (void)inputs, (void)c;
+    out[0] = x[1];
+    out[1] = -p[0]*x[0];
+    return 0;
+}
+#include "batch_explicit.h"
+"""
+
+
+class Table(ctypes.Structure):
+    _fields_ = [("at", ctypes.c_void_p), ("row", ctypes.c_long), ("entry", ctypes.c_long)]
+
+
+def test_oscillators_in_lanes(build: Build, tmp_path: Path) -> None:
+    """Right-hand sides and motions of more oscillators than a vector has lanes, one of them with a negative stiffness."""
+    shape = Shape({"q": 1, "u": 1, "z": 0, "inputs": 0}, 0, (), ())
+    field = {"field": "out[0] = x[1]; out[1] = -problem->p[0]*x[0];"}
+    library = build(integrator("dop853", shape, field, tmp_path, LANES))
+    n = 11
+    stiffness, x = np.linspace(1.0, 4.0, n), np.column_stack([np.ones(n), np.zeros(n)])
+    stiffness[4] = -1.0
+    zero = np.zeros(1)
+    tables = (Table * 4)(Table(zero.ctypes.data, 0, 0), Table(x.ctypes.data, 2, 1), Table(zero.ctypes.data, 0, 0),
+                         Table(stiffness.ctypes.data, 1, 0))
+    out, codes = np.zeros((n, 2)), np.zeros(n, dtype=np.intc)
+    library.symdyn_rhs_batch.restype = ctypes.c_long
+    failed = library.symdyn_rhs_batch(ctypes.c_long(n), tables, pointer(out), pointer(np.array([2, 1])), pointer(codes))
+    good = stiffness > 0
+    assert failed == 1 and codes.tolist() == [int(not g) for g in good] and np.isnan(out[4]).all()
+    assert (out[good] == np.column_stack([np.zeros(n), -stiffness])[good]).all()
+    times, reports, states = np.linspace(0, 3, 7), np.zeros((n, 21)), np.zeros((n, 7, 2))
+    span, atol = np.array([0.0, 3.0, 1e-11, 0.0, 0.0]), np.full(2, 1e-11)
+    library.symdyn_batch_size.restype = library.symdyn_batch_go.restype = ctypes.c_long
+    memory = ctypes.create_string_buffer(library.symdyn_batch_size() + 64)
+    address = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
+    given = (Table * 3)(tables[1], tables[2], tables[3])
+    real = (ctypes.c_void_p * 3)(span.ctypes.data, atol.ctypes.data, times.ctypes.data)
+    into = (ctypes.c_void_p * 2)(states.ctypes.data, reports.ctypes.data)
+    library.symdyn_batch_start(address, given, pointer(np.array([n, 7])), real, into)
+    assert library.symdyn_batch_go(address, ctypes.c_long(10_000)) == n
+    w = np.sqrt(np.abs(stiffness))[:, None]
+    np.testing.assert_allclose(states[good, :, 0], np.cos(w * times)[good], rtol=0, atol=1e-9)
+    assert (reports[good, 0] == 0).all() and reports[4, 0] == -7
