@@ -24,7 +24,7 @@ import pytest
 
 from symdyn.errors import CacheError, CacheWarning, CompileError
 from symdyn.runtime import cache as subject
-from symdyn.runtime import cache_folder
+from symdyn.runtime import cache_folder, objects
 from symdyn.runtime import compiler as compilers
 from symdyn.runtime.cache import SUFFIX, build, cache_dir, load
 from symdyn.runtime.compiler import Compiler, find_compiler
@@ -46,7 +46,7 @@ ROOT = str(Path(subject.__file__).parents[2])
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache of its own for each test."""
     for cached in (
-        subject._cpu,
+        objects._cpu,
         cache_folder._private,
         cache_folder._report,
         compilers._search,
@@ -137,7 +137,7 @@ def test_key(fake: Callable[[str], Compiler], monkeypatch: pytest.MonkeyPatch) -
     ]
     paths = [subject._target("a", "m", variant) for variant in variants]
     paths += [subject._target("b", "m", compiler)]
-    monkeypatch.setattr(subject, "_cpu", lambda: "another")
+    monkeypatch.setattr(objects, "_cpu", lambda: "another")
     paths += [subject._target("a", "m", compiler)]
     assert len({path.name for path in paths}) == 5
     assert subject._target("a", "m", compiler) == paths[-1]
