@@ -47,6 +47,10 @@ class Parts:
             raise SymdynError(f"{name}: #if without #endif; close the condition")
         return _spaced(lines)
 
+    def alone(self, name: str) -> str:
+        """The text of a file with all that it includes, whatever earlier calls gave."""
+        return Parts(self._read, self._switches).text(name)
+
     def _lines_of(self, name: str, include: re.Match[str], files: Mapping[str, str]) -> list[str]:
         if include["file"]:
             text = self.text(include["file"], **files)

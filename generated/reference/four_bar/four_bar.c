@@ -78,6 +78,8 @@ static inline int symdyn_all_finite(const double *values, int n) {
 #define SYMDYN_SLOPE_AT_END 0
 #define SYMDYN_SECOND_ERROR 1
 
+// The problem of a run, and its inputs at a time.
+
 // What the right-hand side needs besides t and x.
 
 // Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
@@ -1654,6 +1656,16 @@ SYMDYN_LINKED int symdyn_between(symdyn_run *run, double s, double *x_out) {
 
 // The parts of the integrator of one mechanism, in order.
 
+// Functions of the integrator that others call: see start.h, simulate.h and events.h. A run is memory of simulation_size bytes,
+// on a multiple of 64.
+
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void);
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
+    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
+    void *memory, int every, long max_steps, double *t, long n, double *x, long *written);
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out);
+
 // Where the polynomial of an embedded explicit Runge-Kutta pair is not good enough, and steps across singular configurations.
 
 // The state at s within the latest step, by a step of its own from its start or from its end, and the error of that.
@@ -1732,7 +1744,8 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
-    symdyn_run *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    symdyn_run *const run = memory;
     const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
     const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const symdyn_run empty;
@@ -1855,7 +1868,8 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // direction of integration, to the rows of x[n][SYMDYN_NX] as they are passed; times beyond t_end never are. With `every`, append
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
-    symdyn_run *run, int every, long max_steps, double *t, long n, double *x, long *written) {
+    void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
+    symdyn_run *const run = memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
         if (failure) return failure;
@@ -1872,7 +1886,8 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
 }
 
 // See the members of the run.
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const symdyn_run *run, double *out) {
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out) {
+    const symdyn_run *const run = memory;
     const double first[8] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations,
         (double)run->reason, (double)run->bad_index, run->t_fail};
     const double last[8] = {run->largest_dq, run->largest_du, (double)run->n_corrected, (double)run->n_corrections, run->residual,

@@ -108,8 +108,53 @@ int four_bar_lam(const double *q, const double *u, const double *p, const double
 // force and moment of every joint on its child, at the joint's point on it, n-frame; out: 4 x 6, row by row
 int four_bar_reactions(const double *q, const double *u, const double *p, const double *c, double *out);
 
-// What a return code of the functions means; 0: no fault.
+// What a return code of the functions means; 0: no fault, -1: not finite.
 const char *four_bar_reason(int code);
+
+// One call for many states: rows of t, of x = [q; u; z] (6), of ud (3), of inputs (0); strides are in rows, 0 repeats
+// the first row. Stops at the first fault (a result that is not finite is one) and leaves its row in `failed`.
+typedef struct {
+    long n;
+    const double *t, *x, *ud, *inputs, *p, *c;
+    double *out;
+    long t_stride, x_stride, ud_stride, inputs_stride;
+    long failed;
+} four_bar_frame;
+int four_bar_rhs_rows(four_bar_frame *frame);
+int four_bar_C_rows(four_bar_frame *frame);
+int four_bar_C_r_rows(four_bar_frame *frame);
+int four_bar_F_d_rows(four_bar_frame *frame);
+int four_bar_lam_rows(four_bar_frame *frame);
+int four_bar_reactions_rows(four_bar_frame *frame);
+
+#ifndef SYMDYN_PROBLEM_TYPE
+#define SYMDYN_PROBLEM_TYPE
+// What the right-hand side needs besides t and x.
+
+// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
+// cubic, its ends held), constants.
+typedef struct {
+    const double *p, *c, *inputs;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
+    int (*function)(double t, const double *x, double *inputs);
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} symdyn_problem;
+#endif
+
+// Integration. A run is a block of memory of simulation_size bytes, on a multiple of 64.
+// start    span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); x0, atol: 6. Returns 0 or a failure
+// go       by at most max_steps attempted steps; states at the times t[*written .. n) to the rows of x[n][6], or, with every, start
+//          and end of each step. Returns 0 at the end, 1 under way, 2 without room, 3 where an event ended it, or a failure < 0
+// report   t, h, steps, rejected, evaluations, reason, bad index, time of the failure, x (6), x there (6), largest changes of q and
+//          of u by projections, steps so moved, corrections, residual, whether of speeds, Jacobians, factorizations
+long four_bar_simulation_size(void);
+int four_bar_simulation_start(void *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
+int four_bar_simulation_go(void *run, int every, long max_steps, double *t, long n, double *x, long *written);
+void four_bar_simulation_report(const void *run, double *out);
 
 #ifdef __cplusplus
 }

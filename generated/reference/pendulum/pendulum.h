@@ -79,8 +79,54 @@ int pendulum_energy(const double *q, const double *u, const double *p, const dou
 // tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud; out: 1 numbers
 int pendulum_inverse_dynamics(const double *q, const double *ud, const double *p, const double *c, double *out);
 
-// What a return code of the functions means; 0: no fault.
+// What a return code of the functions means; 0: no fault, -1: not finite.
 const char *pendulum_reason(int code);
+
+// One call for many states: rows of t, of x = [q; u; z] (2), of ud (1), of inputs (0); strides are in rows, 0 repeats
+// the first row. Stops at the first fault (a result that is not finite is one) and leaves its row in `failed`.
+typedef struct {
+    long n;
+    const double *t, *x, *ud, *inputs, *p, *c;
+    double *out;
+    long t_stride, x_stride, ud_stride, inputs_stride;
+    long failed;
+} pendulum_frame;
+int pendulum_rhs_rows(pendulum_frame *frame);
+int pendulum_mass_matrix_rows(pendulum_frame *frame);
+int pendulum_k_tilde_rows(pendulum_frame *frame);
+int pendulum_F_tilde_rows(pendulum_frame *frame);
+int pendulum_J_rows(pendulum_frame *frame);
+int pendulum_energy_rows(pendulum_frame *frame);
+int pendulum_inverse_dynamics_rows(pendulum_frame *frame);
+
+#ifndef SYMDYN_PROBLEM_TYPE
+#define SYMDYN_PROBLEM_TYPE
+// What the right-hand side needs besides t and x.
+
+// Inputs come from the first of these that is there: a function (returns 0, or not to stop the run), a table over time (piecewise
+// cubic, its ends held), constants.
+typedef struct {
+    const double *p, *c, *inputs;
+    long n_pieces;                  // of the table, from breaks[k] to breaks[k + 1],
+    const double *breaks, *pieces;  // with, for every input, factors of 1, d, d^2 and d^3, d = t - breaks[k]
+    long n_stops;                   // times, increasing, at which inputs may have kinks: steps end there
+    const double *stops;
+    int (*function)(double t, const double *x, double *inputs);
+    int project;    // whether states are kept on what holds for them after every step
+    double length;  // that residuals are measured by, m
+} symdyn_problem;
+#endif
+
+// Integration. A run is a block of memory of simulation_size bytes, on a multiple of 64.
+// start    span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); x0, atol: 2. Returns 0 or a failure
+// go       by at most max_steps attempted steps; states at the times t[*written .. n) to the rows of x[n][2], or, with every, start
+//          and end of each step. Returns 0 at the end, 1 under way, 2 without room, 3 where an event ended it, or a failure < 0
+// report   t, h, steps, rejected, evaluations, reason, bad index, time of the failure, x (2), x there (2), largest changes of q and
+//          of u by projections, steps so moved, corrections, residual, whether of speeds, Jacobians, factorizations
+long pendulum_simulation_size(void);
+int pendulum_simulation_start(void *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
+int pendulum_simulation_go(void *run, int every, long max_steps, double *t, long n, double *x, long *written);
+void pendulum_simulation_report(const void *run, double *out);
 
 #ifdef __cplusplus
 }

@@ -7,6 +7,9 @@
 // Parameters, constants and inputs of one state, one after the other.
 enum { SYMDYN_NUMBERS = SYMDYN_NP + SYMDYN_NC + SYMDYN_NIN + !(SYMDYN_NP + SYMDYN_NC + SYMDYN_NIN) };
 
+SYMDYN_EXPORT int SYMDYN_NAME(batch_width)(void);
+SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, double *out, const long *out_steps, int *codes);
+
 // How many lanes there are; 1: the compiler has no vectors.
 SYMDYN_EXPORT int SYMDYN_NAME(batch_width)(void) { return SYMDYN_WIDTH; }
 

@@ -5,6 +5,11 @@
 #include "batch.h"
 #include "simulate.h"
 
+SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void);
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
+    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out);
+SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps);
+
 // Zeros until batch_start.
 typedef struct {
     symdyn_states lanes;
@@ -138,7 +143,8 @@ SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_ba
 // t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), reports. All
 // have to stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
-    symdyn_batch *batch, const symdyn_table *given, const long *counts, const double *const *real, double *const *out) {
+    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out) {
+    symdyn_batch *const batch = memory;
     for (int k = 0; k < 3; k++) batch->given[k] = given[k];
     batch->n = counts[0];
     batch->n_out = counts[1];
@@ -154,7 +160,8 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
 }
 
 // At most so many steps in every lane; returns how many trajectories have ended.
-SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(symdyn_batch *batch, long max_steps) {
+SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps) {
+    symdyn_batch *const batch = memory;
     for (; max_steps > 0 && batch->n_done < batch->n; max_steps--) symdyn_batch_attempt(batch);
     return batch->n_done;
 }

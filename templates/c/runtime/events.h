@@ -454,14 +454,16 @@ static int symdyn_resume(symdyn_run *run) {
 }
 
 // Which of the SYMDYN_N_EVENTS events to look for, after the start, by samples no further apart than spacing, s (0: any).
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(symdyn_run *run, const int *look, double spacing) {
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing) {
+    symdyn_run *const run = memory;
     run->events.spacing = spacing;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) run->events.looking |= run->events.look[k] = look[k];
 }
 
 // Go on from the end of another run, after simulation_look: known: the sides of the quantities there, 0 where unknown, of those
 // that have just vanished the rates, NaN of all others, and what was left of them; reset: whether the state was changed since.
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(symdyn_run *run, const double *known, int reset) {
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *known, int reset) {
+    symdyn_run *const run = memory;
     const double *const sides = known, *const rates = known + SYMDYN_N_EVENTS, *const left = known + 2 * SYMDYN_N_EVENTS;
     for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
         const int fired = run->events.fired[k] = rates[k] == rates[k];
@@ -473,12 +475,16 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(symdyn_run *run, const double *
 }
 
 // By how much what was refused as a reset is off.
-SYMDYN_EXPORT double SYMDYN_NAME(simulation_reset_gap)(const symdyn_run *run) { return run->events.reset_gap; }
+SYMDYN_EXPORT double SYMDYN_NAME(simulation_reset_gap)(const void *memory) {
+    const symdyn_run *const run = memory;
+    return run->events.reset_gap;
+}
 
 // Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
 // too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
 // on. Returns how many.
-SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(symdyn_run *run, double *rows) {
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows) {
+    symdyn_run *const run = memory;
     const int n = run->events.n_noted;
     for (int k = 0; k < n * SYMDYN_NOTE; k++) rows[k] = run->events.noted[k];
     run->events.n_noted = 0;

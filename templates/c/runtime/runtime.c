@@ -1,6 +1,7 @@
 // The parts of the integrator of one mechanism, in order.
 
 #include "common.h"
+#include "exports.h"
 #if SYMDYN_EXPLICIT
 #include "explicit.h"
 #endif

@@ -61,7 +61,8 @@ SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void) { return (long)sizeof(symd
 // direction of integration, to the rows of x[n][SYMDYN_NX] as they are passed; times beyond t_end never are. With `every`, append
 // start and end of every accepted step instead, first of one that STORE_FULL left no room for. Returns a status.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
-    symdyn_run *run, int every, long max_steps, double *t, long n, double *x, long *written) {
+    void *memory, int every, long max_steps, double *t, long n, double *x, long *written) {
+    symdyn_run *const run = memory;
     for (;; max_steps--) {
         const int failure = every ? 0 : symdyn_serve(run, t, n, x, written);
         if (failure) return failure;
@@ -78,7 +79,8 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
 }
 
 // See the members of the run.
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const symdyn_run *run, double *out) {
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out) {
+    const symdyn_run *const run = memory;
     const double first[8] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations,
         (double)run->reason, (double)run->bad_index, run->t_fail};
     const double last[8] = {run->largest_dq, run->largest_du, (double)run->n_corrected, (double)run->n_corrections, run->residual,

@@ -83,7 +83,8 @@ static int symdyn_restart(symdyn_run *run, double t, const double *x, double h_f
 // Prepare a run, backward where t_end < t0. span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any);
 // atol: SYMDYN_NX. Returns 0 or a failure.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
-    symdyn_run *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol) {
+    symdyn_run *const run = memory;
     const double t0 = span[0], t_end = span[1], rtol = span[2], h_first = span[3], h_max = span[4];
     const double length = fabs(t_end - t0), far = fabs(t0) > fabs(t_end) ? fabs(t0) : fabs(t_end);
     static const symdyn_run empty;

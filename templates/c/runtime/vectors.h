@@ -3,6 +3,7 @@
 #pragma once
 
 #include "prelude.h"
+#include "table_type.h"
 
 #if defined(__GNUC__) && !defined(__TINYC__)
 #if defined(__AVX512F__)
@@ -43,9 +44,3 @@ static inline __attribute__((always_inline)) symdyn_vector symdyn_each_madd(symd
 typedef struct {
     symdyn_vector x[SYMDYN_NX], p[SYMDYN_NP + !SYMDYN_NP], c[SYMDYN_NC + !SYMDYN_NC], inputs[SYMDYN_NIN + !SYMDYN_NIN];
 } symdyn_states;
-
-// Numbers of several trajectories: entry k of trajectory i is at[i*row + k*entry].
-typedef struct {
-    const double *at;
-    long row, entry;
-} symdyn_table;

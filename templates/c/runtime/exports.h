@@ -1,0 +1,18 @@
+// Functions of the integrator that others call: see start.h, simulate.h and events.h. A run is memory of simulation_size bytes,
+// on a multiple of 64.
+#pragma once
+
+#include "problem.h"
+
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_size)(void);
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
+    void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
+SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
+    void *memory, int every, long max_steps, double *t, long n, double *x, long *written);
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out);
+#if SYMDYN_EVENTS
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_look)(void *memory, const int *look, double spacing);
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *known, int reset);
+SYMDYN_EXPORT double SYMDYN_NAME(simulation_reset_gap)(const void *memory);
+SYMDYN_EXPORT long SYMDYN_NAME(simulation_events)(void *memory, double *rows);
+#endif
