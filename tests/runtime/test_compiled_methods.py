@@ -264,7 +264,7 @@ def test_records_are_those_that_can_be_compiled() -> None:
 
 def test_a_unit_holds_one_method(derived: Callable[..., Any]) -> None:
     text = next(iter(emit(derived("pendulum"), "c", ("rhs",), standalone=False, method="bs54").files.values()))
-    assert "pendulum_bs54_restart" in text and "dop853" not in text and "Bogacki" in text
+    assert "symdyn_restart(" in text and "dop853" not in text and "Bogacki" in text
 
 
 @pytest.mark.parametrize("method", sorted(COMPILED))

@@ -145,7 +145,8 @@ static inline void symdyn_sincos_one(double x, double *sine, double *cosine) {
     const unsigned long long exchange = (a.bits ^ b.bits) & (0u - (shifted.bits & 1u));
     a.bits ^= exchange ^ ((shifted.bits & 2u) << 62);
     b.bits ^= exchange ^ (((shifted.bits + 1u) & 2u) << 62);
-    *sine = a.value, *cosine = b.value;
+    *sine = a.value;
+    *cosine = b.value;
 }
 
 // Of n angles. Large ones, NaN and Inf are left to the math library; so are all if the compiler may rearrange sums.
@@ -158,8 +159,12 @@ static inline void symdyn_sincos(int n, const double *restrict angles, double *r
     int small = 1;
     for (int i = 0; i < n; i++) symdyn_sincos_one(angles[i], sines + i, cosines + i);
     for (int i = 0; i < n; i++) small &= fabs(angles[i]) <= largest;
-    for (int i = 0; !small && i < n; i++)
-        if (!(fabs(angles[i]) <= largest)) sines[i] = sin(angles[i]), cosines[i] = cos(angles[i]);
+    for (int i = 0; !small && i < n; i++) {
+        if (!(fabs(angles[i]) <= largest)) {
+            sines[i] = sin(angles[i]);
+            cosines[i] = cos(angles[i]);
+        }
+    }
 }
 
 // Multipliers of least norm; see Multipliers in symdyn/tape/kernels.py, which has the numbers SYMDYN_...; the largest sizes of

@@ -170,8 +170,10 @@ static int symdyn_try(symdyn_run *run, double h, double t_new, double *x_new, do
     const double estimate = symdyn_error(run, x_new, &rough);
     if (!run->method.fixed) *err = estimate;
     if (*err <= 1.0 && rough > 400.0 * (1.0 + estimate) * (1.0 + estimate) && 100 * run->method.n_halved <= run->n_steps
-        && symdyn_halved(run, h, x_new) > 10.0 * (1.0 + estimate))
-        run->method.n_rough++, run->method.t_rough = t_new;
+        && symdyn_halved(run, h, x_new) > 10.0 * (1.0 + estimate)) {
+        run->method.n_rough++;
+        run->method.t_rough = t_new;
+    }
     run->reason = (int)run->method.n_given_up;
     run->bad_index = -1 - run->method.n_rough;
     run->t_fail = run->method.t_rough;

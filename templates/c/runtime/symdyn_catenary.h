@@ -11,15 +11,25 @@ SYMDYN_LINKED int symdyn_catenary(int seabed, const double *in, double *out) {
     if (!(e >= 0.0 && friction >= 0.0 && d < 1e100) || (seabed && !(z > 0.0))) return 1;
     const double hanging =
         seabed ? 2.0 * z / (1.0 + sqrt(1.0 + 2.0 * e * z)) : 2.0;  // slack it hangs straight down, and the rest lies
-    if (hanging <= 1.0 && x <= 1.0 - hanging + 9e-16) return out[0] = 0.0, out[1] = hanging, 0;
+    if (hanging <= 1.0 && x <= 1.0 - hanging + 9e-16) {
+        out[0] = 0.0;
+        out[1] = hanging;
+        return 0;
+    }
     if (!(x > 1e-9)) return 1;
     // Start: a parabola, or a straight line where the ends are far apart, or a stiff line that touches the seabed.
     const double flat = d < 1.0 ? sqrt(3.0 * (1.0 - d * d)) / x : 0.2, f = (1.0 - x) / z;
     double h = 0.5 * x / flat, v = 0.5 * (z / tanh(flat) + 1.0);
-    if (d > 1.0 && (d - 1.0) * x > e * h * d && e > 0.0) h = (d - 1.0) * x / (e * d), v = (d - 1.0) * z / (e * d) + 0.5;
+    if (d > 1.0 && (d - 1.0) * x > e * h * d && e > 0.0) {
+        h = (d - 1.0) * x / (e * d);
+        v = (d - 1.0) * z / (e * d) + 0.5;
+    }
     if (seabed && f > 0.0 && f < 1.0) {
         const double touching = z * (1.0 - f) / (f * f * (4.5 - f * (4.2 - 3.6 * f))), lifted = sqrt(z * (z + 2.0 * touching));
-        if (lifted < 1.0) h = touching, v = lifted;
+        if (lifted < 1.0) {
+            h = touching;
+            v = lifted;
+        }
     }
     for (int k = 0; k < 100; k++) {
         const int rests = seabed && v < 1.0;
@@ -38,7 +48,8 @@ SYMDYN_LINKED int symdyn_catenary(int seabed, const double *in, double *out) {
         const double dh = (x_v * z_off - z_v * x_off) / determinant, dv = (z_h * x_off - x_h * z_off) / determinant;
         double step = h + dh >= 0.1 * h ? 1.0 : -0.9 * h / dh;
         if (seabed && v + step * dv < 0.1 * v) step = -0.9 * v / dv;
-        out[0] = h += step * dh, out[1] = v += step * dv;
+        out[0] = h += step * dh;
+        out[1] = v += step * dv;
         if (fabs(dh) <= 1e-8 * h + 9e-16 && fabs(dv) <= 1e-8 * (h + fabs(v))) return 0;
     }
     return 1;

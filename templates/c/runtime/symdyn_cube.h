@@ -11,8 +11,10 @@ static double symdyn_cube_corner(double a, double b, double s, double h, double 
     if (s <= 0.0)
         y0 = y1 = 0.0;
     else if (s < a + b) {
-        y0 = s > a ? (s - a) / b : 0.0, w0 = s > a ? 1.0 : s / a;
-        y1 = s < b ? s / b : 1.0, w1 = s < b ? 0.0 : (s - b) / a;
+        y0 = s > a ? (s - a) / b : 0.0;
+        w0 = s > a ? 1.0 : s / a;
+        y1 = s < b ? s / b : 1.0;
+        w1 = s < b ? 0.0 : (s - b) / a;
     }
     const double dy = 0.5 * (y1 - y0);
     const double below[6] = {y0, 0.0, 0.5 * y0 * (y0 - 1.0), y0 / 12.0, 0.0, y0 * (3.0 + y0 * (4.0 * y0 - 6.0)) / 12.0};
@@ -22,7 +24,10 @@ static double symdyn_cube_corner(double a, double b, double s, double h, double 
         const double part[6] = {
             dy * w, dy * first, dy * w * y, dy * w * (3.0 + w * (4.0 * w - 6.0)) / 12.0, dy * first * y, dy * w * y * y};
         for (int i = 0; i < 6; i++) m[i] = (k ? m[i] : below[i]) + part[i];
-        ends[k][0] = 1.0, ends[k][1] = w - 0.5, ends[k][2] = y, ends[k][3] = h;
+        ends[k][0] = 1.0;
+        ends[k][1] = w - 0.5;
+        ends[k][2] = y;
+        ends[k][3] = h;
     }
     return dy;
 }
@@ -64,7 +69,9 @@ SYMDYN_LINKED int symdyn_cube(int order, const double *in, double *out) {
     for (int k = 0; k < 4; k++) Q[k][3] = Q[3][k] = c * Q[0][k] - a * Q[1][k] - b * Q[2][k];
     const double sign[4] = {1.0, in[1] > 0.0 ? -1.0 : 1.0, in[2] > 0.0 ? -1.0 : 1.0, in[3] > 0.0 ? -1.0 : 1.0};
     int place[4] = {0};
-    place[x] = 1, place[y] = 2, place[z] = 3;
+    place[x] = 1;
+    place[y] = 2;
+    place[z] = 3;
     for (int i = 0; i < 4; i++) {
         const int p = place[i];
         // Under P the cube is wet from -1/2 to h, under the top altogether.
