@@ -90,6 +90,7 @@ from symdyn.errors import (
 from symdyn.errors import (
     ZeroAxis as ZeroAxis,
 )
+from symdyn.exact.prove import prove as prove
 from symdyn.flexible.beam import Beam as Beam
 from symdyn.flexible.shape import Shape as Shape
 from symdyn.formulation.explicit import embedding as embedding
