@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.lab.disturbance import constant, observe
 from symdyn.lab.flow import Coordinates, Flow, Matrices
 from symdyn.lab.mechanisms import Mechanism, draw, kinds_of
@@ -156,7 +156,7 @@ def verdict_of_motion(mechanism: Mechanism) -> tuple[str, str]:
     hold = {"hold": list(mechanism.hold)} if mechanism.hold else {}
     try:
         found = mechanism.module.stability(mechanism.x, mechanism.params, t=mechanism.t, inputs=mechanism.inputs, **hold)
-    except ArgumentError as error:
+    except (ArgumentError, NoEquilibrium) as error:
         return NO_VERDICT, str(error)
     return str(found.verdict), ""
 
