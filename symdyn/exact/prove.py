@@ -99,7 +99,7 @@ def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
     sides = []
     for name, value in (("a", a), ("b", b)):
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            value = sp.sympify(value)
+            value = sp.sympify(value, strict=True)
         if not isinstance(value, (sp.MatrixBase, sp.Expr)) or value.has(sp.nan, sp.zoo, sp.oo):
             raise ArgumentError(f"prove takes expressions and matrices of SymPy and finite numbers; {name} is {shown(value)}")
         sides.append(value)

@@ -8,7 +8,9 @@ from typing import Any
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
+from symdyn.errors import ArgumentError
 from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, symbols_of, time
+from symdyn.shown import shown
 from symdyn.tape.node import COORDINATE, PARAMETER, SPEED, Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
@@ -18,9 +20,10 @@ def recorded(expressions: Iterable[Any]) -> tuple[list[Any], dict[Node, sp.Expr]
     """Entries (nodes and numbers) of the expressions, and what each leaf stands for.
 
     Functions without a value, such as q(t), and their derivatives are leaves. Raises UnsupportedExpression for functions that no
-    code can be generated for, ZeroDivisionError for a division by zero.
+    code can be generated for, ZeroDivisionError for a division by zero, ArgumentError for text, which is never evaluated, and
+    anything else that is no expression.
     """
-    expressions = [sp.sympify(e) for e in expressions]
+    expressions = [_taken(e) for e in expressions]
     found: set[Any] = set()
     for e in expressions:
         found |= symbols_of(e) | e.atoms(AppliedUndef, sp.Derivative, sp.Integral)
@@ -32,6 +35,13 @@ def recorded(expressions: Iterable[Any]) -> tuple[list[Any], dict[Node, sp.Expr]
         leaves[symbol], symbols[leaf] = leaf, symbol
     memory: dict[sp.Basic, Any] = {}
     return [record_expression(recorder, e, leaves, memory) for e in expressions], symbols
+
+
+def _taken(value: Any) -> Any:
+    try:
+        return sp.sympify(value, strict=True)
+    except sp.SympifyError:
+        raise ArgumentError(f"exact algebra takes numbers and expressions of SymPy symbols, found {shown(value)}") from None
 
 
 def _kind(symbol: Any) -> int:

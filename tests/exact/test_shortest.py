@@ -131,3 +131,9 @@ def test_a_form_that_is_too_large_names_the_alternatives(monkeypatch):
     with pytest.raises(SymdynError, match="M_tilde is too large for the form 'fourier': a product has up to 9 terms"):
         eq.explicit("M_tilde", form="fourier")
     assert sd.prove(eq.explicit("M_tilde"), eq.explicit("M_tilde", simplify=False))
+
+
+@pytest.mark.parametrize("text", ["a + b", "__import__('os').getcwd()"])
+def test_text_is_never_evaluated(text):
+    with pytest.raises(sd.ArgumentError, match="exact algebra takes numbers and expressions of SymPy symbols, found"):
+        shortest(text)
