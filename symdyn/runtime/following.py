@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,9 +114,8 @@ def take_motion(given: Any, name: str, place: int, owner: str, span: tuple[float
     if spline is not None:
         return _of_spline(spline, name, place, where, span)
     if hasattr(given, "derivative"):  # a spline of another kind, such as scipy.interpolate.UnivariateSpline
-        rate, acceleration = given.derivative(1), given.derivative(2)
         knots = given.get_knots() if hasattr(given, "get_knots") else ()
-        return Followed(name, place, None, lambda t: (given(t), rate(t), acceleration(t)), tuple(map(float, knots)))
+        return Followed(name, place, None, _with_derivatives(deepcopy(given)), tuple(map(float, knots)))
     if not callable(given):
         raise ArgumentError(f"{where} is {shown(given)}; pass a function of t that returns value, rate and acceleration, a "
                             "spline of SciPy, a table (times, values), or a number to hold it")
@@ -159,8 +159,7 @@ def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float
                                 f"{min(span):.9g} s to {max(span):.9g} s; pass one of the whole run (its ends are not held)")
     _demand_continuous(breaks, c, where)
     if len(c) > ORDER or spline.extrapolate == "periodic":
-        rate, acceleration = spline.derivative(1), spline.derivative(2)
-        return Followed(name, place, None, lambda t: (spline(t), rate(t), acceleration(t)),
+        return Followed(name, place, None, _with_derivatives(deepcopy(spline)),
                         _repeated(breaks, span) if spline.extrapolate == "periodic" else tuple(breaks.tolist()))
     powers = np.zeros((ORDER, c.shape[1]))
     powers[:len(c)] = c[::-1]
@@ -169,6 +168,12 @@ def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float
     rows = [np.stack(r, axis=-1) for r in ((c0, c1, c2, c3), (c1, 2 * c2, 3 * c3, none), (2 * c2, 6 * c3, none, none))]
     pieces = Pieces(breaks, np.stack(rows, axis=1))
     return Followed(name, place, pieces, None, tuple(breaks.tolist()))
+
+
+def _with_derivatives(spline: Any) -> Callable[[float], Any]:
+    """The function of t that returns value, rate and acceleration of a spline."""
+    rate, acceleration = spline.derivative(1), spline.derivative(2)
+    return lambda t: (spline(t), rate(t), acceleration(t))
 
 
 def _repeated(breaks: np.ndarray, span: tuple[float, float] | None) -> tuple[float, ...]:
