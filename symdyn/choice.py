@@ -17,9 +17,9 @@ from symdyn.formulation.augmented import augment
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.motion_equations import MotionEquations
 from symdyn.formulation.recursion import recursive
+from symdyn.functions.tapes import function_tape
 from symdyn.kinds import flag
 from symdyn.model.record import Model, joint_speeds
-from symdyn.pipeline import function_tape
 from symdyn.shown import shown
 from symdyn.tape.cycles import WIDTH, Schedule, schedule
 from symdyn.tape.node import PARAMETER

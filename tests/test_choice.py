@@ -19,7 +19,7 @@ from symdyn.cli import main
 from symdyn.errors import CompilerNotFound, EvaluationError, ModelError, SymdynError
 from symdyn.formulation.embedding import embed
 from symdyn.formulation.recursion import recursive
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.runtime.compiler import find_compiler
 from symdyn.runtime.recall import recall
 from symdyn.tape.cycles import fused_products
@@ -296,8 +296,8 @@ def test_what_is_recalled_depends_on_the_formulation(tmp_path: Path, monkeypatch
     monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path))
     for _ in range(2):
         modules = {f: recall("n_link_pendulum", {"n": 2}, "numpy", f) for f in FORMULATIONS}
-        assert modules["embedding"].metadata["formulation"] == "embedding"
-        assert modules["recursive"].metadata["formulation"] == "recursive"
+        assert modules["embedding"].metadata.formulation == "embedding"
+        assert modules["recursive"].metadata.formulation == "recursive"
         values = [module.rhs(0.0, [0.1, 0.2, 0.3, 0.4]) for module in modules.values()]
         assert all(value == pytest.approx(values[0], rel=1e-12) for value in values)
         assert len(list(tmp_path.glob("n_link_pendulum-*.json"))) == len(FORMULATIONS)

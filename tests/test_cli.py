@@ -323,7 +323,7 @@ def test_a_remembered_module_is_whole(here: Path) -> None:
         module = recall.recall("cart_pole", {}, "numpy")
         whole = systems.cart_pole().compile("numpy")
         assert isinstance(module, Module) and module.functions == whole.functions
-        assert module.metadata["units"] == whole.metadata["units"]
+        assert module.metadata.units == whole.metadata.units
         assert np.array_equal(module.jacobian(0.0, [0.1] * 4, inputs=[1.0]).x, whole.jacobian(0.0, [0.1] * 4,
                                                                                              inputs=[1.0]).x)
         assert [p.name for p in module.write(here / "out")] == [p.name for p in whole.write(here / "out")]

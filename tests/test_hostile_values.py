@@ -97,7 +97,7 @@ def test_no_call_takes_them_for_numbers(cart: Any, door: str, k: int) -> None:
 
 @pytest.mark.parametrize("value", [1j, np.complex128(1), np.ma.masked, "1.5", 10**400, -10**5000, [1.0], None, sp.I], ids=shown)
 def test_parameters_are_real_numbers(cart: Any, value: Any) -> None:
-    name = cart.metadata["parameters"][0]
+    name = cart.metadata.parameters[0]
     calls: list[Callable[[], Any]] = [
         lambda: cart.parameters({name: value}), lambda: cart.bind({name: value}), lambda: cart.rhs(0.0, X, {name: value}),
         lambda: cart.rhs_batch(0.0, [X], {name: value}), lambda: cart.simulate((0, 0.1), params={name: value}),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import Method
 
 # The functions that a projection calls, besides those that a method needs.
@@ -44,7 +45,7 @@ class Shape:
 
     sizes      of the groups q, u, z, inputs
     n_rows     rows of the constraints, 0 without a projection
-    events     records with direction, stop and reset
+    events     see EventRecord
     leaves     what values at events are bounded by: 0 for t, then come x and the inputs
     directed   whether there are directions in which the constraints let entries of [q; u] be reset
     """
@@ -52,7 +53,7 @@ class Shape:
     sizes: Mapping[str, int]
     n_rows: int
     unit_groups: Sequence[Sequence[int]]
-    events: Sequence[Mapping[str, Any]]
+    events: Sequence[EventRecord]
     leaves: Sequence[int] = ()
     directed: bool = False
 
@@ -67,7 +68,7 @@ class Shape:
     @property
     def resets(self) -> list[int]:
         """The entries of x that events reset, of one event after the other."""
-        return [place for event in self.events for place in event["reset"]]
+        return [place for event in self.events for place in event.reset]
 
     @property
     def held(self) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import os
@@ -22,6 +23,7 @@ from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.function import Function, Part
 from symdyn.backend.integrated import Shape, functions, switches
 from symdyn.backend.integrated import sizes as runtime_sizes
+from symdyn.backend.metadata import EventRecord, Metadata
 from symdyn.backend.methods import Method, method_of
 from symdyn.backend.parts import Parts
 from symdyn.backend.program import Program, build
@@ -53,7 +55,7 @@ class Content:
     outputs  user outputs: (name, shape) in the order of the function `outputs`
     unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
     otherwise     tapes by function name for where the first ones fail
-    events        what the function `events` is about: records with direction, stop and reset, entries of x, and enclosed
+    events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
     """
 
@@ -69,7 +71,7 @@ class Content:
     notes: Sequence[str] = ()
     unit_groups: Sequence[Sequence[str]] = ()
     otherwise: Mapping[str, Tape] = field(default_factory=dict)
-    events: Sequence[Mapping[str, Any]] = ()
+    events: Sequence[EventRecord] = ()
     event_leaves: Sequence[int] = ()
 
 
@@ -80,7 +82,7 @@ class Source:
     backend: str
     files: Mapping[str, str]
     program: Program
-    metadata: Mapping[str, Any] = field(default_factory=dict)
+    metadata: Metadata
 
 
 def template_folders(extra: str | os.PathLike | None = None) -> list[Path]:
@@ -148,7 +150,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
         if backend == "c":
             text = divided(text) if context["divided"] else whole(text)
         files[target.format(name=context["name"])] = text
-    return Source(backend, files, program, dict(context["metadata_record"]))
+    return Source(backend, files, program, context["metadata_record"])
 
 
 def _environment(*folders: Path) -> jinja2.Environment:
@@ -255,19 +257,15 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
                       "turning": [turns(content.units.get(n)) for n in groups["u"]],
                       "angles": [is_angle(content.units.get(n)) for n in groups["q"]]}
 
-    metadata = {
-        "name": name, "formulation": content.formulation, "version": symdyn.__version__,
-        "q": list(groups["q"]), "u": list(groups["u"]), "z": list(groups["z"]), "x": [*groups["q"], *groups["u"],
-                                                                                     *groups["z"]],
-        "ud": list(groups["ud"]), "inputs": list(groups["inputs"]), "parameters": list(groups["p"]),
-        "defaults": [content.defaults.get(n) for n in groups["p"]],
-        "initial": dict(content.initial),
-        "units": {n: content.units.get(n, "") for g in ("q", "u", "z", "inputs", "p") for n in groups[g]},
-        "sizes": {"x": n_x, **sizes}, "shapes": {f.name: list(f.shape) for f in program.functions},
-        "outputs": [[n, list(shape)] for n, shape in content.outputs], "reasons": list(program.reasons),
-        "n_c": program.n_c, "operations": {f.name: f.count for f in program.functions},
-        "arguments": {f.name: list(f.arguments) for f in program.functions},
-    }
+    metadata = Metadata(
+        name, content.formulation, symdyn.__version__, q=tuple(groups["q"]), u=tuple(groups["u"]), z=tuple(groups["z"]),
+        ud=tuple(groups["ud"]), inputs=tuple(groups["inputs"]), parameters=tuple(groups["p"]),
+        defaults=tuple(content.defaults.get(n) for n in groups["p"]), initial=dict(content.initial),
+        units={n: content.units.get(n, "") for g in ("q", "u", "z", "inputs", "p") for n in groups[g]},
+        shapes={f.name: tuple(f.shape) for f in program.functions},
+        outputs=tuple((n, tuple(shape)) for n, shape in content.outputs), reasons=tuple(program.reasons), n_c=program.n_c,
+        operations={f.name: f.count for f in program.functions},
+        arguments={f.name: tuple(f.arguments) for f in program.functions})
     text = repr([(f.name, f.loads, f.sections, f.results, f.parts) for f in (*written, program.prologue)])
     user_texts = texts_of_user_functions(program.user_functions, dialect.name, name)
     identity = text + "".join("\n".join(("", *t.lines)) for t in user_texts)
@@ -278,7 +276,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "panels": panels,
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
-        "parameters": list(groups["p"]), "metadata": [(repr(k), repr(v)) for k, v in metadata.items()],
+        "parameters": list(groups["p"]), "metadata": _metadata_lines(metadata),
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
         "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
         "lanes": lanes, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
@@ -295,6 +293,19 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),
     }
+
+
+def _metadata_lines(metadata: Metadata) -> list[tuple[str, str]]:
+    """Keys and values as Python text, with the state and the sizes that follow from the names."""
+    sizes = metadata.sizes
+    lines: dict[str, Any] = {}
+    for key, value in metadata.as_plain().items():
+        lines[key] = value
+        if key == "z":
+            lines["x"] = list(metadata.x)
+        if key == "units":
+            lines["sizes"] = {"x": sizes.x, **dataclasses.asdict(sizes)}
+    return [(repr(key), repr(value)) for key, value in lines.items()]
 
 
 def _solver_sizes(program: Program) -> list[tuple[str, str]]:

@@ -38,7 +38,7 @@ def chain() -> Iterator[Figure]:
     system = sd.systems.get("spatial_chain", n=7)
     equations = system.equations()
     module = equations.compile(backend="c")
-    x = np.random.default_rng(3).uniform(-1, 1, (module.metadata["sizes"]["x"], STATES)).T
+    x = np.random.default_rng(3).uniform(-1, 1, (module.metadata.sizes.x, STATES)).T
     rows = np.ascontiguousarray(x)
     same = bool((module.rhs_batch(0.0, x) == module.evaluate("rhs", 0.0, rows)).all())
     state = random_state(equations)

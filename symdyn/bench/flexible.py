@@ -13,7 +13,7 @@ from symdyn.bench import flexible_cases as cases
 from symdyn.bench import flexible_crank as crank
 from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import compile_time, evaluation_time
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.systems.turbine_parts import published_tower_beam
 
 # They were fitted to another model.

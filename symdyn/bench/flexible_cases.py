@@ -67,13 +67,13 @@ def rotor(count: int, free: bool = False) -> System:
 
 def rotor_frequencies(module: Module, speed: float) -> np.ndarray:
     """The first three of flap and of lag, (2, 3), rad/s, of a module of `rotor`; a free shaft is kept at the speed."""
-    if "azimuth" in module.metadata["q"]:
+    if "azimuth" in module.metadata.q:
         linear = module.linearize(at={"azimuth_dot": speed}, fixed={"azimuth": 0.0, "azimuth_dot": speed})
     else:
         params = {"Omega": speed}
         # The beam turns with the hub, and does not swing.
-        still = [u for u in module.metadata["u"] if u.startswith(("flap", "lag"))]
-        at = module.consistent(params=params, keep=still) if "p0_hub" in module.metadata["q"] else None
+        still = [u for u in module.metadata.u if u.startswith(("flap", "lag"))]
+        at = module.consistent(params=params, keep=still) if "p0_hub" in module.metadata.q else None
         linear = module.linearize(at=at, params=params)
     modes = list(linear.modes())
     return np.array([[mode.omega for mode in modes if mode.name.startswith(name)][:3] for name in ("flap", "lag")])
@@ -94,7 +94,7 @@ def rotor_and_nacelle(system: System) -> tuple[float, np.ndarray, np.ndarray]:
     model = system.check()
     numbers = dict(model.defaults)
     module = system.embedding().compile(backend="numpy")
-    frames = module.evaluate("frames", 0.0, np.zeros(len(module.metadata["x"]))).reshape(-1, 12)
+    frames = module.evaluate("frames", 0.0, np.zeros(len(module.metadata.x))).reshape(-1, 12)
     top = frames[[b.name for b in model.bodies].index("tower_tip"), :3]
     parts = []
     for frame, body in zip(frames, model.bodies, strict=True):
@@ -132,7 +132,7 @@ def modes_with_head(count: int, mass: float, center: np.ndarray, inertia: np.nda
 def tower_frequencies(system: System) -> np.ndarray:
     """Hz, first fore-aft (x) and side-to-side (y) about equilibrium; yaw, where there is one, is held."""
     module, beam = system.embedding().compile(backend="numpy"), beam_of(system)
-    keep = {"yaw": 0.0} if "yaw" in module.metadata["q"] else {}
+    keep = {"yaw": 0.0} if "yaw" in module.metadata.q else {}
     found = {}
     for mode in list(module.linearize(module.equilibrium(fixed=keep)).modes())[:2]:
         sway = np.abs(beam.Psi_tip[:2] @ mode.shape[:beam.n])
@@ -254,7 +254,7 @@ def thrown(orientation: str = "angles", blades: int = 2, modes: tuple[int, int] 
 def throw(module: Module, seconds: float = 3.0, **options: Any) -> Any:
     """A motion of `thrown`, the same in both sets of coordinates."""
     speeds = {"azimuth_dot": 3.0, "yaw_dot": 0.5}
-    angles = "psi" in module.metadata["q"]
+    angles = "psi" in module.metadata.q
     speeds |= {"x_dot": 1.0, "psi_dot": 0.6, "theta_dot": -0.4, "phi_dot": 0.5} if angles else {
         "v_x": 1.0, "omega_x": 0.5, "omega_y": -0.4, "omega_z": 0.6}
     return module.simulate(t=np.linspace(0, seconds, 61), u=speeds, rtol=1e-11, atol=1e-12, work=True, **options)
@@ -274,7 +274,7 @@ def momenta(module: Module, solution: Any) -> np.ndarray:
 
 def apart(one: Any, other: Any) -> float:
     """Largest difference of the coordinates that two solutions have in common, relative to the largest of each."""
-    common = [name for name in one.module.metadata["q"] if name in other.module.metadata["q"]]
+    common = [name for name in one.module.metadata.q if name in other.module.metadata.q]
     return max(float(np.abs(one[name] - other[name]).max() / np.abs(one[name]).max()) for name in common)
 
 

@@ -14,8 +14,9 @@ from symdyn.bench.kernel import evaluation_times
 from symdyn.bench.random_tree import random_tree
 from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape
 from symdyn.model.system import System
-from symdyn.pipeline import emit, function_tape
+from symdyn.pipeline import emit
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import require_compiler
 from symdyn.systems import get

@@ -58,16 +58,16 @@ def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 
     source = emit(equations, "c", (name,), standalone=False, integrator=False)
     metadata = source.metadata
     function = source.program.functions[0]
-    sizes = metadata["sizes"]
-    places = {"t": "frame->t[0]", "q": "x", "u": f"x + {sizes['q']}", "z": f"x + {sizes['q'] + sizes['u']}",
+    sizes = metadata.sizes
+    places = {"t": "frame->t[0]", "q": "x", "u": f"x + {sizes.q}", "z": f"x + {sizes.q + sizes.u}",
               "inputs": "frame->inputs", "p": "frame->p", "c": "frame->c"}
     call = ", ".join([*[places[g] for g in function.arguments], "frame->out"])
     text = next(iter(source.files.values())) + _LOOP.format(
-        name=metadata["name"], function=name, call=call, last=sizes["x"] - 1)
+        name=metadata.name, function=name, call=call, last=sizes.x - 1)
     unit = CUnit(text, metadata, require_compiler())
     evaluator = unit.evaluator(name)
-    evaluator.set_params(np.array([0.5 + 0.01 * k if v is None else v for k, v in enumerate(metadata["defaults"])]))
-    evaluator.x[:] = 0.1 + 0.01 * np.arange(sizes["x"]) if x is None else x
+    evaluator.set_params(np.array([0.5 + 0.01 * k if v is None else v for k, v in enumerate(metadata.defaults)]))
+    evaluator.x[:] = 0.1 + 0.01 * np.arange(sizes.x) if x is None else x
     return Loop(evaluator, unit.function("loop"), fed)
 
 
@@ -116,6 +116,6 @@ def compile_time(equations: Equations) -> float:
     for _ in range(3):
         text = next(iter(source.files.values())) + f"// measured at {clock.time_ns()}\n"
         begun = clock.perf_counter()
-        cache.discard(cache.build(text, f"{source.metadata['name']}-bench", require_compiler()))
+        cache.discard(cache.build(text, f"{source.metadata.name}-bench", require_compiler()))
         best = min(best, clock.perf_counter() - begun)
     return float(best)

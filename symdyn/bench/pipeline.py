@@ -14,7 +14,8 @@ import numpy as np
 import symdyn as sd
 from symdyn.bench.figures import Figure, print_figures
 from symdyn.bench.kernel import compile_time, evaluation_time
-from symdyn.pipeline import emit, function_tape
+from symdyn.functions.tapes import function_tape
+from symdyn.pipeline import emit
 
 
 def chain() -> Iterator[Figure]:

@@ -138,7 +138,7 @@ def tumbling(module: Any, rtol: float = 1e-11) -> tuple[float, float]:
     half = float(np.sqrt(0.5))
     upright = module.simulate(t=(0, -8), q={"e0": half, "e2": half}, params={"g": 0.0}, rtol=rtol,
                               u={"omega_x": 0.02, "omega_y": 0.3, "omega_z": 0.05, "yaw_dot": 0.03, "azimuth_dot": 1.2})
-    n_q = len(module.metadata["q"])
+    n_q = len(module.metadata.q)
     start = upright.x[-1]
     solution = module.simulate(t=np.linspace(-8, 8, 801), q=start[:n_q], u=start[n_q:], params={"g": 0.0}, rtol=rtol)
     pitch = solution["platform_pitch_deg"]
@@ -149,7 +149,7 @@ def tumbling(module: Any, rtol: float = 1e-11) -> tuple[float, float]:
 
 def series(module: Any, rtol: float = 1e-11) -> dict[str, Any]:
     """Time series of the moored turbine, with the work of its loads; module: of `turbine()`."""
-    rest = {name: module.metadata["initial"].get(name, 0.0) for name in module.metadata["q"]}
+    rest = {name: module.metadata.initial.get(name, 0.0) for name in module.metadata.q}
     rated = 12.1 * np.pi / 30
     cases: dict[str, dict[str, Any]] = {
         "start-up of the rotor": {"inputs": {"tau_a": 2e6, "v_w": 8.0}},
@@ -168,7 +168,7 @@ def leading(mode: Any) -> str:
 
 def decay_period(module: Any, rest: np.ndarray, mode: Any, size: float = 0.01) -> float:
     """Period of a small free decay, s, from where the mode's leading coordinate passes rest; size: its amplitude, m or rad."""
-    names = module.metadata["q"]
+    names = module.metadata.q
     column = names.index(leading(mode))
     shape = mode.shape / mode.shape[column] * size
     start, speed = rest[:len(names)] + shape.real, (mode.eigenvalue * shape).real
@@ -243,7 +243,7 @@ def flexible() -> Iterator[Figure]:
     rest = module.equilibrium()
     yield "flexible: iterations to equilibrium", rest.iterations, "", "<= 25"
     yield "flexible: the tower's top bends by", rest["tower_fa1"] + rest["tower_fa2"], "m", ""
-    start = {**dict(zip(module.metadata["q"], rest.q, strict=True)), "theta": 0.08}
+    start = {**dict(zip(module.metadata.q, rest.q, strict=True)), "theta": 0.08}
     decay = module.simulate(t=(0, 120), q=start, work=True, rtol=1e-11)
     yield "flexible: energy balance of free decay in pitch", decay.energy_error(), "", "< 1e-8"
     yield "flexible: 2 minutes of it", decay.integrator_seconds or decay.seconds, "s", ""

@@ -28,11 +28,11 @@ def write_files(equations: MotionEquations, backends: Sequence[str], output: Pat
 
     operations: Mapping[str, int] = {}
     sources = [emit(equations, backend, functions, templates) for backend in backends]
-    folder = output or Path("generated") / sources[0].metadata["name"]
+    folder = output or Path("generated") / sources[0].metadata.name
     for source in sources:
         for path in write_source(source, folder):
             print(f"wrote {path}")
-        operations = source.metadata["operations"]
+        operations = source.metadata.operations
     print("operations: " + ", ".join(f"{name} {count}" for name, count in operations.items()))
     print("No compiler was needed; the first lines of main.c tell how to build." if "c" in backends else
           "No compiler was needed.")

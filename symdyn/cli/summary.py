@@ -29,10 +29,10 @@ def summarize(solution: Solution) -> None:
     print(f"  {solution.n_steps} steps, {solution.nfev} evaluations, {time}")
     if "energy" in module.functions and len(solution.t):
         print(f"  {_energy(solution)}")
-    if metadata.get("constraints") and len(solution.t):
+    if metadata.constraints and len(solution.t):
         print(f"  {_constraints(solution)}")
     if len(solution.t):
-        names = metadata["x"]
+        names = metadata.x
         state = ", ".join(f"{n} = {v:.6g}" for n, v in list(zip(names, solution.x[-1]))[:SHOWN])
         more = f", and {len(names) - SHOWN} more in the files" if len(names) > SHOWN else ""
         print(f"  at the end: {state}{more}")

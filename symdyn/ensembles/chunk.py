@@ -117,7 +117,7 @@ def _one_by_one(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
 def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Done) -> None:
     """Simulate samples, by their places, several at once."""
     module: Module = setting.system.module
-    states, times = list(module.metadata["x"]), setting.times
+    states, times = list(module.metadata.x), setting.times
     at_once = max(1, NUMBERS // (len(times) * len(states)))
     for part in (rows[k:k + at_once] for k in range(0, len(rows), at_once)):
         groups = _groups(setting, values[part])
@@ -200,21 +200,21 @@ def setting_of(system: Any, names: Sequence[str], times: np.ndarray, measures: S
     places = []
     unknown = []
     for name in names:
-        group = next((g for g in GROUPS if name in metadata[g]), None)
+        group = next((g for g in GROUPS if name in metadata.names(g)), None)
         if group is None:
             unknown.append(name)
         else:
-            places.append((group, metadata[group].index(name)))
+            places.append((group, metadata.names(group).index(name)))
     if unknown:
         raise ArgumentError(f"{module.name}: samples: there is no {', '.join(unknown)}; there are "
-                            + "; ".join(f"{g}: {', '.join(metadata[g])}" for g in GROUPS if metadata[g]))
+                            + "; ".join(f"{g}: {', '.join(metadata.names(g))}" for g in GROUPS if metadata.names(g)))
     base = {}
     for group in GROUPS:
-        defaults = {n: metadata["initial"].get(n, 0.0) for n in metadata[group]}
+        defaults: dict[str, Any] = dict(metadata.initial_values(group))
         if group == "parameters":
-            known = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
+            known = dict(zip(metadata.parameters, metadata.defaults, strict=True))
             defaults = {n: v if v is not None or n not in names else 0.0 for n, v in known.items()}
-        base[group] = take(given.get(group), metadata[group], group, defaults, module.name)
+        base[group] = take(given.get(group), metadata.names(group), group, defaults, module.name)
     return Setting(system, times, base, tuple(names), tuple(places), tuple(measures), consistent, dict(options))
 
 

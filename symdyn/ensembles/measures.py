@@ -81,10 +81,10 @@ def values_of(solution: Solution, name: str) -> np.ndarray:
 
 def functions_of(module: Module, measures: Sequence[Measure]) -> list[str]:
     """Functions of the module that simulations and measures call."""
-    there, constraints = module.functions, module.metadata["constraints"]
+    there, constraints = module.functions, module.metadata.constraints
     names = {m.name for m in measures}
     wanted = ["rhs", *(("C", "lam") if constraints else ("mass_matrix",))]
-    wanted += ["outputs"] * any(n in names for n, _ in module.metadata["outputs"]) + ["energy"] * ("energy" in names)
+    wanted += ["outputs"] * any(n in names for n, _ in module.metadata.outputs) + ["energy"] * ("energy" in names)
     return [n for n in wanted if n in there]
 
 
@@ -104,7 +104,7 @@ def read_measures(asked: Any, module: Module, faults: list[str]) -> list[Measure
             labels to texts and to functions of a Solution
     """
     if asked is None:
-        asked = [f"end {name}" for name in module.metadata["x"]]
+        asked = [f"end {name}" for name in module.metadata.x]
     if isinstance(asked, str) or not isinstance(asked, (Sequence, Mapping)) or not asked:
         faults.append(f"outcomes must be a list of texts such as 'max q1', or a mapping, found {shown(asked, 80)}")
         return []
@@ -132,8 +132,8 @@ def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measu
         faults.append(f"outcome {shown(value)}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time")
         return None
     name, metadata = match["name"], module.metadata
-    known = [*metadata["x"], *metadata["inputs"], *(n for n, _ in metadata["outputs"]),
-             *(["energy"] if "energy" in metadata["functions"] else ()), *metadata["constraints"]]
+    known = [*metadata.x, *metadata.inputs, *(n for n, _ in metadata.outputs),
+             *(["energy"] if "energy" in metadata.functions else ()), *metadata.constraints]
     if name not in known:
         near = difflib.get_close_matches(name, known, 3)
         faults.append(f"outcome {shown(value)}: there is no {shown(name)}; "
@@ -154,7 +154,7 @@ def output_times(t: Any, measures: Sequence[Measure], module: Module) -> np.ndar
     t   as for `simulate`; the times of "at" are added to a pair (start, end)
     Raises ArgumentError for times that do not fit.
     """
-    t = (0.0, module.metadata["duration"]) if t is None else t
+    t = (0.0, module.metadata.duration) if t is None else t
     n = length_of(t)
     if n is not None:
         demand(4 * n, module.name, f"{n} output times", "pass fewer, or (start, end)")

@@ -9,6 +9,8 @@ import zlib
 from collections.abc import Sequence
 from typing import Any
 
+from symdyn.backend.metadata import Metadata, ModuleMetadata
+from symdyn.backend.right_side import RightSide, key_of
 from symdyn.errors import SymdynError
 from symdyn.runtime.compiler import require_compiler
 from symdyn.runtime.module import Module
@@ -33,21 +35,21 @@ class PortableModule:
         self.module = Module(module.metadata, self._provide, module.backend, module.fallback)
         self.at_home = True
 
-    def _provide(self, name: str) -> Unit:
-        unit: Any = self._given.unit(name)
-        self._units[name] = {"source": unit.source, "metadata": dict(unit.metadata)}
+    def _provide(self, what: str | RightSide) -> Unit:
+        unit: Any = self._given.unit(what)
+        self._units[key_of(what)] = {"source": unit.source, "metadata": unit.metadata.as_plain()}
         return unit  # type: ignore[no-any-return]
 
     def key(self) -> str:
         """Changes with what is computed."""
         self.module.unit("rhs")
-        return hashlib.sha256(self._units["rhs"]["source"].encode()).hexdigest()
+        return hashlib.sha256(self._units[key_of(RightSide())]["source"].encode()).hexdigest()
 
     @functools.cached_property
     def _packed(self) -> bytes:
         for name in self._functions:
             self.module.unit(name)
-        record = {"metadata": dict(self.module.metadata), "units": self._units}
+        record = {"metadata": self.module.metadata.as_plain(), "units": self._units}
         return zlib.compress(json.dumps(record).encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -77,13 +79,17 @@ def _module(backend: str, packed: bytes) -> Module:
     record = json.loads(zlib.decompress(packed))
     units = record["units"]
 
-    def provide(name: str) -> Unit:
-        there = name if name in units else next((n for n, u in units.items() if name in u["metadata"]["shapes"]), None)
-        if there is None:
-            raise NotSent(f"{record['metadata']['name']}: {name} was not sent along; it was not used by the samples that "
-                          "were tried in advance. Name it in `functions`")
-        source, metadata = units[there]["source"], units[there]["metadata"]
-        return (CUnit(source, metadata, require_compiler()) if backend == "c"
-                else PythonUnit.from_source(source, metadata["name"]))
+    def provide(what: str | RightSide) -> Unit:
+        there = key_of(what)
+        if there not in units and isinstance(what, str):
+            there = next((key for key, u in units.items() if what in u["metadata"]["shapes"]), there)
+        if there not in units:
+            label = what if isinstance(what, str) else what.label
+            raise NotSent(f"{metadata.name}: {label} was not sent along; it was not used by the samples that were tried in "
+                          "advance. Name it in `functions`")
+        source, of_unit = units[there]["source"], Metadata.of_plain(units[there]["metadata"])
+        return (CUnit(source, of_unit, require_compiler()) if backend == "c"
+                else PythonUnit.from_source(source, of_unit.name))
 
-    return Module(record["metadata"], provide, backend)
+    metadata = ModuleMetadata.of_plain(record["metadata"])
+    return Module(metadata, provide, backend)

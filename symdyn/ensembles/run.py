@@ -202,7 +202,7 @@ class _Run:
         return {"system": module.name, "names": list(self.samples.names), "varied": list(self.samples.varied),
                 "outcomes": [m.label for m in measures], "count": self.store.count,
                 "shapes": {m.label: s for m, s in zip(measures, self.setting.shapes)},
-                "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata["units"]},
+                "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata.units},
                 "about": {m.label: m.told() for m in measures}, "rtol": self.setting.options.get("rtol", 1e-8)}
 
 
@@ -228,7 +228,7 @@ def _tried(setting: Setting, samples: Samples) -> Setting:
 
 def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...]:
     """The shape of an outcome where no motion tells it; of a function a number."""
-    own = tuple(dict(map(tuple, module.metadata["outputs"])).get(measure.name, ()))  # type: ignore[arg-type]
+    own = dict(module.metadata.outputs).get(measure.name, ())
     return (len(setting.times), *own) if measure.kind == "trace" else own
 
 

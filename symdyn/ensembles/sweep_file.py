@@ -34,6 +34,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.samples import SAMPLINGS, Samples
 from symdyn.errors import ArgumentError
@@ -69,22 +70,22 @@ class Sweep:
     def arguments(self, module: Any) -> dict[str, Any]:
         """What `ensemble` takes. The names have been checked."""
         metadata, start = module.metadata, self.fixed.get("initial", {})
-        states = {group: {n: v for n, v in start.items() if n in metadata[group]} or None for group in ("q", "u", "z")}
+        states = {group: {n: v for n, v in start.items() if n in metadata.names(group)} or None for group in ("q", "u", "z")}
         return {"samples": self.samples, "t": self.values.get("t"), "outcomes": self.values.get("outcomes"), **states,
                 "params": self.fixed.get("parameters") or None, "inputs": self.fixed.get("inputs") or None,
                 "chunk": self.values.get("chunk"), "consistent": self.values.get("consistent", False),
                 **{k: self.values[k] for k in OPTIONS if k in self.values}}
 
-    def unknown_names(self, metadata: Mapping[str, Any]) -> list[str]:
+    def unknown_names(self, metadata: ModuleMetadata) -> list[str]:
         """Faults: names that the mechanism does not have."""
         faults = []
         for table, groups in TABLES.items():
-            known = [n for g in groups for n in metadata[g]]
+            known = [n for g in groups for n in metadata.names(g)]
             for name in [*self.fixed.get(table, {}), *self.varied.get(table, [])]:
                 if name not in known:
                     near = difflib.get_close_matches(name, known, 3)
                     hint = f", did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(known) or 'none'}"
-                    faults.append(f"{table}.{name}: {metadata['name']} has no such name{hint}")
+                    faults.append(f"{table}.{name}: {metadata.name} has no such name{hint}")
         return faults
 
 

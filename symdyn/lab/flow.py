@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.lab.manifold import onto, ranks
 
 # Largest steps, of which the better result counts, and how many of each; a step moves coordinates and speeds by so much (SI).
@@ -54,14 +55,14 @@ class Coordinates:
         return len(self.displacements) + len(self.speeds) + len(self.states)
 
     @classmethod
-    def named(cls, metadata: Any, displacements: Sequence[str], others: Sequence[str]) -> Coordinates:
+    def named(cls, metadata: ModuleMetadata, displacements: Sequence[str], others: Sequence[str]) -> Coordinates:
         """From the names that a linearization has for displacements, and for speeds and extra states.
 
         A displacement has the name of the coordinate whose rate is a speed, else of the speed along which it is. Raises
         ValueError for other names.
         """
-        speeds, states = list(metadata["u"]), list(metadata["z"])
-        labels = [u.removesuffix("_dot") if u.removesuffix("_dot") in metadata["q"] else u for u in speeds]
+        speeds, states = list(metadata.u), list(metadata.z)
+        labels = [u.removesuffix("_dot") if u.removesuffix("_dot") in metadata.q else u for u in speeds]
         free = [n for n in others if n in states]
         moving = others[:len(others) - len(free)]
         return cls(tuple(labels.index(n) for n in displacements), tuple(speeds.index(n) for n in moving),
@@ -77,15 +78,15 @@ class Flow:
     def __init__(self, module: Any, t: float, x: np.ndarray, params: np.ndarray, inputs: np.ndarray,
                  coordinates: Coordinates) -> None:
         self.module, self.t, self.x, self.p, self.inputs, self.coordinates = module, t, x, params, inputs, coordinates
-        sizes = module.metadata["sizes"]
-        self.n_q, self.n_u, self.n_x = sizes["q"], sizes["u"], sizes["x"]
+        sizes = module.metadata.sizes
+        self.n_q, self.n_u, self.n_x = sizes.q, sizes.u, sizes.x
         self._dependent = [k for k in range(self.n_u) if k not in coordinates.displacements]
         self._dependent_speeds = [k for k in range(self.n_u) if k not in coordinates.speeds]
         self._inverse = np.linalg.pinv(self._evaluate("N", x))
 
     def freedoms(self) -> tuple[int, int]:
         """How many displacements and speeds are independent here."""
-        if not self.module.metadata["constraints"]:
+        if not self.module.metadata.constraints:
             return self.n_u, self.n_u
         positions, speeds, _ = ranks(self.module, self.t, self.x, self.p)
         return self.n_u - positions, self.n_u - speeds
@@ -173,7 +174,7 @@ class Flow:
 
     def _outputs(self, x: np.ndarray, inputs: np.ndarray | None = None) -> np.ndarray:
         inputs = self.inputs if inputs is None else inputs
-        if not self.module.metadata["outputs"]:
+        if not self.module.metadata.outputs:
             return np.zeros((max(len(x), len(np.atleast_2d(inputs))), 0))
         return self._rows("outputs", x, inputs)
 

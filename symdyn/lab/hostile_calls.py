@@ -530,7 +530,7 @@ def _urdf(text: str) -> Any:
         path = Path(folder, "robot.urdf")
         path.write_bytes(text.encode("utf-8", "surrogatepass"))
         module = sd.read_urdf(path, damping=True).embedding().compile("numpy")
-        return module.rhs(0.0, np.full(module.metadata["sizes"]["x"], 0.1))
+        return module.rhs(0.0, np.full(module.metadata.sizes.x, 0.1))
 
 
 def _sweep(text: str) -> Any:

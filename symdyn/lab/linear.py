@@ -175,7 +175,7 @@ def _worst(linear: Any, errors: Sequence[float], found: Matrices, expected: Matr
         return ""
     row, column = np.unravel_index(int(np.argmax(difference)), difference.shape)
     rows = linear.states if k < 2 else linear.outputs
-    columns = linear.states if k in (0, 2) else linear.module.metadata["inputs"]
+    columns = linear.states if k in (0, 2) else linear.module.metadata.inputs
     return (f"{NAMES[k]}[{rows[row]}, {columns[column]}] is {found[k][row, column]:.9g}, differences give "
             f"{expected[k][row, column]:.9g}")
 

@@ -44,12 +44,12 @@ def ranks(module: Any, t: float, x: np.ndarray, p: np.ndarray, least: float = 0.
 def holonomic(module: Any) -> np.ndarray:
     """Which rows bind displacements, (n_c,) of bool."""
     metadata = module.metadata
-    return np.array(metadata.get("holonomic") or [True] * len(metadata["constraints"]), dtype=bool)
+    return np.array(metadata.holonomic or [True] * len(metadata.constraints), dtype=bool)
 
 
 def consistent_state(module: Any, t: float, x: np.ndarray, p: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
     """The state on the constraints nearest to x (n_x,), to rounding; at: see `onto`, default x."""
-    everything = range(module.metadata["sizes"]["u"])
+    everything = range(module.metadata.sizes.u)
     return onto(module, t, x[None], p, everything, everything, x if at is None else at)[0]
 
 
@@ -63,10 +63,10 @@ def onto(module: Any, t: float, x: np.ndarray, p: np.ndarray, displacements: Ite
     Raises OffConstraints if it does not converge, or if other rows do not follow.
     """
     metadata = module.metadata
-    n_q = metadata["sizes"]["q"]
+    n_q = metadata.sizes.q
     displacements, speeds = list(displacements), list(speeds)
     x = normalised(module, x.copy())
-    if not metadata["constraints"]:
+    if not metadata.constraints:
         return x
     C_r = module.evaluate("C_r", t, at, p)
     rows = np.flatnonzero(holonomic(module))
@@ -103,8 +103,8 @@ def _independent(rows: np.ndarray) -> np.ndarray:
 
 def normalised(module: Any, x: np.ndarray) -> np.ndarray:
     """The states (n, n_x) with Euler parameters of length 1."""
-    for group in module.metadata.get("unit_groups", ()):
-        columns = [module.metadata["x"].index(name) for name in group]
+    for group in module.metadata.unit_groups:
+        columns = [module.metadata.x.index(name) for name in group]
         x[:, columns] /= np.linalg.norm(x[:, columns], axis=1, keepdims=True)
     return x
 

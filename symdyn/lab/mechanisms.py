@@ -136,7 +136,7 @@ class _Composer:
         module = equations.compile(backend=backend)
         x = self._state(module)
         reference = module if not hold else self._holding(module, x, hold).compile(backend=backend)
-        inputs = np.array([draft.number(-1, 1) for _ in module.metadata["inputs"]])
+        inputs = np.array([draft.number(-1, 1) for _ in module.metadata.inputs])
         if self.motion == "any":
             params = {p.name: draft.signed(0.2, 2) for p in self.trims}
         elif formulation == "absolute":  # whose speeds change in steady motion
@@ -540,16 +540,16 @@ class _Composer:
         """x on the constraints. Raises IllConditioned."""
         metadata, draft = module.metadata, self.draft
         values = {**{q.name: v for q, v in draft.values.items()}, **{u.name: v for u, v in self.rates.items()}}
-        values |= {name: v for name, v in metadata["initial"].items() if name not in values}  # of absolute coordinates
-        x = np.array([values[name] for name in metadata["x"]])
+        values |= {name: v for name, v in metadata.initial.items() if name not in values}  # of absolute coordinates
+        x = np.array([values[name] for name in metadata.x])
         p = module.parameters({})
         N = module.evaluate("N", draft.t, x, p)
         if np.linalg.cond(N) * WELL_CONDITIONED > 1:
             raise IllConditioned("Euler angles are nearly locked")
-        if metadata["constraints"]:
+        if metadata.constraints:
             ranks(module, draft.t, x, p, WELL_CONDITIONED, IllConditioned)
         moved = consistent_state(module, draft.t, x, p)
-        change = np.abs(moved - x)[:metadata["sizes"]["q"]].max(initial=0.0)
+        change = np.abs(moved - x)[:metadata.sizes.q].max(initial=0.0)
         if change > 1e-9 or (self.motion != "any" and np.abs(moved - x).max() > 1e-9):
             raise RuntimeError(f"{module.name}: the state that was drawn is off its constraints by {np.abs(moved - x).max():.2g}")
         return moved
@@ -570,21 +570,21 @@ class _Composer:
         no rate of a coordinate stays."""
         draft, metadata = self.draft, module.metadata
         symbols = {s.name: s for s in (*draft.values, *draft.speeds)}
-        rates = module.rhs(draft.t, x, None, np.zeros(len(metadata["inputs"])))
+        rates = module.rhs(draft.t, x, None, np.zeros(len(metadata.inputs)))
         for name in hold:
-            coordinate = name if name in metadata["q"] else name.removesuffix("_dot")
-            if coordinate in metadata["q"]:
-                k = metadata["q"].index(coordinate)
+            coordinate = name if name in metadata.q else name.removesuffix("_dot")
+            if coordinate in metadata.q:
+                k = metadata.q.index(coordinate)
                 expression = symbols[coordinate] - float(x[k]) - float(rates[k]) * (sd.t - draft.t)
             else:
-                expression = symbols[name] - float(x[metadata["x"].index(name)])
+                expression = symbols[name] - float(x[metadata.x.index(name)])
             draft.system.add_constraint(expression, name=f"hold_{name}")
         return draft.system.augmented()
 
     def _trimmed(self, module: Any, x: np.ndarray, inputs: np.ndarray) -> dict[str, float]:
         """Trims that make the derivatives of speeds and extra states zero; what they leave open is drawn."""
         metadata, t = module.metadata, self.draft.t
-        n_q, names = metadata["sizes"]["q"], [p.name for p in self.trims]
+        n_q, names = metadata.sizes.q, [p.name for p in self.trims]
 
         def rates(values: np.ndarray) -> np.ndarray:
             found: np.ndarray = module.rhs(t, x, dict(zip(names, values, strict=True)), inputs)[n_q:]
@@ -606,7 +606,7 @@ class _Composer:
         """Raise IllConditioned for a mechanism whose equations lose digits."""
         t, p = self.draft.t, module.parameters(params)
         M = module.evaluate("mass_matrix", t, x, p)
-        if module.metadata["constraints"]:
+        if module.metadata.constraints:
             positions, speeds, Z = ranks(module, t, x, p, WELL_CONDITIONED, IllConditioned)
             M = Z.T @ M @ Z
             if any(ranks(module, t, near, p)[:2] != (positions, speeds) for near in self._near(module, x, p)):
@@ -621,7 +621,7 @@ class _Composer:
 
     def _near(self, module: Any, x: np.ndarray, p: np.ndarray) -> Iterator[np.ndarray]:
         """States on the constraints a little away."""
-        n_q, n_u = module.metadata["sizes"]["q"], module.metadata["sizes"]["u"]
+        n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
         N = module.evaluate("N", self.draft.t, x, p)
         for _ in range(2):
             near = x.copy()

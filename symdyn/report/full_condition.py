@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.runtime.charts import CHARTS, INSTEAD, distances
+from symdyn.runtime.charts import INSTEAD, distances
 from symdyn.runtime.solution import Solution
 from symdyn.stress.subject import Subject
 from symdyn.stress.yardstick import DEPENDENT, conditions
@@ -141,7 +141,7 @@ def _weakest(subject: Subject, t: float, x: np.ndarray) -> list[str]:
 def _locks(subject: Subject, t: np.ndarray, x: np.ndarray) -> list[Place]:
     """For the Euler angles of every joint where they come nearest to gimbal lock, and where else they come near."""
     found = []
-    for (joint, sequence, *_), d in zip(subject.module.metadata.get(CHARTS, ()), distances(subject.module, x).T, strict=True):
+    for (joint, sequence, *_), d in zip(subject.module.metadata.charts, distances(subject.module, x).T, strict=True):
         for k in _highest(-d, -NEAR_LOCK):
             near = bool(d[k] < NEAR_LOCK)
             advice = f": {INSTEAD}" if near else ""

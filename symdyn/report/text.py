@@ -75,7 +75,8 @@ def _row(name: str, tape: Tape) -> Row:
 
 def report(equations: Equations, backend: str, fallback: str = "") -> Report:
     """The report of equations on a backend; counts after hoisting, one each for + - * / sqrt sin cos."""
-    from symdyn.pipeline import STANDARD, function_tape, has_function
+    from symdyn.functions.table import STANDARD
+    from symdyn.functions.tapes import function_tape, has_function
 
     rows = []
     for name in (*STANDARD, *OF_CONSTRAINTS * bool(equations.constraints)):

@@ -103,7 +103,7 @@ class Actuation:
 
     def describe(self) -> str:
         """Inputs with units, multipliers, what is left, rank and condition, as a table."""
-        units = self.module.metadata["units"]
+        units = self.module.metadata.units
         known = [*self.inputs.names[0], *self.multipliers.names[0]]
         width = max([4, *map(len, known)])
         many = "unique" if self.unique else f"those of least norm of {len(self.found)} for {self.rank} freedoms"
@@ -129,14 +129,14 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
     metadata = module.metadata
     time = number(t, "a finite number of seconds as t", module.name)
     p = real_parameters(module, params)
-    groups = [take(values, metadata[group], group, {n: metadata["initial"].get(n, 0.0) for n in metadata[group]}, module.name)
+    groups = [take(values, metadata.names(group), group, metadata.initial_values(group), module.name)
               for group, values in (("q", q), ("u", u), ("z", z))]
-    rates = take(ud, metadata["u"], "ud", dict.fromkeys(metadata["u"], 0.0), module.name)
+    rates = take(ud, metadata.u, "ud", dict.fromkeys(metadata.u, 0.0), module.name)
     given, guess = _inputs(module, inputs, "inputs"), _inputs(module, start, "start")
-    values = np.array([given.get(n, guess.get(n, metadata["initial"].get(n, 0.0))) for n in metadata["inputs"]], dtype=float)
+    values = np.array([given.get(n, guess.get(n, metadata.initial.get(n, 0.0))) for n in metadata.inputs], dtype=float)
     x = normalised(module, np.concatenate(groups))
     module = module.following(values)
-    kept = list(named(keep, [*metadata["q"], *metadata["u"]], "keep", module.name)) if project or len(keep) else []
+    kept = list(named(keep, [*metadata.q, *metadata.u], "keep", module.name)) if project or len(keep) else []
     if kept and not project:
         raise ArgumentError(f"{module.name}: keep names what stays in a projection; pass project=True, too, or leave it out")
     if project:
@@ -150,23 +150,23 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
     else:
         _demand_accelerations(place, gaps)
     motions = motion_inputs(metadata)
-    free = [k for k, n in enumerate(metadata["inputs"]) if n not in {*given, *motions}]
+    free = [k for k, n in enumerate(metadata.inputs) if n not in {*given, *motions}]
     return _Balance(place, free).solved((*given, *motions))
 
 
 def input_matrix(module: Module, t: Any, x: Any, params: Any, inputs: Any) -> Labelled:
     """See Module.input_matrix."""
-    metadata, units = module.metadata, module.metadata["units"]
-    state = take(x, metadata["x"], "x", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
-    given = module.evaluate("input_matrix", t, state, params, inputs) if metadata["inputs"] else np.zeros((len(metadata["u"]), 0))
-    forces = {u: force_unit(units.get(u, "")) for u in metadata["u"]}
-    return Labelled(given, metadata["u"], metadata["inputs"],
-                    units={**forces, **{n: units.get(n, "") for n in metadata["inputs"]}})
+    metadata, units = module.metadata, module.metadata.units
+    state = take(x, metadata.x, "x", metadata.initial_values("x"), module.name)
+    given = module.evaluate("input_matrix", t, state, params, inputs) if metadata.inputs else np.zeros((len(metadata.u), 0))
+    forces = {u: force_unit(units.get(u, "")) for u in metadata.u}
+    return Labelled(given, metadata.u, metadata.inputs,
+                    units={**forces, **{n: units.get(n, "") for n in metadata.inputs}})
 
 
 def _inputs(module: Module, values: Any, what: str) -> dict[str, float]:
     """Inputs by name; all of them, if they are given in order."""
-    known = module.metadata["inputs"]
+    known = module.metadata.inputs
     if values is None or isinstance(values, Mapping):
         return some(values, known, what, module.name)
     if np.size(values) == 0:
@@ -238,10 +238,10 @@ class _Balance:
         metadata, rows = module.metadata, names(module)
         sure = unique(module, place.t, place.x, place.p) if rows else ()
         return Actuation(module, place.t, place.q, place.u, place.ud,
-                         Labelled(place.inputs, metadata["inputs"], units=metadata["units"]), kept, Labelled(lam, rows),
+                         Labelled(place.inputs, metadata.inputs, units=metadata.units), kept, Labelled(lam, rows),
                          tuple(n for n, known in zip(rows, sure, strict=True) if known),
-                         Labelled(place.forces, metadata["u"], units={u: force_unit(metadata["units"].get(u, ""))
-                                                                      for u in metadata["u"]}),
+                         Labelled(place.forces, metadata.u, units={u: force_unit(metadata.units.get(u, ""))
+                                                                      for u in metadata.u}),
                          self.Z.shape[1], drive.rank, drive.condition)
 
     def _searched(self) -> Place:
@@ -272,7 +272,7 @@ class _Balance:
     def nonlinear(self) -> bool:
         """Whether the derivative by the inputs depends on inputs."""
         module = self.place.module
-        return bool(self.free) and "inputs" in module.unit("input_matrix").metadata["arguments"]["input_matrix"]
+        return bool(self.free) and "inputs" in module.unit("input_matrix").metadata.arguments["input_matrix"]
 
     def _newton(self, place: Place) -> Place:
         """Newton's method with steps of least norm; linear equations take one step, and one for its rounding."""
@@ -306,7 +306,7 @@ class _Balance:
     def _raise(self, place: Place) -> NoReturn:
         """Raises ArgumentError with the direction in which no input works."""
         metadata, owner = place.module.metadata, place.module.name
-        sought = [metadata["inputs"][k] for k in self.free]
+        sought = [metadata.inputs[k] for k in self.free]
         left = self.left(place)
         drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(place)))
         missing = drive.outside(left)
@@ -321,12 +321,12 @@ class _Balance:
         along = [k for k in np.argsort(-shares.round(6), kind="stable") if shares[k] >= SHARE]
         told = ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in along)
         if len(along) == 1 and shares[along[0]] > 1 - 1e-9:
-            unit = force_unit(metadata["units"].get(metadata["u"][along[0]], ""))
+            unit = force_unit(metadata.units.get(metadata.u[along[0]], ""))
             amount = f"{np.linalg.norm(missing) / self.scales[along[0]]:.6g} {unit}".rstrip()
         else:
             amount = f"{np.linalg.norm(missing):.6g} N (moments divided by {natural_length(place):.3g} m)"
         which = (f"no input works along {told}" if not sought else
-                 f"{', '.join(sought)} cannot work along {told}") if metadata["inputs"] else \
+                 f"{', '.join(sought)} cannot work along {told}") if metadata.inputs else \
             f"the system has no inputs, so nothing works along {told}"
         raise ArgumentError(
             f"{owner}: no inputs make this motion: {which}, where {amount} {'is' if len(along) == 1 else 'are'} missing; rank "
@@ -339,7 +339,7 @@ def _demand_linear(balance: _Balance, drive: _Drive) -> None:
     if not balance.nonlinear or drive.rank == len(balance.free):
         return
     place = balance.place
-    known = place.module.metadata["inputs"]
+    known = place.module.metadata.inputs
     base = balance.matrix(place)
     bent = []
     for k in balance.free:
@@ -381,5 +381,5 @@ class _Drive:
 
 
 def _values(place: Place, sought: Sequence[str]) -> str:
-    known = place.module.metadata["inputs"]
+    known = place.module.metadata.inputs
     return ", ".join(f"{n} = {place.inputs[known.index(n)]:.6g}" for n in sought)

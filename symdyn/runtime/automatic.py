@@ -61,7 +61,7 @@ def _by_tolerance(module: Module, request: Request, verdict: str, explicit: str)
     """The method for a motion that needs no implicit one, and why."""
     if module.backend != "c":
         return explicit, "of the explicit methods that need no compiled code the one of order 8 is quickest"
-    operations = module.metadata.get("operations", {}).get("rhs", SHORT)
+    operations = module.metadata.operations.get("rhs", SHORT)
     loose = LOOSE_TINY_RTOL if operations < TINY else LOOSE_RTOL
     finest = SHORT_RTOL if operations < SHORT else FINEST_RTOL
 
@@ -155,7 +155,7 @@ def _doubt(module: Module, found: Outcome, request: Request, product: float, to_
     rough = _roughest(found.t[-half:], found.x[-half:, :n], request.rtol, request.atol[:n])
     if rough is not None:
         return (f"the motion itself, not stability, asks for short steps: over {half} explicit ones, to t = {found.t[-1]:.3g} s, "
-                f"{module.metadata['x'][rough.entry]} departs from a cubic by {100 * rough.missed:.2g} % of its range, where "
+                f"{module.metadata.x[rough.entry]} departs from a cubic by {100 * rough.missed:.2g} % of its range, where "
                 f"{100 * rough.allowed:.2g} % would be smooth")
     return (f"stiffness does not matter: some {to_come:.0f} explicit steps are to come, fewer than the {MANY} from which on an "
             "implicit method pays" if to_come < MANY else "")

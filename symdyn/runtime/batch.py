@@ -45,13 +45,13 @@ def parameter_rows(module: Module, params: Any) -> np.ndarray:
     """Parameters, (n, n_p), or (1, n_p) where none varies."""
     if params is None:  # looking at every one of them takes longer than some hundred states
         return module.default_parameters[None, :]
-    defaults = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
-    return take_rows(params, module.metadata["parameters"], "parameters", defaults, module.name)
+    defaults = dict(zip(module.metadata.parameters, module.metadata.defaults, strict=True))
+    return take_rows(params, module.metadata.parameters, "parameters", defaults, module.name)
 
 
 def input_rows(module: Module, inputs: Any, defaults: Mapping[str, float]) -> np.ndarray:
     """Constant inputs, (n, n_in), or (1, n_in) where none varies."""
-    names = module.metadata["inputs"]
+    names = module.metadata.inputs
     left_out = inputs is None or (isinstance(inputs, (list, tuple)) and not inputs) or getattr(inputs, "size", 1) == 0
     given = None if left_out else inputs
     return take_rows(given, names, "inputs", {n: defaults.get(n, 0.0) for n in names}, module.name)
@@ -60,15 +60,15 @@ def input_rows(module: Module, inputs: Any, defaults: Mapping[str, float]) -> np
 def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = (), out: np.ndarray | None = None) -> np.ndarray:
     """x_dot (n, n_x); see Module.rhs_batch."""
     states, times = _numbers(module, x, "x"), _numbers(module, t, "t")
-    n_x = module.metadata["sizes"]["x"]
+    n_x = module.metadata.sizes.x
     if states.ndim == 1:
         states = states[None, :]
     if states.ndim != 2 or states.shape[1] != n_x:
         raise ArgumentError(f"{module.name}: x has the shape {np.shape(x)}, needed is (n, {n_x}): "
-                            f"{', '.join(module.metadata['x'])}")
+                            f"{', '.join(module.metadata.x)}")
     if times.ndim > 1:
         raise ArgumentError(f"{module.name}: t has the shape {times.shape}; give one time, or one for each state")
-    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, module.metadata["initial"]),
+    arrays = {"t": times.reshape(-1, 1), "x": states, "inputs": input_rows(module, inputs, module.metadata.initial),
               "params": parameter_rows(module, params)}
     n = together(arrays, module.name)
     demand(n * n_x * (1 if module.backend == "c" else 3), module.name, f"{n} rows of {n_x} numbers", "pass fewer rows at a time")
@@ -149,5 +149,5 @@ def _numbers(module: Module, values: Any, what: str) -> np.ndarray:
 
 
 def _given_not_finite(module: Module, x: np.ndarray) -> str:
-    bad = [name for name, value in zip(module.metadata["x"], x, strict=True) if not np.isfinite(value)]
+    bad = [name for name, value in zip(module.metadata.x, x, strict=True) if not np.isfinite(value)]
     return f" ({', '.join(bad)} given not finite)" if bad else ""

@@ -16,8 +16,7 @@ from symdyn.runtime.batch import UNIT, input_rows, parameter_rows, tables_of, wi
 from symdyn.runtime.batch_arguments import take_rows, together
 from symdyn.runtime.batch_solution import BatchSolution
 from symdyn.runtime.batch_watches import outside
-from symdyn.runtime.charts import CHARTS, locked
-from symdyn.runtime.chatter import SWITCHES
+from symdyn.runtime.charts import locked
 from symdyn.runtime.events import wanted
 from symdyn.runtime.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.masses import negative_masses
@@ -25,7 +24,6 @@ from symdyn.runtime.memory import demand
 from symdyn.runtime.sampled import check_span
 from symdyn.runtime.simulate import checked_method, checked_positive, checked_spacing, checked_times, checked_tolerances
 from symdyn.runtime.stops import describe_stop
-from symdyn.runtime.watches import WATCHES
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -70,23 +68,23 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
     has_events = bool(wanted(module, events).any())
-    initial = metadata["initial"]
-    groups = [take_rows(values, metadata[what], f"initial {what}", {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
+    initial = metadata.initial
+    groups = [take_rows(values, metadata.names(what), f"initial {what}", metadata.initial_values(what), module.name)
               for what, values in (("q", q), ("u", u), ("z", z))]
     by_time = varies_over_time(inputs)
     fixed = input_rows(module, None if by_time else inputs, initial)
-    demand_rest(fixed, metadata["inputs"], metadata.get("motions", ()), module.name)
+    demand_rest(fixed, metadata.inputs, metadata.motions, module.name)
     rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
     n = together(rows, module.name)
     times, span = _times(module, t)
     # The states that are kept, and starts, parameters, inputs and the report of each motion.
-    demand(n * (len(times) * metadata["sizes"]["x"] + metadata["sizes"]["x"] + 12), module.name,
-           f"{n} motions with {len(times)} states of {metadata['sizes']['x']} numbers each", "simulate fewer at a time, or call "
+    demand(n * (len(times) * metadata.sizes.x + metadata.sizes.x + 12), module.name,
+           f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
     starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
-    along = take_inputs(inputs, metadata["inputs"], initial, module.name, span, interpolation, extend,
-                        metadata.get("motions", ())) if by_time else None
+    along = take_inputs(inputs, metadata.inputs, initial, module.name, span, interpolation, extend,
+                        metadata.motions) if by_time else None
     if along is not None:  # what does not fit is an error before any motion runs
         check_span(along.samplers, span, module.name)
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
@@ -95,14 +93,14 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
     if by_time:
         options |= {"interpolation": interpolation, "extend": extend}
-    given = np.full((n, len(times), metadata["sizes"]["inputs"]), np.nan) if by_time and metadata.get(WATCHES) else fixed
+    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
     varying = inputs if by_time else None
     solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
     if solution.messages:
         told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
         more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
         warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
-    near = locked(module, times, solution.x, asked.rtol) if metadata.get(CHARTS) else []
+    near = locked(module, times, solution.x, asked.rtol) if metadata.charts else []
     for sentence in outside(module, times, solution.x, asked.params, given) + near:
         warnings.warn(sentence, SimulationWarning, stacklevel=3)
     return solution
@@ -119,13 +117,13 @@ def why_one_by_one(module: Module, events: bool = True) -> str:
     metadata = module.metadata
     if module.backend != "c":
         return f"one by one: the backend is {module.backend}"
-    if metadata["constraints"]:
+    if metadata.constraints:
         return "one by one: the mechanism has constraints, which states are projected onto"
-    if metadata["unit_groups"]:
+    if metadata.unit_groups:
         return "one by one: the mechanism has Euler parameters, which are normalised after every step"
     if events and wanted(module, events).any():
         return "one by one: the mechanism has events"
-    return "" if metadata["sizes"]["x"] else "one by one: the mechanism has no state"
+    return "" if metadata.sizes.x else "one by one: the mechanism has no state"
 
 
 def many_at_once(module: Module, built: bool) -> str:
@@ -149,7 +147,7 @@ def _why_these(by_time: bool, options: Mapping[str, Any]) -> str:
 
 def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     unit: Any = module.unit(UNIT)
-    n, n_x = asked.n, module.metadata["sizes"]["x"]
+    n, n_x = asked.n, module.metadata.sizes.x
     x = np.full((n, len(asked.times), n_x), np.nan)
     report = np.full((n, _X + 2 * n_x + 8), np.nan)
     size = unit.function("batch_size")
@@ -165,7 +163,7 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     go.restype = ctypes.c_long
     begun = clock.perf_counter()
     interrupted, done, waited = False, 0, 0
-    jumping = bool(module.metadata.get(SWITCHES))
+    jumping = bool(module.metadata.switches)
     try:
         unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out)
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (jumping and waited == PATIENCE):
@@ -219,17 +217,17 @@ def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
 def _message(unit: Any, row: np.ndarray) -> str:
     status, metadata = row[_STATUS], unit.metadata
     if np.isnan(status):
-        return f"{metadata['name']}: not finished"
+        return f"{metadata.name}: not finished"
     reason, bad = unit.reason(int(row[_REASON])), int(row[_BAD])
     if status == _NO_CONSTANTS:
-        return f"{metadata['name']}: {reason}; check the parameters"
-    n_x, failed = metadata["sizes"]["x"], status in (_FIELD_FAILED, _NOT_FINITE)
+        return f"{metadata.name}: {reason}; check the parameters"
+    n_x, failed = metadata.sizes.x, status in (_FIELD_FAILED, _NOT_FINITE)
     x = row[_X + n_x * failed:][:n_x]
     if status == _BAD_START:
-        wrong = [name for name, value in zip(metadata["x"], x, strict=True) if not np.isfinite(value)]
-        return f"{metadata['name']}: the start is not finite: {', '.join(wrong)}"
+        wrong = [name for name, value in zip(metadata.x, x, strict=True) if not np.isfinite(value)]
+        return f"{metadata.name}: the start is not finite: {', '.join(wrong)}"
     why = {_FIELD_FAILED: reason, _STEP_TOO_SMALL: f"the step became too small ({row[_H]:.3g} s) for the tolerances",
-           _NOT_FINITE: f"the derivative of {metadata['x'][bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
+           _NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
     t = row[_T_FAIL if failed else _T]
     return describe_stop(metadata, t, x, why.get(int(status), f"the integrator refused (status {int(status)})"))
 
@@ -240,7 +238,7 @@ def _message(unit: Any, row: np.ndarray) -> str:
 def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, note: str,
                 options: Mapping[str, Any]) -> BatchSolution:
     """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary."""
-    n, n_x, sizes = asked.n, module.metadata["sizes"]["x"], module.metadata["sizes"]
+    n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
     x = np.full((n, len(asked.times), n_x), np.nan)
     success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
     messages: dict[int, str] = {}
@@ -254,7 +252,7 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
 
     for k in range(n):
         start, p, given = (a[k if len(a) > 1 else 0] for a in (asked.starts, asked.params, asked.inputs))
-        q, u, z = np.split(start, np.cumsum([sizes["q"], sizes["u"]]))
+        q, u, z = np.split(start, np.cumsum([sizes.q, sizes.u]))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SimulationWarning)

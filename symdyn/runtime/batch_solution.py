@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.errors import ArgumentError
 from symdyn.shown import name_of, shown
 
@@ -25,7 +26,7 @@ class BatchSolution:
     seconds    what the integration took
     """
 
-    metadata: Mapping[str, Any]
+    metadata: ModuleMetadata
     t: np.ndarray
     x: np.ndarray
     success: np.ndarray
@@ -39,26 +40,26 @@ class BatchSolution:
     @property
     def q(self) -> np.ndarray:
         """Coordinates, (n, n_t, n_q)."""
-        return self.x[..., :self.metadata["sizes"]["q"]]
+        return self.x[..., :self.metadata.sizes.q]
 
     @property
     def u(self) -> np.ndarray:
         """Speeds, (n, n_t, n_u)."""
-        sizes = self.metadata["sizes"]
-        return self.x[..., sizes["q"]:sizes["q"] + sizes["u"]]
+        sizes = self.metadata.sizes
+        return self.x[..., sizes.q:sizes.q + sizes.u]
 
     def __getitem__(self, name: Any) -> np.ndarray:
         """One coordinate, speed or extra state by name or symbol, (n, n_t)."""
         text = name_of(name)
-        if text not in self.metadata["x"]:
-            raise ArgumentError(f"{self.metadata['name']}: there is no state {shown(text)}; there are "
-                                f"{', '.join(self.metadata['x'])}")
-        return self.x[..., self.metadata["x"].index(text)]
+        if text not in self.metadata.x:
+            raise ArgumentError(f"{self.metadata.name}: there is no state {shown(text)}; there are "
+                                f"{', '.join(self.metadata.x)}")
+        return self.x[..., self.metadata.x.index(text)]
 
     def __len__(self) -> int:
         return len(self.x)
 
     def __repr__(self) -> str:
         told = f"; {self.note}" if self.note else ""
-        return (f"<BatchSolution {self.metadata['name']}: {len(self)} trajectories, {int(self.success.sum())} of them to the "
+        return (f"<BatchSolution {self.metadata.name}: {len(self)} trajectories, {int(self.success.sum())} of them to the "
                 f"end, {self.width} at once{told}>")

@@ -20,7 +20,7 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
     t, x             (n_t,), (n, n_t, n_x), NaN where there is no state
     params, inputs   (n, n_p), (n, n_in), or one row for all; or inputs at every time, (n, n_t, n_in)
     """
-    about = module.metadata.get(WATCHES, ())
+    about = module.metadata.watches
     if not about or not len(x):
         return []
     values = np.full((*x.shape[:2], len(about)), np.nan)
@@ -49,7 +49,7 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
 
 def _rows(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """The function `watches`, (n, n_w); NaN where it cannot be evaluated."""
-    found = np.full((len(x), len(module.metadata[WATCHES])), np.nan)
+    found = np.full((len(x), len(module.metadata.watches)), np.nan)
     try:
         if len(x):
             found[:] = module.evaluate(WATCHES, t, x, params, inputs).reshape(found.shape)

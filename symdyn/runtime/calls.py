@@ -55,19 +55,19 @@ def _time_and_state(module: Module, function: str, at: Sequence[Any], by_parts: 
     """Whether arguments begin with a time (or one for each state) and a state, or rows of states."""
     if len(at) < 2:
         return False
-    sizes, states = module.metadata["sizes"], at[1]
+    sizes, states = module.metadata.sizes, at[1]
     if isinstance(states, Mapping):
-        fits = bool(states) and {name_of(k) for k in states} <= set(module.metadata["x"])
+        fits = bool(states) and {name_of(k) for k in states} <= set(module.metadata.x)
         rows = 1
     else:
         shape: tuple[int, ...] = np.shape(states) if not isinstance(states, str) else ()
-        allowed = (sizes["x"],) if "u" in by_parts else (sizes["q"], sizes["x"])
+        allowed = (sizes.x,) if "u" in by_parts else (sizes.q, sizes.x)
         fits, rows = len(shape) in (1, 2) and shape[-1] in allowed, shape[0] if len(shape) == 2 else 1
     first: tuple[int, ...] | None = np.shape(at[0]) if not isinstance(at[0], (Mapping, str)) else None
     if not fits or first is None or not (first == () or (len(first) == 1 and first[0] == rows and np.ndim(states) == 2)):
         return False
-    other = sizes["u"] if "u" in by_parts else sizes["p"]
-    if sizes["q"] == 1 and not isinstance(states, Mapping) and np.shape(states)[-1] == other:
+    other = sizes.u if "u" in by_parts else sizes.p
+    if sizes.q == 1 and not isinstance(states, Mapping) and np.shape(states)[-1] == other:
         raise ArgumentError(f"{module.name}: {function} may be called with a time and a state here, or with q and "
                             f"{by_parts[1]}, which are as many numbers; name them, such as {function}(t=0, q=...)")
     return True

@@ -24,9 +24,9 @@ INSTEAD = "take EulerParameters, or another sequence"
 
 def distances(module: Module, x: np.ndarray) -> np.ndarray:
     """How far the angles of every chart are from gimbal lock, rad, (n, n_charts), of rows of states."""
-    names, rows = module.metadata["x"], np.atleast_2d(x)
+    names, rows = module.metadata.x, np.atleast_2d(x)
     found = []
-    for _, sequence, _, name in module.metadata.get(CHARTS, ()):
+    for _, sequence, _, name in module.metadata.charts:
         angle = rows[:, names.index(name)]
         found.append(np.abs(np.cos(angle) if len(set(sequence)) == 3 else np.sin(angle)))
     return np.array(found).reshape(-1, len(rows)).T
@@ -34,7 +34,7 @@ def distances(module: Module, x: np.ndarray) -> np.ndarray:
 
 def at_lock(module: Module, x: np.ndarray) -> str:
     """What to add to a message where a run stopped: that angles are at gimbal lock, if they are."""
-    charts = module.metadata.get(CHARTS, ())
+    charts = module.metadata.charts
     return "".join(f"; the {sequence} angles of joint {joint} are within {d:.2g} rad of gimbal lock ({INSTEAD})"
                    for (joint, sequence, *_), d in zip(charts, distances(module, x).ravel(), strict=True) if d < AT)
 
@@ -49,7 +49,7 @@ def locked(module: Module, t: np.ndarray, x: np.ndarray, rtol: float) -> list[st
     t (n_t,), x (n, n_t, n_x), NaN where there is no state."""
     told = []
     found = distances(module, x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
-    for k, (joint, sequence, speeds, _) in enumerate(module.metadata.get(CHARTS, ())):
+    for k, (joint, sequence, speeds, _) in enumerate(module.metadata.charts):
         near = np.where(np.isfinite(found[..., k]), found[..., k], np.inf)
         wrong = np.flatnonzero((near < _limit(rtol, speeds)).any(axis=1))
         if len(wrong):
@@ -68,13 +68,13 @@ def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarra
     At the distance d the mass matrix of the angles' rates has a condition of 1/d^2, the rates themselves one of 1/d; a warning is
     given where a rounding error times that exceeds rtol.
     """
-    charts = module.metadata.get(CHARTS, ())
+    charts = module.metadata.charts
     if not charts or len(t) < 2 or not np.isfinite(x).all():
         return
     here = distances(module, x)
     for k, (joint, sequence, speeds, name) in enumerate(charts):
         limit = _limit(request.rtol, speeds)
-        angle = x[:, module.metadata["x"].index(name)]
+        angle = x[:, module.metadata.x.index(name)]
         # The angle turns back where it comes near, so that two outputs on the same side tell nothing; its rate hardly changes.
         before = np.abs(np.gradient(angle, t, edge_order=1))
         most = np.maximum(before[:-1], before[1:])

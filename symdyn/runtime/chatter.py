@@ -35,7 +35,7 @@ class Chatter:
 
     def __init__(self, module: Module, request: Request) -> None:
         self.module, self.request = module, request
-        self.about = module.metadata[SWITCHES]
+        self.about = module.metadata.switches
         self.n_state = request.n_state
         self.t, self.n_steps = request.span[0], 0
         self.longest, self.looks = 0.0, 0
@@ -73,12 +73,12 @@ class Chatter:
 
     def _drive(self, k: int, up: float, down: float) -> str:
         about = self.about[k]
-        where = f" in {about['where']}" if about["where"] else ""
-        return (f"{about['what']}{where} chatters: the motion is driven onto {about['surface']} = 0 from both sides, at rates of "
+        where = f" in {about.where}" if about.where else ""
+        return (f"{about.what}{where} chatters: the motion is driven onto {about.surface} = 0 from both sides, at rates of "
                 f"{up:.3g} and {down:.3g} of its unit a second")
 
     def _remedy(self, k: int) -> str:
-        return (f"make the jump smooth, for example by {self.about[k]['remedy']} with a small eps, or end "
+        return (f"make the jump smooth, for example by {self.about[k].remedy} with a small eps, or end "
                 "the motion there by an event with stop=True and go on with equations for what sticks")
 
     def _sliding(self, t: float, x: np.ndarray, near: float) -> tuple[int, float, float] | None:
@@ -117,4 +117,4 @@ class Chatter:
 
 def chatter_of(module: Module, request: Request) -> Chatter | None:
     """What looks for chattering in a run; None where nothing jumps."""
-    return Chatter(module, request) if module.metadata.get(SWITCHES) else None
+    return Chatter(module, request) if module.metadata.switches else None

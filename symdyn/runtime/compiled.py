@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.chatter import STEPS, chatter_of
-from symdyn.runtime.events import CHATTER, EVENTS, Happened, at_once, ended, not_known, not_proved, too_quick
+from symdyn.runtime.events import CHATTER, Happened, at_once, ended, not_known, not_proved, too_quick
 from symdyn.runtime.inputs import not_finite
 from symdyn.runtime.interrupts import Interrupts
-from symdyn.runtime.methods import DEFAULT, unit_name, with_own_tolerances
+from symdyn.runtime.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
 from symdyn.runtime.short_steps import ShortSteps
@@ -56,7 +57,7 @@ class _Run:
 
     def __init__(self, unit: CUnit, request: Request) -> None:
         self.unit = unit
-        self.n_x = unit.metadata["sizes"]["x"]
+        self.n_x = unit.metadata.sizes.x
         self.trouble: list[BaseException] = []
         self.guard: Any = contextlib.nullcontext()
         size = unit.function("simulation_size")
@@ -64,7 +65,7 @@ class _Run:
         self.memory = ctypes.create_string_buffer(size() + 64)
         self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
         self.request = request
-        self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, unit.metadata["n_c"]))
+        self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, unit.metadata.n_c))
         self.p[:len(request.field_p)] = request.field_p
         unit.prologue(self.p, self.c)
         self.problem = Problem(self.p.ctypes.data, self.c.ctypes.data)
@@ -170,12 +171,13 @@ class _Run:
         return out
 
 
-def run_compiled(module: Module, request: Request, method: str, bar: Any = None, field: str = "rhs") -> Outcome:
-    """Integrate with a compiled method. What a function of inputs raises ends the run.
+def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
+                 field: RightSide | None = None) -> Outcome:
+    """Integrate with a compiled method, by default the plain right-hand side. What a function of inputs raises ends the run.
 
     Raises ArgumentError where such a function returns what does not fit.
     """
-    unit: Any = module.unit(unit_name(field, method))
+    unit: Any = module.unit(replace(field or RightSide(), method=method))
     run = _Run(unit, with_own_tolerances(request, method))
     chatter = chatter_of(module, request)
     piece = PIECE if chatter is None and request.inputs.function is None else STEPS
@@ -231,7 +233,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     success = over or (status == _DONE and not early)
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped, chatters)
     if over:
-        stopping = (one.event for one in reversed(run.happened) if module.metadata[EVENTS][one.event]["stop"])
+        stopping = (one.event for one in reversed(run.happened) if module.metadata.events[one.event].stop)
         message = ended(module, next(stopping), report[0])
     if over or not success:
         t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
@@ -246,7 +248,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
                    next_step=float(report[1]))
 
 
-def _short_steps(module: Module, request: Request, method: str, field: str) -> ShortSteps | None:
+def _short_steps(module: Module, request: Request, method: str, field: RightSide | None) -> ShortSteps | None:
     """What looks for steps that are far too short; None where their length is given or follows from a table of inputs."""
     if method == "gauss" or request.inputs.has_kinks:
         return None
@@ -292,7 +294,7 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         why = run.unit.reason(int(report[5])) if report[5] else not_known(module, int(report[6]))
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _RESET_REFUSED:
-        why = reset_refused(metadata["x"][int(report[6])], run.reset_gap)
+        why = reset_refused(metadata.x[int(report[6])], run.reset_gap)
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _FIELD_FAILED:
         x_fail = report[8 + n:8 + 2 * n]
@@ -303,7 +305,7 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
     if status == _NOT_FINITE:
         bad = int(report[6])
-        name = metadata["x"][bad] if 0 <= bad < n else "the state"
+        name = metadata.x[bad] if 0 <= bad < n else "the state"
         x_fail = report[8 + n:8 + 2 * n]
         why = _inputs(module, run, report[7], x_fail)
         return describe_stop(metadata, report[7], x_fail, f"the derivative of {name} is not finite{why}")
@@ -313,7 +315,7 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
         return describe_stop(metadata, report[7], x_fail, f"no way back onto the constraints: {_off(module, run, report)}{why}")
     if status == _STEP_TOO_SMALL:
         chatter = chatter_of(module, run.request)
-        why = nearly_singular(module, t, x[:module.metadata["sizes"]["x"]], run.request.p) + _dependent(module, run, t, x)
+        why = nearly_singular(module, t, x[:module.metadata.sizes.x], run.request.p) + _dependent(module, run, t, x)
         why += chatter.of_small_steps(t, x) if chatter is not None else ""
         return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
     return describe_stop(metadata, t, x, f"the integrator refused (status {status})")
@@ -327,7 +329,7 @@ def _series_reason(run: _Run, report: np.ndarray) -> str:
 
 def _dependent(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
     """What to add to a message where constraints depend on each other, unlike at the start."""
-    n, request = module.metadata["sizes"]["x"], run.request
+    n, request = module.metadata.sizes.x, run.request
     return lost_rank(module, t, x[:n], request.p, request.x0[:n], request.span[0])
 
 
@@ -335,14 +337,14 @@ def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
     """What to add to a message where an input is not finite; a function of the user is asked once more."""
     request = run.request
     try:
-        return not_finite(module.metadata["inputs"], request.inputs.at(t, x[:request.n_state].copy()), t)
+        return not_finite(module.metadata.inputs, request.inputs.at(t, x[:request.n_state].copy()), t)
     except SymdynError:
         return ""
 
 
 def _off(module: Module, run: _Run, report: np.ndarray) -> str:
     """Why a projection failed."""
-    rows, reason, worst = module.metadata["constraints"], int(report[5]), int(report[6])
+    rows, reason, worst = module.metadata.constraints, int(report[5]), int(report[6])
     if reason:
         return run.unit.reason(reason)
     if 0 <= worst < len(rows):

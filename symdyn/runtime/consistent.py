@@ -54,8 +54,8 @@ class NotConsistent(ArgumentError):
 
 def normalised(module: Module, x: np.ndarray) -> np.ndarray:
     """The state with unit vectors of length 1; raises ArgumentError if they are off by more than rounding of input."""
-    for group in module.metadata.get("unit_groups", ()):
-        places = [module.metadata["x"].index(name) for name in group]
+    for group in module.metadata.unit_groups:
+        places = [module.metadata.x.index(name) for name in group]
         norm = float(np.linalg.norm(x[places]))
         if abs(norm - 1) > 1e-6:
             raise ArgumentError(f"{module.name}: initial q: {', '.join(group)} have the norm {norm:.6g}, not 1; Euler parameters "
@@ -77,7 +77,7 @@ def check_start(module: Module, t: float, x: np.ndarray, params: np.ndarray) -> 
     if faults:
         raise NotConsistent(f"{module.name}: {'; '.join(faults)}", "begin with the nearest consistent state: "
                             f"q, u = module.consistent(q, u, params{f', t={t:g}' if t else ''}"
-                            f"{', inputs=inputs' if module.metadata.get('motions') else ''})")
+                            f"{', inputs=inputs' if module.metadata.motions else ''})")
 
 
 def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None, t: float = 0.0,
@@ -85,10 +85,10 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     """The consistent state near a guess: q (n_q,) and u (n_u,); see Module.consistent."""
     metadata = module.metadata
     p = module.parameters(params)
-    initial = metadata["initial"]
-    q0, u0 = (take(values, metadata[what], what, {n: initial.get(n, 0.0) for n in metadata[what]}, module.name)
+    initial = metadata.initial
+    q0, u0 = (take(values, metadata.names(what), what, metadata.initial_values(what), module.name)
               for what, values in (("q", q), ("u", u)))
-    x = np.concatenate([q0, u0, [initial.get(n, 0.0) for n in metadata["z"]]])
+    x = np.concatenate([q0, u0, list(metadata.initial_values("z").values())])
     t = number(t, "a finite number of seconds as t", module.name)
     if keep is None:
         keep = ()
@@ -100,15 +100,15 @@ def consistent(module: Module, q: Any = None, u: Any = None, params: Any = None,
     if getattr(keep, "ndim", 1) == 0:
         raise ArgumentError(f"{module.name}: keep is {shown(keep)}; pass a list of names or symbols")
     kept = [name_of(k) for k in keep]
-    unknown = [k for k in kept if k not in metadata["q"] and k not in metadata["u"]]
+    unknown = [k for k in kept if k not in metadata.q and k not in metadata.u]
     if unknown:
-        known = ", ".join([*metadata["q"], *metadata["u"]])
+        known = ", ".join([*metadata.q, *metadata.u])
         raise ArgumentError(f"{module.name}: keep names {', '.join(unknown)}; there are {known}")
     x = normalised(module, x)
     if not names(module):
         return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
     if inputs is not None:
-        module = module.following(inputs_at(inputs, t, metadata["inputs"], initial, module.name, metadata["motions"]))
+        module = module.following(inputs_at(inputs, t, metadata.inputs, initial, module.name, metadata.motions))
     search = _Search(module, t, p, kept)
     x = search.speeds(search.positions(x))
     return x[:len(q0)], x[len(q0):len(q0) + len(u0)]
@@ -163,10 +163,10 @@ class _Search:
 
     def __init__(self, module: Module, t: float, p: np.ndarray, keep: list[str]) -> None:
         self.module, self.t, self.p, self.keep = module, t, p, keep
-        self.n_q, self.n_u = (module.metadata["sizes"][k] for k in "qu")
-        self.kept_q = [k for k, name in enumerate(module.metadata["q"]) if name in keep]
-        self.kept_u = [k for k, name in enumerate(module.metadata["u"]) if name in keep]
-        self.holonomic = np.array(module.metadata.get("holonomic") or [True] * len(names(module)), dtype=bool)
+        self.n_q, self.n_u = module.metadata.sizes.q, module.metadata.sizes.u
+        self.kept_q = [k for k, name in enumerate(module.metadata.q) if name in keep]
+        self.kept_u = [k for k, name in enumerate(module.metadata.u) if name in keep]
+        self.holonomic = np.array(module.metadata.holonomic or [True] * len(names(module)), dtype=bool)
         self.length = length(module, p)
         self.velocities = as_velocities(module, p)
 
@@ -228,8 +228,8 @@ class _Search:
         moved = x.copy()
         moved[:self.n_q] += self._evaluate("N", x) @ dv
         moved[self.kept_q] = x[self.kept_q]
-        for group in self.module.metadata.get("unit_groups", ()):
-            places = [self.module.metadata["x"].index(name) for name in group]
+        for group in self.module.metadata.unit_groups:
+            places = [self.module.metadata.x.index(name) for name in group]
             if not set(places) & set(self.kept_q):
                 moved[places] /= np.linalg.norm(moved[places])
         return moved

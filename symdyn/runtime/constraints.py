@@ -19,18 +19,18 @@ CONSISTENT = 1e-6
 
 def names(module: Module) -> list[str]:
     """Names of the constraint rows, (n_c,)."""
-    return list(module.metadata.get("constraints", ()))
+    return list(module.metadata.constraints)
 
 
 def length(module: Module, params: Any) -> float:
     """The mechanism's length, m."""
     module.unit("rhs")  # it is there, too
-    return float(module.evaluate("length", 0.0, np.zeros(module.metadata["sizes"]["x"]), params))
+    return float(module.evaluate("length", 0.0, np.zeros(module.metadata.sizes.x), params))
 
 
 def turning(module: Module) -> np.ndarray:
     """For every speed whether it is an angular velocity or has no length in it, (n_u,)."""
-    return np.array([turns(module.metadata["units"].get(u)) for u in module.metadata["u"]], dtype=bool)
+    return np.array([turns(module.metadata.units.get(u)) for u in module.metadata.u], dtype=bool)
 
 
 def as_velocities(module: Module, params: Any) -> np.ndarray:
@@ -48,7 +48,7 @@ def velocity_residual(module: Module, t: Any, x: Any, params: Any, at_least: flo
 
     A speed is |u_j|, times the mechanism's length if it is in rad/s, or that with which the constraints move by themselves.
     """
-    n_q, n_u = (module.metadata["sizes"][k] for k in "qu")
+    n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
     still = np.array(x, dtype=float)
     u = np.array(still[..., n_q:n_q + n_u])
     still[..., n_q:n_q + n_u] = 0.0

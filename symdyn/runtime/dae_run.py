@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, MissingExtra
 from symdyn.runtime.constraints import names, rank
 from symdyn.runtime.outcome import Outcome, Request
@@ -57,7 +58,7 @@ def _solver() -> Any:
 
 def run_ggl(module: Module, request: Request, bar: Any = None) -> Outcome:
     """Integrate from the nearest state that fulfils the constraints."""
-    return _Run(module, request, Stabilized, "rhs").through(bar)
+    return _Run(module, request, Stabilized, RightSide()).through(bar)
 
 
 class _Run(Run):

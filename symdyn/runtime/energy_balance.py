@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symdyn.runtime.events import EVENTS, Happened
+from symdyn.runtime.events import Happened
 
 if TYPE_CHECKING:
     from symdyn.runtime.solution import Solution
@@ -19,19 +19,19 @@ def reset_energy(solution: Solution, happened: list[Happened]) -> dict[str, np.n
 
     At the time of a reset itself a row counts as before or after it by the state it has.
     """
-    records = solution.module.metadata.get(EVENTS, ())
-    resetting = [one for one in happened if records[one.event]["reset"]]
+    records = solution.module.metadata.events
+    resetting = [one for one in happened if records[one.event].reset]
     groups = [list(group) for _, group in groupby(resetting, key=lambda one: (one.t, one.before.tobytes()))]
     changes: dict[str, np.ndarray] = {}
     if not groups:
         return changes
-    n_x = solution.module.metadata["sizes"]["x"]
+    n_x = solution.module.metadata.sizes.x
     times = np.array([group[0].t for group in groups])
     before = np.array([group[0].before[:n_x] for group in groups])
     after = np.array([group[0].after[:n_x] for group in groups])
     gained = solution.energy_at(times, after) - solution.energy_at(times, before)
     for group, t, x_before, x_after, change in zip(groups, times, before, after, gained, strict=True):
-        name = " + ".join(records[one.event]["name"] for one in group)
+        name = " + ".join(records[one.event].name for one in group)
         total = changes.setdefault(name, np.zeros(len(solution.t)))
         total[_passed(solution, t, x_before, x_after)] += change
     return changes

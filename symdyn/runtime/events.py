@@ -57,7 +57,7 @@ def wanted(module: Module, asked: Any) -> np.ndarray:
 
     Raises ArgumentError for names that the mechanism has no event of.
     """
-    names = [e["name"] for e in module.metadata.get(EVENTS, ())]
+    names = [e.name for e in module.metadata.events]
     if isinstance(asked, (bool, np.bool_)) or asked is None:
         return np.full(len(names), asked is None or bool(asked))
     chosen = [name_of(a) for a in ([asked] if isinstance(asked, str) or not isinstance(asked, Iterable) else asked)]
@@ -72,39 +72,39 @@ def wanted(module: Module, asked: Any) -> np.ndarray:
 def rows_of(module: Module, happened: Sequence[Happened], n_x: int) -> dict[str, EventRows]:
     """Times and states by event."""
     rows = {}
-    for k, event in enumerate(module.metadata.get(EVENTS, ())):
+    for k, event in enumerate(module.metadata.events):
         own = [one for one in happened if one.event == k]
         states = np.array([one.before[:n_x] for one in own]).reshape(len(own), n_x)
-        rows[event["name"]] = EventRows(np.array([one.t for one in own]), states)
+        rows[event.name] = EventRows(np.array([one.t for one in own]), states)
     return rows
 
 
 def ended(module: Module, k: int, t: float) -> str:
     """What to say of a motion that an event has ended."""
-    return f"event {module.metadata[EVENTS][k]['name']} ended the motion at t = {t:.9g} s"
+    return f"event {module.metadata.events[k].name} ended the motion at t = {t:.9g} s"
 
 
 def at_once(module: Module, happened: Sequence[Happened], near: float) -> str:
     """What to say where resets are followed by the same event at once, again and again; near: such a time, s."""
     last = happened[-1]
-    times = np.array([one.t for one in happened if module.metadata[EVENTS][one.event]["reset"]])
+    times = np.array([one.t for one in happened if module.metadata.events[one.event].reset])
     gaps = np.abs(np.diff(times)) <= near
     n = 1 + int(np.argmin(gaps[::-1]) if not gaps.all() else len(gaps))
-    name = module.metadata[EVENTS][last.event]["name"]
+    name = module.metadata.events[last.event].name
     return (f"{n} events, {name} the last, with hardly any time between: its reset leads back to it, or the motion "
             "comes to rest there; give it stop=True, or a reset that lets the quantity leave zero")
 
 
 def not_known(module: Module, k: int) -> str:
     """What to say where the quantity of an event is not a number."""
-    return f"event {module.metadata[EVENTS][k]['name']} cannot be evaluated: the result is not finite"
+    return f"event {module.metadata.events[k].name} cannot be evaluated: the result is not finite"
 
 
 def too_quick(module: Module, found: Sequence[tuple[int, float]]) -> str:
     """What to warn of where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
     if not found:
         return ""
-    names = [f"{module.metadata[EVENTS][k]['name']} (from t = {t:.9g} s on)" for k, t in found]
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
     return (f"{module.name}: zeros of events may be missed: {', '.join(names)} var{'y' if len(names) > 1 else 'ies'} so quickly "
             f"within a step that {panels.MOST_DIVISIONS} divisions do not resolve it; give a max_step as short as its "
             "shortest wave")
@@ -115,7 +115,7 @@ def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: floa
     where the user has chosen the spacing of samples."""
     if not found or spacing:
         return ""
-    names = [f"{module.metadata[EVENTS][k]['name']} (from t = {t:.9g} s on)" for k, t in found]
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
     return (f"{module.name}: zeros of events may be missed: {', '.join(names)} may pass zero and back between two samples, which "
             f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short "
             "as the shortest pulse that matters")
@@ -127,9 +127,9 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
     if look is None or spacing:
         return ""
     told = []
-    for record, wanted in zip(module.metadata.get(EVENTS, ()), look, strict=True):
-        of = [f"the function {f}" for f in record["functions"]] + [f"the input {i}" for i in record["inputs"] if i in functions]
-        told += [f"{record['name']} depends on {', '.join(of)}"] if wanted and of else []
+    for record, wanted in zip(module.metadata.events, look, strict=True):
+        of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
+        told += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
     if not told:
         return ""
     return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "
@@ -146,23 +146,23 @@ class Locator:
     def __init__(self, module: Module, p: np.ndarray, look: np.ndarray, given: Callable[[float, np.ndarray], Any], n_state: int,
                  span: float, spacing: float = 0.0) -> None:
         self.module, self.p, self.look, self.given, self.n_state = module, p, look, given, n_state
-        self.records = module.metadata[EVENTS]
-        self.direction = np.array([record["direction"] for record in self.records])
-        self.resets = np.array([len(record["reset"]) > 0 for record in self.records])
+        self.records = module.metadata.events
+        self.direction = np.array([record.direction for record in self.records])
+        self.resets = np.array([len(record.reset) > 0 for record in self.records])
         self.resolution = AT_ONCE * abs(span)
         n_e = len(look)
         self.side, self.left, self.now, self.leaving = np.zeros(n_e), np.zeros(n_e), np.zeros(n_e), np.zeros(n_e)
         self.change = np.zeros(n_e)  # of the quantities in a small step before the latest event
         self.kept = np.zeros(n_e, dtype=bool)  # whose side is known where the run goes on from another one
         self.unresolved = np.zeros(n_e, dtype=bool)
-        self.starts = np.cumsum([0, *[len(record["reset"]) for record in self.records]])
+        self.starts = np.cumsum([0, *[len(record.reset) for record in self.records]])
         self.latest, self.repeated = np.inf, 0  # of resets
         self.fired: list[int] = []  # the events of the latest time
         self.happened: list[Happened] = []
         self.too_quick: list[tuple[int, float]] = []  # quantities that vary too quickly, and from when on
         self.hidden: list[tuple[int, float]] = []  # those not proved to have no zeros between samples, and from when on
         self.spacing = spacing
-        self.bounded = look & np.array([record["enclosed"] for record in self.records])
+        self.bounded = look & np.array([record.enclosed for record in self.records])
         self.size: Any = 0.0  # of the entries of the state over the latest step
         self.known = 0.0  # up to when the quantities are known
         self.apart = module.unit(EVENTS).evaluator(EVENTS)
@@ -268,15 +268,15 @@ class Locator:
 
         Raises ProjectionFailed where the constraints do not allow what the resets ask for.
         """
-        changed = [k for k in self.fired if self.records[k]["reset"]]
+        changed = [k for k in self.fired if self.records[k].reset]
         if not changed:
             return None
         projector = Projector(self.module, self.p)
         state = projector(t, x)
         becomes = self.module.evaluate(RESETS, t, state[:self.n_state], self.p, self.given(t, state[:self.n_state]))
         for k in changed:
-            state[self.records[k]["reset"]] = becomes[self.starts[k]:self.starts[k + 1]]
-        return projector.keeping(t, state, [place for k in changed for place in self.records[k]["reset"]])
+            state[list(self.records[k].reset)] = becomes[self.starts[k]:self.starts[k + 1]]
+        return projector.keeping(t, state, [place for k in changed for place in self.records[k].reset])
 
     def goes_on(self, after: np.ndarray) -> None:
         """Note the state after the resets of the latest events."""
@@ -317,8 +317,8 @@ class Locator:
 
     def _bounds(self, t: float, state: np.ndarray, given: np.ndarray, jets: np.ndarray) -> np.ndarray:
         """Bounds of the quantities, (n_e, 6), from those of t, the state and the inputs, (1 + n_x + n_in, 6)."""
-        leaves = self.module.metadata["event_leaves"]
-        return self.module.evaluate(BOUNDS, t, state, self.p, given, jets[leaves].ravel())
+        leaves = self.module.metadata.event_leaves
+        return self.module.evaluate(BOUNDS, t, state, self.p, given, jets[list(leaves)].ravel())
 
     def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
         """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
@@ -388,12 +388,12 @@ class Locator:
         self.fired, self.now = events, self.left
         self.side[fresh], self.leaving[events] = -self.side[fresh], 0.0
         self.happened += [Happened(k, t, before, before) for k in events]
-        if any(self.records[k]["reset"] for k in events):
+        if any(self.records[k].reset for k in events):
             near = abs(t - self.latest) <= CHATTER / AT_ONCE * self.resolution
             self.repeated, self.latest = MOST_RESETS if again else self.repeated + 1 if near else 1, t
             earlier = t - min(1e-6 * abs(t_new - t_old), abs(t - t_old)) * np.sign(t_new - t_old)
             self.change = self.left - self.values(earlier, between(earlier))
-        stopping = [k for k in events if self.records[k]["stop"]]
+        stopping = [k for k in events if self.records[k].stop]
         if stopping:
             self.over = ended(self.module, stopping[0], t)
         elif self.repeated >= MOST_RESETS:

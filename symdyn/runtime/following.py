@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, real
 from symdyn.runtime.raised import InputRaised, called
@@ -32,9 +33,9 @@ PARTS = ("value", "rate", "acceleration")
 RATES = ("_dot", "_ddot")
 
 
-def motion_inputs(metadata: Mapping[str, Any]) -> tuple[str, ...]:
+def motion_inputs(metadata: ModuleMetadata) -> tuple[str, ...]:
     """Names of the inputs that belong to motions: values, rates and accelerations."""
-    return tuple(f"{name}{end}" for name in metadata.get("motions", ()) for end in ("", *RATES))
+    return tuple(f"{name}{end}" for name in metadata.motions for end in ("", *RATES))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.methods import DEFAULT
 from symdyn.runtime.outcome import Outcome, Request
@@ -27,7 +28,7 @@ STRETCH = 4
 LEAST_RTOL = 1e-14
 
 
-def run_series(module: Module, request: Request, method: str, bar: Any, field: str) -> Outcome:
+def run_series(module: Module, request: Request, method: str, bar: Any, field: RightSide) -> Outcome:
     """Integrate by series, and by DEFAULT where there are none."""
     parts, reasons, stretch, by_default = [run_compiled(module, request, method, bar, field)], [], STRETCH, 0
     while parts[-1].no_series and _left(request, parts) != 0:

@@ -15,7 +15,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.runtime.chatter import SHRUNK, STEPS, STEPS_OF_SCIPY, chatter_of
-from symdyn.runtime.events import EVENTS, Carried, Happened, Locator, ended
+from symdyn.runtime.events import Carried, Happened, Locator, ended
 from symdyn.runtime.inputs import Inputs
 from symdyn.runtime.methods import is_compiled
 from symdyn.runtime.outcome import Outcome, Request
@@ -78,7 +78,7 @@ class _Pieces:
             while True:
                 held = holding.at(t, x[:request.n_state])
                 fired = self._switch(t, x, request.inputs.held(held))
-                over = any(self.module.metadata[EVENTS][k]["stop"] for k in fired)
+                over = any(self.module.metadata.events[k].stop for k in fired)
                 if over:
                     message = ended(self.module, fired[0], t)
                     break
@@ -147,7 +147,7 @@ class _Pieces:
 
     def _over(self, outcome: Outcome) -> bool:
         """Whether an event ended the motion."""
-        return any(self.module.metadata[EVENTS][one.event]["stop"] for one in outcome.happened)
+        return any(self.module.metadata.events[one.event].stop for one in outcome.happened)
 
     def _carry(self, begun: float, t: float, outcome: Outcome) -> None:
         """Note the sides of events at the end of a piece, for the next one, so that what vanishes at an instant counts once."""
@@ -164,7 +164,7 @@ class _Pieces:
             left[one.event] = there[one.event]
             rates[one.event] = (self.locator.values(one.t + step, x + step * xd) - there)[one.event] / step
         x = latest[-1].after if latest else outcome.x[-1]
-        changed = any(self.module.metadata[EVENTS][one.event]["reset"] for one in latest)
+        changed = any(self.module.metadata.events[one.event].reset for one in latest)
         self.carried = Carried(np.sign(self.locator.values(t, x)), rates, left, changed)
 
     def _switch(self, t: float, x: np.ndarray, inputs: Inputs) -> list[int]:
@@ -187,8 +187,8 @@ class _Pieces:
 
     def _reset(self, fired: list[int], t: float, x: np.ndarray) -> np.ndarray:
         """The state that the next piece begins with: after the resets of events at jumps of inputs."""
-        records = self.module.metadata.get(EVENTS, ())
-        if self.locator is None or self.carried is None or not any(records[k]["reset"] for k in fired):
+        records = self.module.metadata.events
+        if self.locator is None or self.carried is None or not any(records[k].reset for k in fired):
             return x
         self.locator.fired = fired
         after = self.locator.after(t, x)

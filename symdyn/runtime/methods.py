@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from symdyn.backend.right_side import METHOD
 from symdyn.errors import ArgumentError
 from symdyn.runtime.outcome import Request
 from symdyn.shown import shown
@@ -13,7 +14,7 @@ from symdyn.shown import shown
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-DEFAULT, SERIES = "dop853", "taylor"
+DEFAULT, SERIES = METHOD, "taylor"
 # What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
 SMALLEST_RTOL = 1e-15
 
@@ -35,7 +36,7 @@ class CompiledMethod:
 
 def _constrained(module: Module, request: Request) -> str:
     """Steps that are projected onto constraints are not symmetric: energy would drift as with any other method."""
-    names = module.metadata.get("constraints", ())
+    names = module.metadata.constraints
     if not names:
         return ""
     return (f"it keeps energy by its symmetry, which corrections back onto constraints ({', '.join(names[:3])}"
@@ -45,7 +46,7 @@ def _constrained(module: Module, request: Request) -> str:
 
 def _switching(module: Module, so: str) -> str:
     """Why steps of high order go wrong without a sign of it, and what follows, `so`; empty if the right-hand side is smooth."""
-    reason = module.metadata.get("not_smooth", "")
+    reason = module.metadata.not_smooth
     return f"{reason}, {so}; use method='{DEFAULT}'" if reason else ""
 
 
@@ -70,7 +71,7 @@ def _not_collocated(module: Module, request: Request) -> str:
 
 
 COMPILED = {m.name: m for m in (
-    CompiledMethod("dop853"), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
+    CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
     CompiledMethod(SERIES, unfit=_not_expanded),
     # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
     CompiledMethod("radau", ("jacobian_x",), kinked=0.01), CompiledMethod("radau5", ("jacobian_x",), kinked=0.01),
@@ -81,17 +82,6 @@ def with_own_tolerances(request: Request, method: str) -> Request:
     """The request with the tolerances that a compiled method needs for its inputs."""
     part = COMPILED[method].kinked if request.inputs.may_have_kinks else 1.0
     return request if part == 1.0 else replace(request, rtol=max(part * request.rtol, SMALLEST_RTOL), atol=part * request.atol)
-
-
-def unit_name(field: str, method: str) -> str:
-    """The unit with the integrator of a right-hand side: a unit holds one method."""
-    return field if method == DEFAULT else f"{field}:{method}"
-
-
-def split_name(unit: str) -> tuple[str, str]:
-    """The right-hand side and the method of a unit."""
-    field, _, method = unit.partition(":")
-    return field, method or DEFAULT
 
 
 def is_compiled(method: object) -> bool:
@@ -105,7 +95,7 @@ def check_compiled(module: Module, request: Request, method: str) -> None:
         raise ArgumentError(f"{module.name}: the compiled integrator {shown(method)} needs the C backend; this module "
                             f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
     record = COMPILED[method]
-    missing = [n for n in record.needs if n not in module.metadata.get("functions", record.needs)]
+    missing = [n for n in record.needs if n not in module.metadata.functions]
     why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)
     if why:
         raise ArgumentError(f"{module.name}: method {shown(method)} does not fit: {why}")

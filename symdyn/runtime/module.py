@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn.backend.metadata import Metadata, ModuleMetadata
+from symdyn.backend.right_side import RightSide
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError
 from symdyn.kinds import text
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.statics.linearize import Linearization
     from symdyn.runtime.statics.stability import Stability
 
-Provider = Callable[[str], Unit]
+Provider = Callable[[str | RightSide], Unit]
 Numbers = Sequence[float] | np.ndarray
 # In order, or by name or symbol.
 Values = Sequence[float] | np.ndarray | Mapping[Any, Any]
@@ -61,29 +63,29 @@ class Module:
     """Functions of a mechanism.
 
     metadata   names, order, shapes, units, defaults
-    provider   function name -> unit that has it; asked once for each function, when it is first called
+    provider   function name, or what a right-hand side is made with -> unit that has it; called once for each, at its first use
 
-    Parameters are given as an array in the order of `metadata["parameters"]`, or as a mapping from names or symbols;
+    Parameters are given as an array in the order of `metadata.parameters`, or as a mapping from names or symbols;
     what is left out takes its default. Every function takes one state, or arrays with the states along the first axis.
     Raises ArgumentError for values that do not fit, EvaluationError where the equations cannot be evaluated.
     """
 
-    def __init__(self, metadata: Mapping[str, Any], provider: Provider, backend: str, fallback: str = "",
+    def __init__(self, metadata: ModuleMetadata, provider: Provider, backend: str, fallback: str = "",
                  writer: Callable[[Path], list[Path]] | None = None, reporter: Callable[[], Any] | None = None) -> None:
         self.metadata = metadata
-        self.name: str = metadata["name"]
+        self.name: str = metadata.name
         self.backend = backend
         self.fallback = fallback
         self._provider = provider
-        self._units: dict[str, Unit] = {}
+        self._units: dict[str | RightSide, Unit] = {}
         self._writer = writer
         self._reporter = reporter
         self._local, self._notes = threading.local(), threading.local()
         self._lock = threading.Lock()
         self._left_out: Callable[[Any], np.ndarray] | None = None
-        self._n_in: int = metadata["sizes"]["inputs"]
-        self._one, self._free = (metadata["sizes"]["x"],), (self._n_in,)
-        self._defaults = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
+        self._n_in: int = metadata.sizes.inputs
+        self._one, self._free = (metadata.sizes.x,), (self._n_in,)
+        self._defaults = dict(zip(metadata.parameters, metadata.defaults, strict=True))
 
     # -- evaluation
 
@@ -156,7 +158,7 @@ class Module:
     def following(self, inputs: Inputs | np.ndarray) -> Module:
         """The module whose motions are those of a run, or those of inputs (n_in,), wherever inputs are left out: constraints
         depend on motions, too, though on no other inputs."""
-        if not self.metadata.get("motions"):
+        if not self.metadata.motions:
             return self
         other = copy.copy(self)
         other._left_out = (lambda t: inputs) if isinstance(inputs, np.ndarray) else inputs.left_out
@@ -220,7 +222,7 @@ class Module:
         """
         named = {"x": x, "q": q, "u": u, "ud": ud, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "inverse_dynamics", at, named, ("q", "u", "ud", "params", "t", "inputs"))
-        constraints = self.metadata.get("constraints", ())
+        constraints = self.metadata.constraints
         if not constraints:
             if lam is not None and (isinstance(lam, Mapping) or np.size(lam)):
                 raise ArgumentError(f"{self.name}: multipliers lam were given, but there are no constraints; leave them out")
@@ -230,9 +232,9 @@ class Module:
                                 f"multipliers of the constraints {', '.join(constraints)}; pass lam={{...}} (zeros: those of the "
                                 "tree with its loops cut), or take module.actuation(t, q, u, ud), which finds the inputs that "
                                 "make the motion")
-        if self.metadata.get("implicit_loads"):
+        if self.metadata.implicit_loads:
             raise ArgumentError(f"{self.name}: inverse dynamics requested with multipliers, but the loads "
-                                f"{', '.join(self.metadata['implicit_loads'])} depend on accelerations, multipliers or reactions "
+                                f"{', '.join(self.metadata.implicit_loads)} depend on accelerations, multipliers or reactions "
                                 "of the motion under these loads; pass them as inputs to ask for what other values need")
         held = take(lam, constraints, "lam", dict.fromkeys(constraints, 0.0), self.name) \
             if isinstance(lam, Mapping) or np.ndim(lam) < 2 else np.asarray(lam, dtype=float)
@@ -315,7 +317,7 @@ class Module:
 
     def parameters(self, params: States | None = None) -> np.ndarray:
         """Parameters in order, (n_p,)."""
-        return take(params, self.metadata["parameters"], "parameters", self._defaults, self.name)
+        return take(params, self.metadata.parameters, "parameters", self._defaults, self.name)
 
     @functools.cached_property
     def default_parameters(self) -> np.ndarray:
@@ -583,7 +585,7 @@ class Module:
     def split_outputs(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """The user's outputs by name from the rows of the function `outputs`."""
         result, start = {}, 0
-        for name, shape in self.metadata["outputs"]:
+        for name, shape in self.metadata.outputs:
             size = int(np.prod(shape))
             part = rows[..., start:start + size]
             result[name] = part.reshape((*rows.shape[:-1], *shape))
@@ -593,37 +595,38 @@ class Module:
     @property
     def functions(self) -> tuple[str, ...]:
         """Names of the functions that can be evaluated."""
-        return tuple(self.metadata["functions"])
+        return tuple(self.metadata.functions)
 
     def shape(self, name: str) -> tuple[int, ...]:
         """Shape of the result of a function at one state."""
-        return tuple(self._unit(name).metadata["shapes"][name])
+        return tuple(self._unit(name).metadata.shapes[name])
 
-    def unit(self, name: str) -> Unit:
-        """The loaded unit that has a function."""
-        return self._unit(name)
+    def unit(self, what: str | RightSide) -> Unit:
+        """The loaded unit that has a function, or a right-hand side with its integrator."""
+        return self._unit(what)
 
-    def _unit(self, name: str) -> Unit:
-        if name not in self._units:
-            note: Callable[[str], None] = getattr(self._notes, "take", lambda name: None)
-            note(name)
+    def _unit(self, what: str | RightSide) -> Unit:
+        what = RightSide() if what == "rhs" else what
+        if what not in self._units:
+            note: Callable[[str], None] = getattr(self._notes, "take", lambda label: None)
+            note(what if isinstance(what, str) else what.label)
             try:
-                self._make(name)
+                self._make(what)
             finally:
                 note("")
-        return self._units[name]
+        return self._units[what]
 
-    def _make(self, name: str) -> None:
+    def _make(self, what: str | RightSide) -> None:
         with self._lock:  # the derivation behind it is for one thread at a time
-            if name not in self._units:
-                unit = self._units[name] = self._provider(name)
-                if name in unit.metadata["shapes"]:  # not in variations of rhs, where "rhs" means something else
-                    for other in unit.metadata["shapes"]:
+            if what not in self._units:
+                unit = self._units[what] = self._provider(what)
+                if what == RightSide() or what in unit.metadata.shapes:  # other right-hand sides have a "rhs" of their own
+                    for other in unit.metadata.shapes:
                         self._units.setdefault(other, unit)
 
     @contextlib.contextmanager
     def noting(self, note: Callable[[str], None]) -> Iterator[None]:
-        """Have a function called whenever this thread makes a function of the module, which may take long: with its name at the
+        """Have a function called whenever this thread makes a function of the module, which may take long: with a label at the
         beginning, and with "" at the end."""
         self._notes.take = note
         try:
@@ -647,8 +650,7 @@ class Module:
 
     def _initial(self, group: str) -> np.ndarray:
         """What entries of a group are where they are left out: their initial values in the system, else 0."""
-        initial = self.metadata.get("initial", {})
-        return np.array([initial.get(n, 0.0) for n in self.metadata[group]], dtype=float)
+        return np.array(list(self.metadata.initial_values(group).values()))
 
     def _state(self, q: Any, u: Any = None) -> np.ndarray:
         q = self._rows(q, "q", "q")
@@ -663,13 +665,15 @@ class Module:
             raise ArgumentError(f"{self.name}: q has {len(q)} rows and u has {len(u)}; give the same number")
         return np.concatenate([np.broadcast_to(a, (rows, a.shape[-1])) for a in (q, u, z)], axis=1)
 
-    def _rows(self, values: Any, what: str, group: str, metadata: Mapping[str, Any] | None = None) -> np.ndarray:
+    def _rows(self, values: Any, what: str, group: str, metadata: Metadata | None = None) -> np.ndarray:
         """One row or rows of numbers of a group; what is left out takes its initial value, accelerations 0. Accelerations go by
         the names of the speeds."""
         about = metadata or self.metadata
-        wanted = about["sizes"][group]
-        names = about["u" if what == "ud" and wanted == about["sizes"]["u"] else group]
-        initial = self.metadata.get("initial", {}) if what != "ud" else {}
+        names = about.names(group)
+        wanted = len(names)
+        if what == "ud" and wanted == about.sizes.u:
+            names = about.u
+        initial = self.metadata.initial if what != "ud" else {}
         if isinstance(values, Mapping):
             return take(values, names, what, {n: initial.get(n, 0.0) for n in names}, self.name)
         array = real_of(values, self.name, f"{what} must be numbers")
@@ -683,8 +687,8 @@ class Module:
         return array
 
     def __repr__(self) -> str:
-        sizes = self.metadata["sizes"]
-        what = ", ".join(counted(sizes[group], one) for group, one in (("q", "coordinate"), ("u", "speed"), ("p", "parameter")))
+        sizes = self.metadata.sizes
+        what = ", ".join(counted(n, one) for n, one in ((sizes.q, "coordinate"), (sizes.u, "speed"), (sizes.p, "parameter")))
         return f"<Module {self.name}: {self.backend}, {what}>"
 
 
@@ -694,10 +698,9 @@ class BoundModule:
     def __init__(self, module: Module, p: np.ndarray) -> None:
         self.module = module
         self.params = fixed(p)
-        self._n_in: int = module.metadata["sizes"]["inputs"]
-        self._one, self._free = (module.metadata["sizes"]["x"],), (self._n_in,)
-        initial = module.metadata.get("initial", {})
-        self._inputs = np.array([initial.get(n, 0.0) for n in module.metadata["inputs"]], dtype=float)
+        self._n_in: int = module.metadata.sizes.inputs
+        self._one, self._free = (module.metadata.sizes.x,), (self._n_in,)
+        self._inputs = np.array(list(module.metadata.initial_values("inputs").values()))
         self._local = threading.local()
         self._ready("rhs")
 
@@ -718,7 +721,7 @@ class BoundModule:
                 return evaluator.one(t, x, inputs)  # type: ignore[no-any-return]
         owner = self.module.name
         if isinstance(inputs, Mapping):
-            names = self.module.metadata["inputs"]
+            names = self.module.metadata.inputs
             inputs = take(inputs, names, "inputs", dict(zip(names, self._inputs.tolist(), strict=True)), owner)
         state, free = real_of(x, owner, "x must be numbers"), real_of(inputs, owner, "inputs must be numbers")
         time = number_of(t, owner, "t must be a finite time")

@@ -21,7 +21,7 @@ def reactions(solution: Solution, function: str = "reactions") -> dict[str, np.n
 
     function   "reactions" or "cut_loads"
     """
-    names = list(solution.module.metadata.get("reactions", ()))
+    names = list(solution.module.metadata.reactions)
     if not names or function not in solution.module.functions:
         return {}
     rows = solution.rows(function)
@@ -32,17 +32,17 @@ def in_frame(solution: Solution, of_joints: Mapping[str, np.ndarray], joint: Any
     """One joint's force and moment, (n_t, 6), in the axes of the n-frame, the ground, its parent, its child, or a body."""
     metadata = solution.module.metadata
     name = name_of(joint)
-    known = list(metadata.get("reactions", ()))
+    known = list(metadata.reactions)
     if name not in known:
         near = difflib.get_close_matches(name, known, 3)
         there = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known) or 'none'}"
         raise ArgumentError(f"{solution.module.name}: no reaction of a joint {shown(name)} is known; {there}")
     values = of_joints[name]
     frame = name_of(frame)
-    ends = dict(zip(known, metadata.get("reaction_bodies", ()), strict=False))
+    ends = dict(zip(known, metadata.reaction_bodies, strict=False))
     if frame in ("parent", "child") and name in ends:
         frame = ends[name][0 if frame == "parent" else 1]
-    bodies = list(metadata.get("bodies", ()))
+    bodies = list(metadata.bodies)
     still = "ground_rotation" not in solution.module.functions
     if frame == "inertial" or (frame == "ground" and still):
         return values
@@ -60,7 +60,7 @@ def in_frame(solution: Solution, of_joints: Mapping[str, np.ndarray], joint: Any
 def unique_reactions(solution: Solution) -> dict[str, np.ndarray]:
     """Joint name -> whether the motion determines its reaction, (n_t,) of bool: not where redundant constraints share it."""
     module = solution.module
-    joints = list(module.metadata.get("reactions", ()))
+    joints = list(module.metadata.reactions)
     if not joints or not names(module):
         return {joint: np.ones(len(solution.t), dtype=bool) for joint in joints}
     by_lam = solution.rows("reactions_by_lam").reshape(len(solution.t), len(joints), 6, -1)

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import symdyn
+from symdyn.backend.metadata import Metadata, ModuleMetadata
+from symdyn.backend.right_side import RightSide, key_of
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler, find_compiler, no_compiler_reason, require_compiler
 from symdyn.runtime.module import Module
@@ -51,8 +53,8 @@ class _Memory:
         own = hashlib.sha256(repr(about).encode()).hexdigest()[:16]
         self.path = cache.cache_dir() / f"{name}-{own}.json"
         self.state = _state_of_symdyn()
-        self.record = self._read() or {"state": self.state, "metadata": dict(self.derived.metadata), "units": {}}
-        self.metadata: Mapping[str, Any] = self.record["metadata"]
+        self.record = self._read() or {"state": self.state, "metadata": self.derived.metadata.as_plain(), "units": {}}
+        self.metadata = ModuleMetadata.of_plain(self.record["metadata"])
 
     @cached_property
     def derived(self) -> Module:
@@ -64,17 +66,17 @@ class _Memory:
         return compile_equations(formulated(systems.get(self.name, **self.options), self.formulation,
                                             coordinates=self.coordinates), self.backend)
 
-    def unit(self, function: str) -> Unit:
+    def unit(self, what: str | RightSide) -> Unit:
         """A unit from the record, else a derived one, which is put into it."""
-        units = self.record["units"]
-        if function in units:
-            source, metadata = units[function]["source"], units[function]["metadata"]
+        units, key = self.record["units"], key_of(what)
+        if key in units:
+            source, metadata = units[key]["source"], Metadata.of_plain(units[key]["metadata"])
             if self.backend == "c":
                 assert self.compiler is not None
                 return CUnit(source, metadata, self.compiler)
-            return PythonUnit.from_source(source, metadata["name"])
-        unit: Any = self.derived.unit(function)
-        units[function] = {"source": unit.source, "metadata": dict(unit.metadata)}
+            return PythonUnit.from_source(source, metadata.name)
+        unit: Any = self.derived.unit(what)
+        units[key] = {"source": unit.source, "metadata": unit.metadata.as_plain()}
         self._write()
         return unit
 

@@ -44,7 +44,7 @@ def number(value: Any) -> str:
 
 def facts(solution: Solution) -> list[tuple[str, str]]:
     """How the run was computed: pairs of title and text."""
-    rows = [("Formulation", str(solution.module.metadata.get("formulation", "unknown"))),
+    rows = [("Formulation", str(solution.module.metadata.formulation)),
             ("Computed by", f"{solution.method} on {WHERE.get(solution.backend, solution.backend)}")]
     if len(solution.t):
         rows.append(("Span", f"t = {number(solution.t[0])} s to {number(solution.t[-1])} s, {len(solution.t)} times"))
@@ -56,10 +56,10 @@ def facts(solution: Solution) -> list[tuple[str, str]]:
     inside = solution.integrator_seconds
     rows.append(("Time", _seconds(solution.seconds)
                  + (f", of which {_seconds(inside)} inside the integrator" if inside is not None else "")))
-    sizes = solution.module.metadata["sizes"]
-    counts = [(len(solution.module.metadata.get("bodies", ())), "body", "bodies"), (sizes["q"], "coordinate", "coordinates"),
-              (sizes["u"], "speed", "speeds"), (sizes["z"], "extra state", "extra states"), (sizes["inputs"], "input", "inputs"),
-              (sizes["p"], "parameter", "parameters")]
+    sizes = solution.module.metadata.sizes
+    counts = [(len(solution.module.metadata.bodies), "body", "bodies"), (sizes.q, "coordinate", "coordinates"),
+              (sizes.u, "speed", "speeds"), (sizes.z, "extra state", "extra states"), (sizes.inputs, "input", "inputs"),
+              (sizes.p, "parameter", "parameters")]
     return [*rows, ("Model", ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in counts if n))]
 
 
@@ -76,10 +76,10 @@ def parameters(solution: Solution) -> list[dict[str, Any]]:
     """Every parameter with its value, unit, default, and whether the value differs from it."""
     metadata = solution.module.metadata
     rows = []
-    for name, value, default in zip(metadata["parameters"], solution.params, metadata["defaults"], strict=True):
-        given = default is not None and bool(np.isfinite(default))
-        rows.append({"name": name, "value": number(value), "unit": unit(metadata["units"].get(name, "")),
-                     "default": number(default) if given else "none", "changed": not given or float(value) != float(default)})
+    for name, value, default in zip(metadata.parameters, solution.params, metadata.defaults, strict=True):
+        given = default if default is not None and np.isfinite(default) else None
+        rows.append({"name": name, "value": number(value), "unit": unit(metadata.units.get(name, "")),
+                     "default": "none" if given is None else number(given), "changed": given is None or float(value) != given})
     return rows
 
 
@@ -88,8 +88,8 @@ def start(solution: Solution) -> list[dict[str, str]]:
     if not len(solution.t):
         return []
     metadata = solution.module.metadata
-    return [{"name": name, "value": number(value), "unit": unit(metadata["units"].get(name, ""))}
-            for name, value in zip(metadata["x"], solution.x[0], strict=True)]
+    return [{"name": name, "value": number(value), "unit": unit(metadata.units.get(name, ""))}
+            for name, value in zip(metadata.x, solution.x[0], strict=True)]
 
 
 def extremes(solution: Solution) -> list[dict[str, str]]:
@@ -116,15 +116,15 @@ def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
     metadata = solution.module.metadata
     for kind, group, columns in (("coordinate", "q", solution.q), ("speed", "u", solution.u), ("state", "z", solution.z),
                                  ("input", "inputs", solution.inputs)):
-        for name, values in zip(metadata[group], columns.T, strict=True):
-            yield kind, name, unit(metadata["units"].get(name, "")), values
+        for name, values in zip(metadata.names(group), columns.T, strict=True):
+            yield kind, name, unit(metadata.units.get(name, "")), values
     points = points_of(solution)
     for name, rows in solution.outputs.items():
         if rows.ndim <= 2:
             flat = rows.reshape(len(solution.t), -1)
             point = points.get(name)
             for k, values in enumerate(flat.T):
-                told = metadata.get("output_units", {}).get(name, "") if point is None else point.unit
+                told = metadata.output_units.get(name, "") if point is None else point.unit
                 place = "" if flat.shape[1] == 1 else f" {'xyz'[k]}" if told else f"[{k}]"
                 yield "output", name + place, unit(told), values
 
@@ -138,7 +138,7 @@ def _mean(t: np.ndarray, values: np.ndarray) -> float:
 
 def energy(solution: Solution) -> Energy | None:
     """The balance, where energy is known and the work of the loads is (a run with work=True, or loads that do none)."""
-    known = solution.has_work or solution.module.metadata["conservative"]
+    known = solution.has_work or solution.module.metadata.conservative
     if not known or "energy" not in solution.module.functions or not len(solution.t):
         return None
     balance = solution.energy_balance
@@ -150,7 +150,7 @@ def energy(solution: Solution) -> Energy | None:
 
 def constraints(solution: Solution) -> list[dict[str, str]]:
     """How well every constraint is kept: its largest residual, relative to the mechanism's length, and of its rate."""
-    names = solution.module.metadata.get("constraints", ())
+    names = solution.module.metadata.constraints
     if not names or not len(solution.t):
         return []
     off, rate = (np.abs(rows).max(axis=0) for rows in (solution.constraint_violation, solution.velocity_violation))
@@ -160,7 +160,7 @@ def constraints(solution: Solution) -> list[dict[str, str]]:
 def watches(solution: Solution) -> list[dict[str, Any]]:
     """What loads want to be looked at: range of each value, its limits, and what it means if it leaves them."""
     module = solution.module
-    if not module.metadata.get(WATCHES) or not len(solution.t):
+    if not module.metadata.watches or not len(solution.t):
         return []
     return [{"label": value.label, "least": number(value.low), "most": number(value.high),
              "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.runtime.chatter import STEPS_OF_SCIPY, chatter_of
 from symdyn.runtime.events import Locator, not_proved, too_quick
@@ -61,10 +62,10 @@ def takes_changed_states(solver_class: Any) -> bool:
 class Field:
     """The right-hand side as SciPy calls it; it keeps why the step under way could not be evaluated."""
 
-    def __init__(self, module: Module, request: Request, name: str) -> None:
+    def __init__(self, module: Module, request: Request, right_side: RightSide) -> None:
         self.module, self.request = module, request
         self.bound = module.bind(request.p)
-        self.evaluator = module.unit(name).evaluator("rhs")
+        self.evaluator = module.unit(right_side).evaluator("rhs")
         self.evaluator.set_params(request.field_p)
         self.n_in = len(request.inputs.constant)
         self.trouble: list[str] = []
@@ -92,7 +93,7 @@ class Field:
 
     def note(self, error: EvaluationError, t: float, inputs: Any) -> None:
         """Keep why an evaluation failed."""
-        told = not_finite(self.module.metadata["inputs"], inputs, t)
+        told = not_finite(self.module.metadata.inputs, inputs, t)
         self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + told)
         self.cause = error.__cause__
 
@@ -121,10 +122,10 @@ class _Cut(NamedTuple):
 class Run:
     """One run of a solver, with what is stored of it; solver_class: of SciPy, or called like these."""
 
-    def __init__(self, module: Module, request: Request, solver_class: Any, field_name: str) -> None:
-        self.module, self.request, self.solver_class, self.field_name = module, request, solver_class, field_name
-        self.metadata = module.unit(field_name).metadata
-        self.field = Field(module, request, field_name)
+    def __init__(self, module: Module, request: Request, solver_class: Any, right_side: RightSide) -> None:
+        self.module, self.request, self.solver_class, self.right_side = module, request, solver_class, right_side
+        self.metadata = module.unit(right_side).metadata
+        self.field = Field(module, request, right_side)
         self.options = self._options()
         way = request.stabilization.way
         self.projector = Projector(module, request.p) if way == "projection" else None
@@ -239,7 +240,7 @@ class Run:
     def _trial(self, t: float, x: np.ndarray, step: float, n: int) -> Outcome:
         request = replace(self.request, span=(t, self.request.span[1]), times=None, x0=x.copy(), first_step=step, max_steps=n,
                           look=None)
-        return type(self)(self.module, request, self.solver_class, self.field_name).through(None)
+        return type(self)(self.module, request, self.solver_class, self.right_side).through(None)
 
     def _why_failed(self, note: str | None) -> str:
         if self.field.trouble:
@@ -379,6 +380,6 @@ class Run:
         return self.outcome(interrupted)
 
 
-def run_scipy(module: Module, request: Request, method: Any, bar: Any, field_name: str) -> Outcome:
+def run_scipy(module: Module, request: Request, method: Any, bar: Any, right_side: RightSide) -> Outcome:
     """Integrate with SciPy."""
-    return Run(module, request, solver_class_of(module, method), field_name).through(bar)
+    return Run(module, request, solver_class_of(module, method), right_side).through(bar)

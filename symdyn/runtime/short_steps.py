@@ -66,7 +66,7 @@ class ShortSteps:
             return ""
         self.warned = True
         k, length, jump = found
-        names, n = self.module.metadata["x"], self.request.n_state
+        names, n = self.module.metadata.x, self.request.n_state
         state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x[:n], strict=True))
         return (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter than "
                 f"the motion itself needs there: the rate of {names[k]} goes to and fro by {jump:.3g} a second from step to "

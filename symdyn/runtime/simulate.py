@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, EvaluationError, SimulationInterrupted, SimulationWarning
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.real_numbers import length_of, number, number_of, real, real_of
 from symdyn.runtime.arguments import take
 from symdyn.runtime.automatic import automatic
-from symdyn.runtime.charts import CHARTS, warn_near_lock
+from symdyn.runtime.charts import warn_near_lock
 from symdyn.runtime.compiled import run_compiled
 from symdyn.runtime.consistent import check_start, normalised
 from symdyn.runtime.events import not_seen, wanted
@@ -64,8 +65,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                              for v, what in ((steps, "steps"), (progress, "progress"), (work, "work")))
     method = checked_method(module, method)
     times, span, every = checked_times(module, t, steps)
-    free = take_inputs(inputs, metadata["inputs"], metadata["initial"], module.name, span, interpolation, extend,
-                       metadata.get("motions", ()))
+    free = take_inputs(inputs, metadata.inputs, metadata.initial, module.name, span, interpolation, extend,
+                       metadata.motions)
     module = module.following(free)
     check_span(free.samplers, span, module.name)
     if not (max_steps is None or (isinstance(max_steps, (int, np.integer)) and 0 < max_steps <= MOST_STEPS)):
@@ -75,14 +76,14 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
                       max_steps, len(start), look=wanted(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
-    if work and "power" not in metadata["functions"]:
+    if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
     bar = _bar(module, span) if progress else None
     with contextlib.ExitStack() as stack:
         if bar is not None:
             stack.callback(bar.close)
-            stack.enter_context(module.noting(lambda name: bar.set_description(_underway(module, name))))
+            stack.enter_context(module.noting(lambda label: bar.set_description(_underway(module, label))))
         with contextlib.suppress(InputRaised):  # the run ends with it, as with what raises later
             check_start(module, span[0], start, p)
         why = ""
@@ -101,7 +102,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                 request = replace(request, x0=Projector(module, p)(span[0], start))
         begun = clock.perf_counter()
         outcome = _run(module, request.with_work() if work else request, method, bar)
-        unseen = not_seen(module, request.look, free.by_function(metadata["inputs"]), request.event_spacing)
+        unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
@@ -113,9 +114,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
         for doubt in outcome.doubts:
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
-        if metadata.get(WATCHES) and len(solution.t):
+        if metadata.watches and len(solution.t):
             warn(module, solution.rows(WATCHES), "in this motion", 3)
-        if metadata.get(CHARTS):
+        if metadata.charts:
             warn_near_lock(module, replace(request, inputs=free), solution.t, solution.x,
                            lambda part: _run(module, part, method), 3)
         return solution
@@ -128,7 +129,7 @@ def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outc
         from symdyn.runtime.dae_run import run_ggl
 
         return run_ggl(module, request, bar)
-    field = "rhs" + "_work" * (len(request.x0) > request.n_state) + "_baumgarte" * (request.stabilization.way == "baumgarte")
+    field = RightSide(work=len(request.x0) > request.n_state, baumgarte=request.stabilization.way == "baumgarte")
     run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
     return run(module, request, method, bar, field)
 
@@ -173,10 +174,10 @@ def _trial(module: Module, request: Request, method: Any, stabilization: Any = N
 
 
 def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
-    initial = module.metadata["initial"]
+    initial = module.metadata.initial
     parts = []
     for what, values in (("q", q), ("u", u), ("z", z)):
-        names = module.metadata[what]
+        names = module.metadata.names(what)
         parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
     return normalised(module, np.concatenate(parts))
 
@@ -193,9 +194,9 @@ def checked_method(module: Module, method: Any) -> Any:
 def checked_times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tuple[float, float], bool]:
     """Output times, span, whether every step is stored."""
     if t is None:
-        t = (0.0, module.metadata["duration"])
+        t = (0.0, module.metadata.duration)
     # The times, what they are compared by, and the states at them.
-    n, n_x = length_of(t), module.metadata["sizes"]["x"]
+    n, n_x = length_of(t), module.metadata.sizes.x
     if n is not None:
         demand(n * (n_x + 3), module.name, f"a solution with {n} output times and {n_x} numbers at each",
                "pass fewer times, or (start, end)")
@@ -211,7 +212,7 @@ def checked_times(module: Module, t: Any, steps: bool) -> tuple[np.ndarray, tupl
 
 
 def checked_tolerances(module: Module, rtol: Any, atol: Any) -> tuple[float, np.ndarray]:
-    n = module.metadata["sizes"]["x"]
+    n = module.metadata.sizes.x
     absolute = rtol if atol is None else atol
     try:
         relative, vector = number(rtol), np.array(np.broadcast_to(real(absolute), (n,)), order="C")
@@ -246,11 +247,9 @@ def checked_spacing(module: Module, value: Any, span: tuple[float, float]) -> fl
     return spacing
 
 
-def _underway(module: Module, name: str) -> str:
-    """What the bar shows while a function, or an integrator with its right-hand side, is made; empty name: the motion runs."""
-    field, _, method = name.partition(":")
-    what = f"{field} with the method {method}" if method else field
-    return f"{module.name}: first use of {what}, which is derived and compiled" if name else module.name
+def _underway(module: Module, label: str) -> str:
+    """What the bar shows while a function, or an integrator with its right-hand side, is made; empty label: the motion runs."""
+    return f"{module.name}: first use of {label}, which is derived and compiled" if label else module.name
 
 
 def _bar(module: Module, span: tuple[float, float]) -> Any:

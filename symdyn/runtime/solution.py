@@ -7,13 +7,14 @@ import csv
 import difflib
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.metadata import Sizes
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.arguments import fixed
@@ -73,7 +74,7 @@ class Solution:
         self._inputs = inputs
         # A function of the user may depend on what changes after the run, such as the variable of a loop: it is called here.
         self._input_rows = np.broadcast_to(inputs.rows(self.t, self.x), (len(self.t), len(inputs.constant)))
-        self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata["sizes"]["x"])
+        self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata.sizes.x)
         self._happened = list(outcome.happened)
         self._n_c = len(names(module))
 
@@ -100,7 +101,7 @@ class Solution:
             raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
                                 f"its state was asked for at t = {outside.flat[0]:.9g} s")
         times, places = np.unique(asked, return_inverse=True)
-        found = self._repeat(times)[:, :self._sizes["x"]]
+        found = self._repeat(times)[:, :self._sizes.x]
         return found[places.reshape(asked.shape)]
 
     def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
@@ -111,10 +112,10 @@ class Solution:
         """
         name = name_of(name)
         metadata = self.module.metadata
-        if name in metadata["x"]:
-            return self.x[:, metadata["x"].index(name)]
-        if name in metadata["inputs"]:
-            return self.inputs[:, metadata["inputs"].index(name)]
+        if name in metadata.x:
+            return self.x[:, metadata.x.index(name)]
+        if name in metadata.inputs:
+            return self.inputs[:, metadata.inputs.index(name)]
         if name in self.outputs:
             return self.outputs[name]
         constraints = names(self.module)
@@ -122,7 +123,7 @@ class Solution:
             return self.lam
         if name in constraints or name.removeprefix("lam_") in constraints:
             return self.lam[:, constraints.index(name if name in constraints else name.removeprefix("lam_"))]
-        known = [*metadata["x"], *metadata["inputs"], *self.outputs, *(["lam", *constraints] if self._n_c else ())]
+        known = [*metadata.x, *metadata.inputs, *self.outputs, *(["lam", *constraints] if self._n_c else ())]
         near = difflib.get_close_matches(name, known, 3)
         raise ArgumentError(f"{self.module.name}: the solution has no {shown(name)}; "
                             + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
@@ -139,15 +140,15 @@ class Solution:
 
     @property
     def q(self) -> np.ndarray:
-        return self.x[:, :self._sizes["q"]]
+        return self.x[:, :self._sizes.q]
 
     @property
     def u(self) -> np.ndarray:
-        return self.x[:, self._sizes["q"]:self._sizes["q"] + self._sizes["u"]]
+        return self.x[:, self._sizes.q:self._sizes.q + self._sizes.u]
 
     @property
     def z(self) -> np.ndarray:
-        return self.x[:, self._sizes["q"] + self._sizes["u"]:]
+        return self.x[:, self._sizes.q + self._sizes.u:]
 
     @cached_property
     def energy(self) -> np.ndarray:
@@ -195,7 +196,7 @@ class Solution:
         """
         if self._work is not None:
             return self._work
-        if self.module.metadata["conservative"]:
+        if self.module.metadata.conservative:
             return np.zeros(len(self.t))
         raise ArgumentError(f"{self.module.name} has loads that do work; pass work=True to simulate")
 
@@ -213,13 +214,13 @@ class Solution:
     @property
     def samples(self) -> dict[str, SampleRows]:
         """Input name -> what its sampled controller set: when the values took effect, t (n,), and the values (n,)."""
-        record, known = self._inputs.record, self.module.metadata["inputs"]
+        record, known = self._inputs.record, self.module.metadata.inputs
         return {} if record is None else {name: record.of(k) for k, name in enumerate(known) if record.fresh[:, k].any()}
 
     @cached_property
     def outputs(self) -> dict[str, np.ndarray]:
         """The user's named outputs, each (n_t, ...)."""
-        if not self.module.metadata["outputs"]:
+        if not self.module.metadata.outputs:
             return {}
         return self.module.split_outputs(self._rows("outputs"))
 
@@ -372,13 +373,13 @@ class Solution:
         return path
 
     def _save_arrays(self, path: Path) -> None:
-        about = {"name": self.module.name, "x": self.module.metadata["x"], "inputs": self.module.metadata["inputs"],
-                 "parameters": self.module.metadata["parameters"], "units": self.module.metadata["units"],
+        about = {"name": self.module.name, "x": self.module.metadata.x, "inputs": self.module.metadata.inputs,
+                 "parameters": self.module.metadata.parameters, "units": self.module.metadata.units,
                  "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
         arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
         if "energy" in self.module.functions:
             arrays["energy"] = self.energy
-        if self.module.metadata["inputs"]:
+        if self.module.metadata.inputs:
             arrays["inputs"] = self.inputs
         if self._n_c:
             about["constraints"] = names(self.module)
@@ -389,7 +390,7 @@ class Solution:
                  about=np.array(json.dumps(about)), **arrays)
 
     def _save_columns(self, path: Path) -> None:
-        titles = ["t", *self.module.metadata["x"], *self.module.metadata["inputs"]]
+        titles = ["t", *self.module.metadata.x, *self.module.metadata.inputs]
         columns = [self.t, *self.x.T, *self.inputs.T]
         for name, rows in self.outputs.items():
             flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
@@ -403,8 +404,8 @@ class Solution:
             writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
 
     @property
-    def _sizes(self) -> Mapping[str, int]:
-        return self.module.metadata["sizes"]  # type: ignore[no-any-return]
+    def _sizes(self) -> Sizes:
+        return self.module.metadata.sizes
 
     def rows(self, name: str) -> np.ndarray:
         """A function of the module at every time, (n_t, ...); not a number where it cannot be evaluated."""

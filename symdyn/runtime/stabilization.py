@@ -76,7 +76,7 @@ def choose(module: Module, asked: Any, one_step: bool, method: str, params: np.n
                             "stabilization='baumgarte', or method='Radau' (stiff), 'DOP853' or 'dop853'")
     if way == "baumgarte" and not constrained:
         raise ArgumentError(f"{module.name}: there are no constraints; leave out stabilization={shown(asked)}")
-    if way == "projection" and not constrained and not module.metadata.get("unit_groups"):
+    if way == "projection" and not constrained and not module.metadata.unit_groups:
         way = "none"
     return Stabilization(way, float(gain), length(module, params) if constrained else 1.0)
 
@@ -89,15 +89,15 @@ class Projector:
 
     def __init__(self, module: Module, params: np.ndarray) -> None:
         self.module = module
-        sizes = module.metadata["sizes"]
-        self.n_q, self.n_u = sizes["q"], sizes["u"]
-        self.n_state: int = sizes["x"]
+        sizes = module.metadata.sizes
+        self.n_q, self.n_u = sizes.q, sizes.u
+        self.n_state: int = sizes.x
         self.n_c = len(names(module))
-        self.groups = [[module.metadata["x"].index(name) for name in group] for group in module.metadata.get("unit_groups", ())]
+        self.groups = [[module.metadata.x.index(name) for name in group] for group in module.metadata.unit_groups]
         self.length = length(module, params) if self.n_c else 1.0
         self.velocities = as_velocities(module, params) if self.n_c else np.ones(self.n_u)
-        units = module.metadata["units"]
-        self.lengths = np.array([self.length if is_angle(units.get(q)) else 1.0 for q in module.metadata["q"]])
+        units = module.metadata.units
+        self.lengths = np.array([self.length if is_angle(units.get(q)) else 1.0 for q in module.metadata.q])
         self.n_evaluations, self.n_steps = 0, 0
         self.largest = np.zeros(2)
         self._evaluators = {}
@@ -126,7 +126,7 @@ class Projector:
         middle = self.n_q + self.n_u
         if not self.n_c or not any(k < middle for k in held):
             return self(t, x)
-        resets = {k for event in self.module.metadata["events"] for k in event["reset"]}
+        resets = {k for event in self.module.metadata.events for k in event.reset}
         known = [k for k in sorted(resets) if k < middle]  # in the order of reset_directions
         wanted, u = x.copy(), x[self.n_q:middle].copy()
         for part in (slice(0, self.n_q), slice(self.n_q, middle)):
@@ -166,7 +166,7 @@ class Projector:
                 worst = np.inf
                 break
         if worst > allowed:
-            raise ProjectionFailed(reset_refused(self.module.metadata["x"][entry], left))
+            raise ProjectionFailed(reset_refused(self.module.metadata.x[entry], left))
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
         """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
@@ -230,7 +230,7 @@ class Watch:
 
     def __init__(self, module: Module, params: np.ndarray) -> None:
         self.module = module
-        self.n_state: int = module.metadata["sizes"]["x"]
+        self.n_state: int = module.metadata.sizes.x
         self.length = length(module, params)
         self.evaluator = module.unit("rhs").evaluator("violation")
         self.evaluator.set_params(params)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.backend.metadata import Metadata
 from symdyn.errors import EvaluationError
 from symdyn.runtime.charts import at_lock
 from symdyn.runtime.constraints import names, rank, scaled_jacobian
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> str:
     """What to add to a message where a step became too small: whether the mass matrix is to blame, and along which speeds."""
     locked = at_lock(module, x)
-    if "mass_matrix" not in module.functions or not module.metadata["u"] or names(module):
+    if "mass_matrix" not in module.functions or not module.metadata.u or names(module):
         return locked  # under constraints a singular mass matrix is nothing special
     try:
         M = module.evaluate("mass_matrix", t, x, p)
@@ -29,7 +29,7 @@ def nearly_singular(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> s
     if values[0] > 1e-8 * values[-1]:
         return locked
     share = np.abs(vectors[:, 0])
-    along = [name for name, s in zip(module.metadata["u"], share, strict=True) if s > share.max() / 2]
+    along = [name for name, s in zip(module.metadata.u, share, strict=True) if s > share.max() / 2]
     return f"; the mass matrix is nearly singular there, along {', '.join(along)}{locked}"
 
 
@@ -63,10 +63,10 @@ def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.nda
     return f"; the constraints nearly lose rank there ({now} instead of {before}): {'; '.join(told)}"
 
 
-def describe_stop(metadata: Mapping[str, Any], t: float, x: np.ndarray, reason: str) -> str:
+def describe_stop(metadata: Metadata, t: float, x: np.ndarray, reason: str) -> str:
     """When, where and why a run stopped."""
-    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], x, strict=False))
-    return f"{metadata['name']}: stopped at t = {t:.9g}: {reason}; the state there: {state}"
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata.x, x, strict=False))
+    return f"{metadata.name}: stopped at t = {t:.9g}: {reason}; the state there: {state}"
 
 
 def with_last(t: np.ndarray, x: np.ndarray, t_here: float, x_here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,14 +6,16 @@ There are two: a C library through ctypes, and a generated Python module. No Sym
 from __future__ import annotations
 
 import ctypes
+import functools
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 
+from symdyn.backend.metadata import Metadata
 from symdyn.errors import EvaluationError
 from symdyn.runtime import cache
 from symdyn.runtime.compiler import Compiler
@@ -44,7 +46,10 @@ class Unit(Protocol):
     """Generated code that is loaded."""
 
     backend: str
-    metadata: Mapping[str, Any]
+
+    @property
+    def metadata(self) -> Metadata:
+        """What the code documents of itself."""
 
     def evaluator(self, name: str) -> Evaluator:
         """A new evaluator of one function."""
@@ -62,25 +67,25 @@ class CUnit:
 
     backend = "c"
 
-    def __init__(self, source: str, metadata: Mapping[str, Any], compiler: Compiler) -> None:
+    def __init__(self, source: str, metadata: Metadata, compiler: Compiler) -> None:
         self.metadata = metadata
         self.source = source
         # The integrator in a unit of its own has the same names for all mechanisms.
-        self._of_runtime = "symdyn" if len(translation_units(source)) > 1 else metadata["name"]
-        self.library = cache.load(source, metadata["name"], compiler)
+        self._of_runtime = "symdyn" if len(translation_units(source)) > 1 else metadata.name
+        self.library = cache.load(source, metadata.name, compiler)
         # Evaluations are too short to be worth releasing the interpreter lock for; integrations are not.
         self.quick = ctypes.PyDLL(self.library._name)
 
     def function(self, name: str, quick: bool = False) -> Any:
         """An exported function of the library, without the module's prefix."""
-        prefix = self._of_runtime if name.startswith("simulation_") else self.metadata["name"]
+        prefix = self._of_runtime if name.startswith("simulation_") else self.metadata.name
         return getattr(self.quick if quick else self.library, f"{prefix}_{name}")
 
     def reason(self, code: int) -> str:
         """What a return code means."""
         if code == NOT_FINITE:
             return "the result is not finite"
-        reasons = self.metadata["reasons"]
+        reasons = self.metadata.reasons
         return reasons[code - 1] if 0 < code <= len(reasons) else f"code {code}"
 
     def evaluator(self, name: str) -> CEvaluator:
@@ -90,9 +95,9 @@ class CUnit:
         """Compute the constants. Raises EvaluationError if they cannot be."""
         code = self.function("prologue")(ctypes.c_void_p(p.ctypes.data), ctypes.c_void_p(c.ctypes.data))
         if code:
-            raise EvaluationError(f"{self.metadata['name']}: {self.reason(code)}; {check_parameters(self.metadata, p)}")
+            raise EvaluationError(f"{self.metadata.name}: {self.reason(code)}; {check_parameters(self.metadata, p)}")
         if not np.isfinite(c).all():
-            raise EvaluationError(f"{self.metadata['name']}: {np.count_nonzero(~np.isfinite(c))} of the constants that "
+            raise EvaluationError(f"{self.metadata.name}: {np.count_nonzero(~np.isfinite(c))} of the constants that "
                                   "depend on parameters only are not finite; check for a division by a zero parameter")
 
 
@@ -100,14 +105,14 @@ class CEvaluator:
     """One function of a C library, with buffers whose addresses are bound once."""
 
     def __init__(self, unit: CUnit, name: str) -> None:
-        sizes = unit.metadata["sizes"]
+        sizes = unit.metadata.sizes
         self.unit = unit
         self.name = name
-        self.shape = tuple(unit.metadata["shapes"][name])
+        self.shape = tuple(unit.metadata.shapes[name])
         self.size = int(np.prod(self.shape))
-        self.p, self.c = np.zeros(max(1, sizes["p"])), np.zeros(max(1, unit.metadata["n_c"]))
-        self.t, self.x = np.zeros(1), np.zeros(sizes["x"])
-        self.ud, self.inputs = np.zeros(sizes["ud"]), np.zeros(sizes["inputs"])
+        self.p, self.c = np.zeros(max(1, sizes.p)), np.zeros(max(1, unit.metadata.n_c))
+        self.t, self.x = np.zeros(1), np.zeros(sizes.x)
+        self.ud, self.inputs = np.zeros(sizes.ud), np.zeros(sizes.inputs)
         self.out = np.zeros(self.size)
         self.result = self.out.reshape(self.shape)
         self.frame = Frame(1, *[a.ctypes.data for a in (self.t, self.x, self.ud, self.inputs, self.p, self.c, self.out)],
@@ -157,7 +162,11 @@ class PythonUnit:
     def __init__(self, module: ModuleType, source: str) -> None:
         self.module = module
         self.source = source
-        self.metadata = module.METADATA
+
+    @functools.cached_property
+    def metadata(self) -> Metadata:
+        """What the code documents of itself. Raises SymdynError where it was written by another version."""
+        return Metadata.of_plain(self.module.METADATA)
 
     @classmethod
     def from_source(cls, source: str, name: str) -> PythonUnit:
@@ -201,13 +210,13 @@ class PythonUnit:
         Raises the module's SingularError, which tells the rows, where single ones cannot be evaluated; ArithmeticError or
         ValueError where it is not known which.
         """
-        sizes = self.metadata["sizes"]
+        sizes = self.metadata.sizes
         x, p, inputs = (a.T for a in (x, p, inputs))
-        q, u, z = np.split(x, np.cumsum([sizes["q"], sizes["u"]]))
+        q, u, z = np.split(x, np.cumsum([sizes.q, sizes.u]))
         many = self.module._MANY
         with np.errstate(all="ignore"):
             try:
-                result = many[name](t, q, u, z, np.zeros((sizes["ud"], 1)), inputs, p, many["prologue"](p))
+                result = many[name](t, q, u, z, np.zeros((sizes.ud, 1)), inputs, p, many["prologue"](p))
             except Exception as error:
                 raise_by_text(error)
                 raise
@@ -234,9 +243,9 @@ class PythonEvaluator:
         self.p = tuple(p.tolist())
 
     def one(self, t: float, x: Any, inputs: Any = None, ud: Any = None) -> np.ndarray:
-        sizes = self.unit.metadata["sizes"]
-        inputs = [0.0] * sizes["inputs"] if inputs is None else inputs
-        ud = [0.0] * sizes["ud"] if ud is None else ud
+        sizes = self.unit.metadata.sizes
+        inputs = [0.0] * sizes.inputs if inputs is None else inputs
+        ud = [0.0] * sizes.ud if ud is None else ud
         state = np.asarray(x, dtype=float)
         if state.ndim != 1:
             raise ValueError(f"one state has one dimension, found the shape {state.shape}")
@@ -259,13 +268,13 @@ class PythonEvaluator:
         raise EvaluationError(failure_of_row(self.unit.metadata, self.name, why, rows[0], rows[1], first, n))
 
     def each(self, t: float, x: np.ndarray, inputs: Any) -> np.ndarray:
-        sizes = self.unit.metadata["sizes"]
-        rows = [np.atleast_2d(np.asarray(a, dtype=float)) for a in (x, inputs, np.zeros(sizes["ud"]))]
+        sizes = self.unit.metadata.sizes
+        rows = [np.atleast_2d(np.asarray(a, dtype=float)) for a in (x, inputs, np.zeros(sizes.ud))]
         with np.errstate(all="ignore"):
             try:
                 result: np.ndarray = self.unit.evaluate(self.name, np.array([t]), rows[0], self.p, *rows[1:])[0]
             except (ArithmeticError, ValueError):
-                result = np.full(self.unit.metadata["shapes"][self.name], np.nan)
+                result = np.full(self.unit.metadata.shapes[self.name], np.nan)
         return result
 
     def _evaluate(self, t: Any, x: Any, inputs: Any, ud: Any) -> np.ndarray:
@@ -283,9 +292,9 @@ class PythonEvaluator:
         raise EvaluationError(failure(self.unit.metadata, self.name, "the result is not finite", t, x))
 
 
-def check_parameters(metadata: Mapping[str, Any], p: Sequence[float] | np.ndarray) -> str:
+def check_parameters(metadata: Metadata, p: Sequence[float] | np.ndarray) -> str:
     """What to do where what depends on parameters only cannot be computed; those that are 0 are the first to look at."""
-    zero = [name for name, value in zip(metadata["parameters"], p, strict=False) if value == 0]
+    zero = [name for name, value in zip(metadata.parameters, p, strict=False) if value == 0]
     return "check the parameters" + (f", of which {', '.join(zero)} {'are' if len(zero) > 1 else 'is'} 0" if zero else "")
 
 
@@ -295,17 +304,17 @@ def _rows(arrays: Sequence[np.ndarray]) -> int:
     return 0 if 0 in lengths else max(lengths)
 
 
-def failure_of_row(metadata: Mapping[str, Any], name: str, reason: str, t: np.ndarray, x: np.ndarray, k: int, n: int) -> str:
+def failure_of_row(metadata: Metadata, name: str, reason: str, t: np.ndarray, x: np.ndarray, k: int, n: int) -> str:
     """The sentence for row k of n, where t and x have n rows or one for all."""
     text = failure(metadata, name, reason, t[min(k, len(t) - 1)], x[min(k, len(x) - 1)])
     return text + (f" (row {k} of {n})" if n > 1 else "")
 
 
-def failure(metadata: Mapping[str, Any], name: str, reason: str, t: Any, x: Any) -> str:
+def failure(metadata: Metadata, name: str, reason: str, t: Any, x: Any) -> str:
     """The sentence for an evaluation that failed."""
-    text = f"{metadata['name']}: {name} cannot be evaluated: {reason}"
+    text = f"{metadata.name}: {name} cannot be evaluated: {reason}"
     if np.ndim(x) > 1:
         return text
-    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata["x"], np.asarray(x, dtype=float), strict=True))
-    bad = [n for n, v in zip(metadata["x"], np.asarray(x, dtype=float), strict=True) if not np.isfinite(v)]
+    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(metadata.x, np.asarray(x, dtype=float), strict=True))
+    bad = [n for n, v in zip(metadata.x, np.asarray(x, dtype=float), strict=True) if not np.isfinite(v)]
     return f"{text}; at t = {float(t):.6g}, {state}" + (f" ({', '.join(bad)} given not finite)" if bad else "")

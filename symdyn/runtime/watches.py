@@ -40,7 +40,7 @@ class Watched:
 
 def watched(module: Module, values: Any) -> list[Watched]:
     """Of the function `watches` at one state or at rows of states."""
-    about = module.metadata.get(WATCHES, ())
+    about = module.metadata.watches
     rows = np.asarray(values, dtype=float).reshape(-1, len(about))
     rows = rows[np.isfinite(rows).all(axis=1)]
     if not len(rows):

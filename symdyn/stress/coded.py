@@ -8,7 +8,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.stress.first_order import HIGHER_ORDER, FirstOrder, first_order
 from symdyn.stress.statements import Statements
 from symdyn.stress.subject import EPS, Subject

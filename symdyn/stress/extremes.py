@@ -89,7 +89,7 @@ def denormals(subject: Subject, short: bool) -> Iterator[Row]:
 
 def masses(subject: Subject, short: bool) -> Iterator[Row]:
     """Ratios of masses from 1e-8 to 1e8: accelerations against 30 digits, and a short motion with its energy at both ends."""
-    units, names = subject.module.metadata["units"], subject.module.metadata["parameters"]
+    units, names = subject.module.metadata.units, subject.module.metadata.parameters
     heavy = [k for unit in ("kg", "kg m^2") for k in [i for i, n in enumerate(names) if units.get(n) == unit][1::2]]
     if len(heavy) == 0 or sum(units.get(n) == "kg" for n in names) < 2:
         raise NotApplicable("there are no two masses that are parameters")
@@ -149,7 +149,7 @@ def _short_motion(subject: Subject, heavy: list[int], ratio: float) -> Row:
 
 def inputs(subject: Subject, short: bool) -> Iterator[Row]:
     """Inputs that become NaN or infinite in the middle of a run."""
-    names = subject.module.metadata["inputs"]
+    names = subject.module.metadata.inputs
     if not names:
         raise NotApplicable("there are no inputs")
     when = subject.duration / 100
@@ -171,7 +171,7 @@ def stopped(check: str, system: str, done: str, sol: Any, when: float, culprits:
         lacks.append("it does not stop")
     if "stopped at t =" not in sol.message:
         lacks.append("the message has no time")
-    if not all(f"{name} =" in sol.message for name in sol.module.metadata["x"]):
+    if not all(f"{name} =" in sol.message for name in sol.module.metadata.x):
         lacks.append("the message has no state")
     lacks += [f"the message does not name {c}" for c in culprits if c not in sol.message]
     if not np.isfinite(sol.x).all():

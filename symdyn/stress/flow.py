@@ -45,7 +45,7 @@ class Path:
 def scales_of(subject: Subject, x: np.ndarray) -> np.ndarray:
     """For each entry of the state the largest value of its unit in rows of states, 1 where all are zero, (n_x,)."""
     metadata = subject.module.metadata
-    units = [metadata["units"].get(name, name) for name in metadata["x"]]
+    units = [metadata.units.get(name, name) for name in metadata.x]
     most = np.abs(x).max(axis=0)
     largest = {unit: max(m for u, m in zip(units, most, strict=True) if u == unit) for unit in units}
     return np.array([largest[unit] or 1.0 for unit in units])
@@ -75,10 +75,10 @@ def stands_still(subject: Subject, x: np.ndarray) -> bool:
     """Whether no coordinate changes over rows of states, of a run at RTOL or thereabouts, by more than errors of steps may make
     up: STILL of the largest value of its unit, of 1 rad, or of the longest parameter in metres."""
     module = subject.module
-    known, params = module.metadata["units"], zip(module.metadata["parameters"], subject.params, strict=True)
+    known, params = module.metadata.units, zip(module.metadata.parameters, subject.params, strict=True)
     longest = max((abs(float(p)) for name, p in params if known.get(name) == "m"), default=1.0)
-    n_q, n_u = (module.metadata["sizes"][k] for k in "qu")
-    least = np.array([longest if known.get(name) == "m" else 1.0 for name in module.metadata["x"]])
+    n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
+    least = np.array([longest if known.get(name) == "m" else 1.0 for name in module.metadata.x])
     change = np.ptp(x, axis=0) <= STILL * np.maximum(scales_of(subject, x), least)
     return bool(np.delete(change, slice(n_q, n_q + n_u)).all())  # rounding alone gives speeds beside those that are zero
 

@@ -38,7 +38,7 @@ def energy_row(subject: Subject, motion: Path, check: str = "energy", of: str = 
     """
     if not subject.has("energy"):
         raise NotApplicable("the equations tell no energy")
-    conservative = bool(subject.module.metadata["conservative"])
+    conservative = bool(subject.module.metadata.conservative)
     end = float(motion.sol.t[-1])
     sol = subject.run(np.linspace(0.0, end, 401), rtol=RTOL, atol=RTOL * motion.scales, work=not conservative)
     if not sol.success:
@@ -124,7 +124,7 @@ def divergence(subject: Subject, short: bool) -> Iterator[Row]:
     k -= k % 2
     direction = np.random.default_rng(7).normal(size=len(motion.scales)) * motion.scales
     starts = [sol.x[0] + sign * CHANGE * direction for sign in (0.5, -0.5, 1, -1)]
-    if subject.constrained or subject.module.metadata.get("unit_groups"):
+    if subject.constrained or subject.module.metadata.unit_groups:
         starts = [_onto(subject, x) for x in starts]
     times = sol.t[:2 * k + 1]
     runs = [subject.run(times, x, rtol=1e-12, atol=1e-12 * motion.scales) for x in starts]
@@ -135,7 +135,7 @@ def divergence(subject: Subject, short: bool) -> Iterator[Row]:
     wanted, coarse = phi[k] @ change, flow(subject, motion, 2)[k // 2] @ change
     bent = float(np.linalg.norm((ends[2] - ends[3]) / 2 - 2 * apart))
     size, grown = float(np.linalg.norm(change)), max(float(norms[:k + 1].max()), 1.0)
-    if subject.constrained or subject.module.metadata.get("unit_groups"):
+    if subject.constrained or subject.module.metadata.unit_groups:
         wanted, coarse = (_tangent(subject, times[-1], runs[0].x[-1], motion.scales, w) for w in (wanted, coarse))
     found = float(np.linalg.norm(apart - wanted) / (size * grown))
     allowed = 2 * math.sqrt(len(motion.scales)) * 1e-12 * (2 if subject.constrained else 1)

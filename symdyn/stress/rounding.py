@@ -13,7 +13,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, CompileError, SymdynError
 from symdyn.formulation.equations import Symbols
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.runtime.compiler import Compiler, find_compiler, package_path, probe
 from symdyn.stress.coded import SMALLEST, Coded, imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, judged, refusals, set_aside
@@ -81,7 +81,7 @@ def states(subject: Subject, n: int, seed: int = 1) -> States:
             x[k, n_q:] = rng.choice([0.0, 5e-324, -1e-310], len(x0) - n_q)
         else:
             x[k] *= 10.0 ** rng.uniform(-8, 0, len(x0))
-    if subject.constrained or subject.module.metadata.get("unit_groups"):
+    if subject.constrained or subject.module.metadata.unit_groups:
         x = _consistent(subject, x, x0)
     n_in = len(symbols.inputs)
     return States(rng.uniform(0, 1, n), x, rng.uniform(-1, 1, (n, n_in)), rng.uniform(-1, 1, (n, n_u)))
@@ -190,7 +190,7 @@ def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
 
 def _angles(subject: Subject) -> list[int]:
     """Places of the coordinates that are angles."""
-    units, symbols = subject.module.metadata["units"], subject.symbols
+    units, symbols = subject.module.metadata.units, subject.symbols
     return [k for k, s in enumerate(symbols.coordinates) if units.get(s.name) == "rad" and s not in symbols.reach]
 
 

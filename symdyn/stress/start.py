@@ -35,7 +35,7 @@ def start(subject: Subject) -> Iterator[Row]:
 
 
 def _moved(subject: Subject, moved: np.ndarray) -> Row:
-    names, units = subject.module.metadata["x"], subject.module.metadata["units"]
+    names, units = subject.module.metadata.x, subject.module.metadata.units
     most = np.argsort(-np.abs(moved))[:5]
     parts = [f"{names[k]} by {moved[k]:.3g} {units.get(names[k], '')}".rstrip() for k in most if moved[k]]
     return Row(START, subject.name, f"system.initial violates constraints; the start was moved onto them: {', '.join(parts)}"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.pipeline import tape_as_derived
+from symdyn.functions.tapes import tape_as_derived
 from symdyn.stress.subject import Subject
 from symdyn.tape.balance import balance
 from symdyn.tape.kernels import CLEANINGS, MASSLESS, ROUNDS, SMOOTHED, Kernel, Multipliers, Saddle

@@ -12,7 +12,9 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError, no_value
 from symdyn.formulation.equations import Equations
-from symdyn.pipeline import FUNCTIONS, emit, has_function
+from symdyn.functions.table import FUNCTIONS
+from symdyn.functions.tapes import has_function
+from symdyn.pipeline import emit
 from symdyn.runtime.compiler import Compiler, find_compiler, plain
 from symdyn.runtime.module import Module
 from symdyn.runtime.solution import Solution
@@ -96,26 +98,26 @@ class Subject:
     @cached_property
     def inputs(self) -> np.ndarray:
         """What inputs are while nothing else is said, (n_in,)."""
-        initial = self.module.metadata["initial"]
-        return np.array([initial.get(name, 0.0) for name in self.module.metadata["inputs"]], dtype=float)
+        initial = self.module.metadata.initial
+        return np.array([initial.get(name, 0.0) for name in self.module.metadata.inputs], dtype=float)
 
     @property
     def duration(self) -> float:
-        return float(self.module.metadata["duration"])
+        return float(self.module.metadata.duration)
 
     @property
     def given(self) -> np.ndarray:
         """The initial state as it was given, (n_x,)."""
         metadata = self.module.metadata
-        return np.array([metadata["initial"].get(name, 0.0) for name in metadata["x"]], dtype=float)
+        return np.array([metadata.initial.get(name, 0.0) for name in metadata.x], dtype=float)
 
     @cached_property
     def start(self) -> np.ndarray:
         """The usual start: what was given, moved onto the constraints, (n_x,)."""
         metadata, x = self.module.metadata, self.given
-        n_q, n_u = metadata["sizes"]["q"], metadata["sizes"]["u"]
-        for group in metadata.get("unit_groups", ()):
-            places = [metadata["x"].index(name) for name in group]
+        n_q, n_u = metadata.sizes.q, metadata.sizes.u
+        for group in metadata.unit_groups:
+            places = [metadata.x.index(name) for name in group]
             norm = np.linalg.norm(x[places])
             x[places] = x[places] / norm if norm > 0 else [1.0, *[0.0] * (len(places) - 1)]
         if self.constrained:
@@ -132,8 +134,8 @@ class Subject:
 
     def parts(self, x: np.ndarray) -> dict[str, Any]:
         """A state as arguments of `simulate`."""
-        sizes = self.module.metadata["sizes"]
-        q, u, z = np.split(np.asarray(x, dtype=float), np.cumsum([sizes["q"], sizes["u"]]))
+        sizes = self.module.metadata.sizes
+        q, u, z = np.split(np.asarray(x, dtype=float), np.cumsum([sizes.q, sizes.u]))
         return {"q": q, "u": u, "z": z} if len(z) else {"q": q, "u": u}
 
     def run(self, t: Any, x: np.ndarray | None = None, params: Any = None, rtol: float = RTOL, **options: Any) -> Solution:
@@ -169,28 +171,28 @@ class Subject:
         compiler = compiler or find_compiler()
         if backend == "numpy" or compiler is None:
             source = emit(self.equations, "numpy", names, standalone=False)
-            return PythonUnit.from_source(next(iter(source.files.values())), source.metadata["name"])
+            return PythonUnit.from_source(next(iter(source.files.values())), source.metadata.name)
         source = emit(self.equations, "c", names, standalone=False, integrator=False)
         return CUnit(next(iter(source.files.values())), source.metadata, plain(compiler) if not backend else compiler)
 
 
 def evaluated(evaluator: Any, t: Any, x: np.ndarray, params: np.ndarray, inputs: Any, ud: Any = None) -> np.ndarray:
     """A function of a unit at rows of states, (n, size), NaN where it cannot be evaluated."""
-    sizes = evaluator.unit.metadata["sizes"]
+    sizes = evaluator.unit.metadata.sizes
     rows = np.atleast_2d(np.asarray(x, dtype=float))
     n = len(rows)
     times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=float), (n,)))
-    free = np.ascontiguousarray(np.broadcast_to(np.atleast_2d(np.asarray(inputs, dtype=float)), (n, sizes["inputs"])))
-    given = np.zeros((n, sizes["ud"])) if ud is None else np.ascontiguousarray(np.asarray(ud, dtype=float))
-    if given.shape[1] != sizes["ud"]:
-        given = np.zeros((n, sizes["ud"]))
+    free = np.ascontiguousarray(np.broadcast_to(np.atleast_2d(np.asarray(inputs, dtype=float)), (n, sizes.inputs)))
+    given = np.zeros((n, sizes.ud)) if ud is None else np.ascontiguousarray(np.asarray(ud, dtype=float))
+    if given.shape[1] != sizes.ud:
+        given = np.zeros((n, sizes.ud))
     try:
         evaluator.set_params(np.asarray(params, dtype=float))
         found = evaluator.many(times, np.ascontiguousarray(rows), free, given)
         return np.asarray(found, dtype=float).reshape(n, -1)
     except EvaluationError:
         pass
-    size = int(np.prod(evaluator.unit.metadata["shapes"][evaluator.name]))
+    size = int(np.prod(evaluator.unit.metadata.shapes[evaluator.name]))
     found = np.full((n, size), np.nan)
     for k in range(n):
         try:

@@ -59,7 +59,7 @@ def powers(unit: str) -> tuple[int, int, int]:
 
 def factors(subject: Subject, names: Sequence[str], units: Units) -> np.ndarray:
     """What numbers are multiplied by. Raises NotApplicable for a symbol without a unit."""
-    known = subject.module.metadata["units"]
+    known = subject.module.metadata.units
     missing = [name for name in names if name not in known]
     if missing:
         raise NotApplicable(f"the unit of {', '.join(missing[:5])} is not known; give it in system.units")
@@ -71,7 +71,7 @@ def units(subject: Subject, short: bool) -> Iterator[Row]:
     metadata = subject.module.metadata
     _demand_scaling(subject)
     for system in EXACT[:1] if short else EXACT:
-        p, x = (factors(subject, metadata[group], system) for group in ("parameters", "x"))
+        p, x = (factors(subject, metadata.names(group), system) for group in ("parameters", "x"))
         yield from _bits(subject, system, p, x, short)
     yield from _decimal(subject, short)
 
@@ -83,7 +83,7 @@ def _demand_scaling(subject: Subject) -> None:
     t, y, given, ud = every.t[-3:], every.x[-3:], every.inputs[-3:], every.ud[-3:]
     plain = exact(subject, "rhs", t, y, given, ud)
     for system in EXACT:
-        p, x, free = (factors(subject, metadata[group], system) for group in ("parameters", "x", "inputs"))
+        p, x, free = (factors(subject, metadata.names(group), system) for group in ("parameters", "x", "inputs"))
         other = exact(subject, "rhs", t * system.time, y * x, given * free, ud, subject.params * p)
         for one, two in zip(plain, other, strict=True):
             if one is None or two is None:
@@ -101,7 +101,7 @@ def _bits(subject: Subject, system: Units, p: np.ndarray, x: np.ndarray, short: 
     scales = scales_of(subject, pilot.x)
     ends: list[Any] = []
     for time, of_p, of_x in ((1.0, 1.0, 1.0), (system.time, p, x)):
-        free = subject.inputs * factors(subject, subject.module.metadata["inputs"], system) if time != 1.0 else subject.inputs
+        free = subject.inputs * factors(subject, subject.module.metadata.inputs, system) if time != 1.0 else subject.inputs
         ends.append(subject.run((0.0, end * time), subject.start * of_x, subject.params * of_p, rtol=RTOL,
                                 atol=RTOL * scales * of_x, max_steps=5000, steps=True, first_step=end / 1024 * time,
                                 **({"inputs": free} if len(free) else {})))
@@ -146,7 +146,7 @@ def _decimal(subject: Subject, short: bool) -> Iterator[Row]:
     if k < 2:
         raise NotApplicable("errors grow beyond all measure at once")
     metadata, end = subject.module.metadata, float(motion.sol.t[2 * k])
-    p, x, free = (factors(subject, metadata[group], DECIMAL) for group in ("parameters", "x", "inputs"))
+    p, x, free = (factors(subject, metadata.names(group), DECIMAL) for group in ("parameters", "x", "inputs"))
     one = subject.run((0.0, end), rtol=RTOL, atol=RTOL * motion.scales, steps=True)
     two = subject.run((0.0, end), subject.start * x, subject.params * p, rtol=RTOL, atol=RTOL * motion.scales * x, steps=True,
                       **({"inputs": subject.inputs * free} if len(free) else {}))

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 
 from symdyn.bench.precise import Lost, program
-from symdyn.pipeline import function_tape, tape_as_derived
+from symdyn.functions.tapes import function_tape, tape_as_derived
 from symdyn.stress.subject import EPS, Subject
 from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node
@@ -198,7 +198,7 @@ def together(subject: Subject, name: str, size: int) -> np.ndarray:
     """Which entries of a function are computed and compared together, (size,) of numbers from 0: those of one unit, one output,
     origins and rotations apart; the whole function where its entries have no units of their own."""
     metadata = subject.module.metadata
-    units = [metadata["units"].get(x, x) for x in metadata["x"]]
+    units = [metadata.units.get(x, x) for x in metadata.x]
     n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
     of_speeds = units[n_q:n_q + n_u]
     labels: list = [0] * size
@@ -293,6 +293,6 @@ def _alone(subject: Subject, values: Callable[[str], np.ndarray], n_q: int, n_u:
     if subject.constrained:
         C = values("C_r").reshape(len(forces), -1, n_u)
         forces = forces + (C.transpose(0, 2, 1) * values("lam")[:, None, :]).sum(axis=2)
-    found = np.zeros((len(forces), len(subject.module.metadata["x"])))
+    found = np.zeros((len(forces), len(subject.module.metadata.x)))
     found[:, n_q:n_q + n_u] = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
     return found

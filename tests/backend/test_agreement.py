@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from symdyn import systems
-from symdyn.pipeline import FUNCTIONS, emit, has_function
+from symdyn.functions.table import FUNCTIONS
+from symdyn.functions.tapes import has_function
+from symdyn.pipeline import emit
 from symdyn.runtime.compiler import find_compiler, flags
 from symdyn.runtime.unit import CUnit, PythonUnit
 from symdyn.tape.evaluate import evaluate
@@ -109,7 +111,7 @@ def test_every_bit_is_that_of_the_tests(name: str, derived: Callable[..., Any], 
     one, other = (module.simulate((0, 1), rtol=1e-9, method="dop853") for module in (ours, theirs))
     assert one.success and one.n_steps == other.n_steps > 10
     assert np.array_equal(one.x, other.x)
-    n_inputs = len(ours.metadata["inputs"])
+    n_inputs = len(ours.metadata.inputs)
     x, inputs = one.x[1] + np.linspace(-1e-3, 1e-3, one.x.shape[1]), np.linspace(0.2, 0.4, n_inputs)
     for x_k in (one.x[-1], x):
         assert np.array_equal(ours.rhs(0.7, x_k, None, inputs), theirs.rhs(0.7, x_k, None, inputs))

@@ -70,7 +70,7 @@ def both(source: Source, compiler: Compiler, x: np.ndarray, p: np.ndarray) -> tu
     unit = CUnit(next(iter(source.files.values())), source.metadata, compiler)
     n = len(x)
     out, codes = np.zeros((n, x.shape[1])), np.zeros(n, dtype=np.intc)
-    arrays = [np.zeros((1, 1)), x, np.zeros((1, len(source.metadata["inputs"]))), p]
+    arrays = [np.zeros((1, 1)), x, np.zeros((1, len(source.metadata.inputs))), p]
     unit.function("rhs_batch")(ctypes.c_long(n), tables_of(arrays), ctypes.c_void_p(out.ctypes.data),
                                (ctypes.c_long * 2)(x.shape[1], 1), ctypes.c_void_p(codes.ctypes.data))
     evaluator = unit.evaluator("rhs")
@@ -96,7 +96,7 @@ def test_every_operation_has_the_bits_of_one_state(operations: Source, way: str)
         pytest.skip("not here")
     rng = np.random.default_rng(3)
     n = 11
-    x = rng.uniform(0.1, 0.9, (n, len(operations.metadata["q"])))
+    x = rng.uniform(0.1, 0.9, (n, len(operations.metadata.q)))
     x[2, 0] = x[2, 1]
     out, wanted, codes, lanes = both(operations, compiler, x, rng.uniform(0.5, 1, (n, 1)))
     assert not codes.any() and (out == wanted).all() and np.isfinite(out).all()
@@ -108,7 +108,7 @@ def test_one_bad_lane_leaves_the_others(operations: Source, way: str) -> None:
     compiler = compilers().get(way)
     if compiler is None:
         pytest.skip("not here")
-    x = np.random.default_rng(4).uniform(0.1, 0.9, (9, len(operations.metadata["q"])))
+    x = np.random.default_rng(4).uniform(0.1, 0.9, (9, len(operations.metadata.q)))
     x[3, 0], x[8, 4] = 2.0, np.inf  # the arc sine of 2
     out, wanted, codes, _ = both(operations, compiler, x, np.full((9, 1), 0.7))
     assert np.flatnonzero(codes).tolist() == [3, 8]

@@ -13,7 +13,9 @@ import pytest
 
 from symdyn import systems
 from symdyn.errors import SymdynError
-from symdyn.pipeline import FUNCTIONS, emit, has_function
+from symdyn.functions.table import FUNCTIONS
+from symdyn.functions.tapes import has_function
+from symdyn.pipeline import emit
 from tests import mechanisms
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")

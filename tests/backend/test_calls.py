@@ -107,7 +107,7 @@ def test_both_ways_are_in_the_program(name: str) -> None:
     assert set(made.program.kernels) == {"symdyn_saddle", "symdyn_multipliers"}
     n, m = len(equations(name).symbols.speeds), len(equations(name).constraints)
     assert set(made.program.kernels.values()) == {(n, m)}
-    assert made.metadata["operations"]["rhs"] == functions["rhs"].count
+    assert made.metadata.operations["rhs"] == functions["rhs"].count
 
 
 @both

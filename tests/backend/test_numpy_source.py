@@ -16,7 +16,9 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.pipeline import FUNCTIONS, emit, has_function, write_source
+from symdyn.functions.table import FUNCTIONS
+from symdyn.functions.tapes import has_function
+from symdyn.pipeline import emit, write_source
 
 ALONE = """
 import runpy, sys

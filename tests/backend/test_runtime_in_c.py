@@ -13,6 +13,7 @@ import pytest
 
 from symdyn import panels
 from symdyn.backend.integrated import Shape, sizes, switches
+from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import METHODS
 from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.backend.source import _shipped, template_folders
@@ -152,7 +153,7 @@ def test_a_unit_vector_keeps_its_length(build: Build, tmp_path: Path) -> None:
 
 
 def test_zeros_of_a_cubic_and_a_reset(build: Build, tmp_path: Path) -> None:
-    events = [{"direction": 0, "stop": False, "reset": []}, {"direction": 1, "stop": False, "reset": [1]}]
+    events = [EventRecord("a", 0, False, (), False, (), ()), EventRecord("b", 1, False, (1,), False, (), ())]
     functions = {"field": "out[0] = 1.0; out[1] = 1.0;",
                  "events_at": "out[0] = (x[0] - 0.3)*(x[0] - 0.50001)*(x[0] - 0.5); out[1] = x[1] - 0.75;",
                  "event_resets_at": "out[0] = -1.0;"}
@@ -178,7 +179,7 @@ BENDS = ROOF + " const double s = d[0] > 0.0 ? -1.0 : 1.0; const int kinks = nea
 
 @pytest.mark.parametrize("bounded", [True, False])
 def test_a_pulse_between_samples_is_found_by_bounds(bounded: bool, build: Build, tmp_path: Path) -> None:
-    events = [{"direction": 0, "stop": False, "reset": [], "enclosed": bounded}]
+    events = [EventRecord("a", 0, False, (), bounded, (), ())]
     functions = {"field": "out[0] = 1.0;", "events_at": "out[0] = fmax(1e-3 - fabs(x[0] - 0.5003), -0.01);"}
     functions |= {"event_ranges_of": ROOF, "event_bounds_of": BENDS} if bounded else {}
     shape = Shape({"q": 1, "u": 0, "z": 0, "inputs": 0}, 0, (), events, (1,) if bounded else ())
@@ -192,7 +193,7 @@ def test_a_pulse_between_samples_is_found_by_bounds(bounded: bool, build: Build,
 def test_a_reset_on_a_circle_takes_the_other_speed_along(build: Build, tmp_path: Path) -> None:
     functions = CIRCLE | {"events_at": "out[0] = x[0] - 0.5;", "event_resets_at": "out[0] = -x[2];",
                           "reset_directions_at": "out[0] = out[1] = 0.0; out[2] = x[1]*x[1]; out[3] = -x[1]*x[0];"}
-    shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), [{"direction": -1, "stop": False, "reset": [2]}], (), True)
+    shape = Shape({"q": 2, "u": 2, "z": 0, "inputs": 0}, 1, (), [EventRecord("a", -1, False, (2,), False, (), ())], (), True)
     tables = {"n_rows": 1, "turning": [0, 0], "angles": [0, 0]}
     library = build(integrator("dop853", shape, functions, tmp_path, projection=tables))
     run = Run(library, [1.0, 0.0, 0.0, 1.0], (0.0, 2 * np.pi / 3), 1e-11, project=True, look=1)

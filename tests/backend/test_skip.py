@@ -10,7 +10,8 @@ import pytest
 
 import symdyn as sd
 from symdyn.backend.source import Source
-from symdyn.pipeline import FUNCTIONS, emit
+from symdyn.functions.table import FUNCTIONS
+from symdyn.pipeline import emit
 from tests.mechanisms import pendulums, planar_or_spatial, split_by_fixed_joint
 
 
@@ -26,7 +27,7 @@ def rendered(equations: Any, *functions: str) -> Source:
 def body(source: Source, function: str) -> str:
     """The statements of one C function."""
     text = next(iter(source.files.values()))
-    found = re.search(rf"^SYMDYN_EXPORT int {source.metadata['name']}_{function}\([^)]*\) {{\n(.*?)^}}", text,
+    found = re.search(rf"^SYMDYN_EXPORT int {source.metadata.name}_{function}\([^)]*\) {{\n(.*?)^}}", text,
                       re.MULTILINE | re.DOTALL)
     assert found is not None
     return re.sub(r"//.*", "", found[1])
@@ -51,7 +52,7 @@ def test_one_function_asked_for_costs_less_than_all(name: str, derived: Callable
 def test_mass_matrix_reads_neither_loads_nor_speeds(derived: Callable[..., Any]) -> None:
     source = rendered(derived("kitchen_sink"), "mass_matrix")
     text = body(source, "mass_matrix")
-    assert source.metadata["arguments"]["mass_matrix"] == ["t", "q", "c"] or "u[" not in text
+    assert source.metadata.arguments["mass_matrix"] == ["t", "q", "c"] or "u[" not in text
     assert not any(word in text for word in ("u[", "inputs[", "z[", "exp(", "erf(", "?"))
 
 
@@ -63,13 +64,13 @@ def test_constants_are_those_of_the_functions_asked_for(derived: Callable[..., A
 
 def test_no_time_where_nothing_depends_on_it(derived: Callable[..., Any]) -> None:
     still, shaken = rendered(derived("double_pendulum"), "rhs", "energy"), rendered(derived("kitchen_sink"), "rhs", "energy")
-    assert all("t" not in arguments for arguments in still.metadata["arguments"].values())
+    assert all("t" not in arguments for arguments in still.metadata.arguments.values())
     assert "double t" not in next(iter(still.files.values()))
-    assert all("t" in arguments for arguments in shaken.metadata["arguments"].values())
+    assert all("t" in arguments for arguments in shaken.metadata.arguments.values())
 
 
 def test_nothing_but_what_is_there_is_passed(derived: Callable[..., Any]) -> None:
-    arguments = rendered(derived("double_pendulum"), "rhs").metadata["arguments"]["rhs"]
+    arguments = rendered(derived("double_pendulum"), "rhs").metadata.arguments["rhs"]
     assert not {"z", "inputs", "ud", "t"} & set(arguments)
 
 

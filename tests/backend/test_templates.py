@@ -17,7 +17,9 @@ import pytest
 from symdyn.backend.dialect import identifier
 from symdyn.backend.source import backends, template_folders
 from symdyn.errors import SymdynError
-from symdyn.pipeline import FUNCTIONS, emit, has_function, write_source
+from symdyn.functions.table import FUNCTIONS
+from symdyn.functions.tapes import has_function
+from symdyn.pipeline import emit, write_source
 
 HERE = Path(__file__).parent
 SHIPPED = template_folders()[0]

@@ -24,8 +24,8 @@ def parts_of(system: Any) -> tuple[Any, np.ndarray, np.ndarray]:
     equations = system.equations()
     module = equations.compile()
     q, u = module.consistent(params=None) if equations.constraints else (None, None)
-    initial = module.metadata["initial"]
-    x0 = np.array([initial.get(name, 0.0) for name in module.metadata["x"]]) if q is None else np.concatenate([q, u])
+    initial = module.metadata.initial
+    x0 = np.array([initial.get(name, 0.0) for name in module.metadata.x]) if q is None else np.concatenate([q, u])
     return equations, module.parameters(), x0
 
 

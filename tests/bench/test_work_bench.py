@@ -605,7 +605,7 @@ def test_all_faults_are_told_at_once():
 def test_bodies_that_carry_joints_in_absolute_coordinates_do_not_count():
     times = np.array([0.1, 0.2])
     first, other = subject("slider_crank").formulated(["augmented", "absolute"])[0]
-    assert len(other.module.metadata["bodies"]) == 4 > len(first.module.metadata["bodies"]) == 2
+    assert len(other.module.metadata.bodies) == 4 > len(first.module.metadata.bodies) == 2
     x, y = (f.module.simulate(np.r_[0.0, times], rtol=1e-11).x[1:] for f in (first, other))
     yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 11.0, ""), first, bodies=True)
     for wrong, bound in ((0.0, 1e-9), (1e-3, 1e-2)):

@@ -158,7 +158,7 @@ def test_a_system_is_compiled_and_its_inputs_can_vary():
 
 def test_a_start_is_made_consistent_for_every_member():
     module = recall("four_bar", {})
-    first = module.metadata["x"][0]
+    first = module.metadata.x[0]
     angle = module.consistent()[0][0]
     angles = angle + np.linspace(-0.1, 0.1, 3)
     done = sd.ensemble(module, {first: angles}, (0.0, 0.05), {"start": f"start {first}", "error": violation}, consistent=True)

@@ -182,7 +182,7 @@ def test_reaction_at_the_clamp() -> None:
     tilt, mass = 0.3, 0.5
     system = cases.column(cases.powers("x", 3) + cases.powers("y", 2), 1.0, 200.0, tilt)
     module, beam = system.recursive().compile(backend="numpy"), cases.beam_of(system)
-    step, q = 1e-4, module.metadata["q"]
+    step, q = 1e-4, module.metadata.q
     solution = module.simulate(t=step * np.arange(5), q={q[0]: 0.05, q[3]: 0.03}, u={f"{q[0]}_dot": 1.0, f"{q[4]}_dot": -2.0},
                                params={"g": GRAVITY, "m": mass}, rtol=1e-12, atol=1e-14)
     moments, turning = [], []

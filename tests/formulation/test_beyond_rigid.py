@@ -101,7 +101,7 @@ def test_absolute_coordinates_give_the_same() -> None:
     rates = []
     for equations in (relative, absolute):
         module = equations.compile(backend="numpy")
-        names, initial = module.metadata["x"], module.metadata["initial"]
+        names, initial = module.metadata.x, module.metadata.initial
         x_dot = module.rhs(0.0, [initial.get(n, 0.0) for n in names])
         rates.append([x_dot[names.index(f"{n}_dot")] for n in system.initial if n.startswith("mast") and f"{n}_dot" in names])
     assert len(rates[0]) == 3

@@ -17,8 +17,8 @@ from symdyn.formulation.locking import lockable
 from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
 from symdyn.formulation.recursive.numbers import NumericTree
 from symdyn.formulation.tree_equations import tree_of
+from symdyn.functions.tapes import function_tape
 from symdyn.model.orientation import SEQUENCES
-from symdyn.pipeline import function_tape
 from symdyn.stress.attitude import free_body, platform
 from symdyn.stress.singular import two_points
 from symdyn.systems import get, names

@@ -218,7 +218,7 @@ def test_quantities_stand_in_states_resets_and_absolute_coordinates():
     state = [0.3, 0.4, 0, 0, 0]
     assert module.rhs(0, state)[4] == pytest.approx(0.7 * (np.cos(0.3) + np.cos(0.7)), rel=1e-14)
     absolute = system.augmented(coordinates="absolute").compile()
-    names = absolute.metadata["x"]
+    names = absolute.metadata.x
     at = dict.fromkeys(names, 0.0)
     at.update(x_first=0, theta_first=0.3, x_second=0.7 * np.cos(0.3), y_second=0.7 * np.sin(0.3), theta_second=0.7)
     found = absolute.outputs(0, [at[name] for name in names])["tip"]

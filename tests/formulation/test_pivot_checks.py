@@ -17,7 +17,7 @@ def test_no_indefinite_mass_matrix_passes(backend: str) -> None:
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")
     module = systems.get("n_link_pendulum", n=5).embedding().compile(backend=backend)
-    masses = [name for name in module.metadata["parameters"] if name.startswith("m")]
+    masses = [name for name in module.metadata.parameters if name.startswith("m")]
     assert len(masses) == 5
     stream = np.random.default_rng(5)
     refused = 0

@@ -253,7 +253,7 @@ def test_a_wild_motion_keeps_its_energy(module: Any) -> None:
 
 
 def test_units_and_parameters(module: Any) -> None:
-    assert module.metadata["parameters"] == ["rho"] and module.metadata["units"]["rho"] == "kg/m^3"
+    assert list(module.metadata.parameters) == ["rho"] and module.metadata.units["rho"] == "kg/m^3"
 
 
 # -- what bad input gets

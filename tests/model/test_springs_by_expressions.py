@@ -61,7 +61,7 @@ def test_what_depends_on_parameters_only_has_a_potential() -> None:
         system.add_spring_damper(system.ground, mass, stiffness=stiffness, length=l / 2)
         system.defaults = {k: 3.0, l: 1.0}
         module = system.compile(backend="numpy")
-        assert module.metadata["conservative"]
+        assert module.metadata.conservative
         energies.append(float(module.energy([0.8], [0.0])[1]))
     assert energies == [pytest.approx(0.5 * 6 * 0.3**2)] * 3
 

@@ -40,8 +40,8 @@ def test_every_stage_decides_alike(units, wanted):
     first = First()
     first.module = module
     spans = _spans(first, None)
-    assert [spans[name] == (-TURNS, TURNS) for name in module.metadata["q"]] == wanted
-    assert [spans[name] == (-LENGTHS, LENGTHS) for name in module.metadata["q"]] == [not turned for turned in wanted]
+    assert [spans[name] == (-TURNS, TURNS) for name in module.metadata.q] == wanted
+    assert [spans[name] == (-LENGTHS, LENGTHS) for name in module.metadata.q] == [not turned for turned in wanted]
     text = emit(equations, "c").files["custom.c"]
     written = next(line for line in text.splitlines() if "turning" in line and "{" in line and "=" in line)
     assert [int(v) for v in written.split("{")[1].split("}")[0].replace("true", "1").replace("false", "0").split(",")] == \

@@ -18,7 +18,7 @@ from symdyn.bench.work.methods import SCIPY
 from symdyn.bench.work.record import Reference, Row, Skipped
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.report import full, full_condition, full_equations, full_pictures, full_work
 from symdyn.report.full import full_report
 from symdyn.report.notation import entry_latex, name_latex

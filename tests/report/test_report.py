@@ -1,7 +1,7 @@
 """The report names what was generated and each thing skipped."""
 
 import symdyn as sd
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 
 
 def report(system: sd.System) -> str:

@@ -58,7 +58,7 @@ def test_parameters_that_vary(double: Any) -> None:
     found = double.rhs_batch(0.0, x, p)
     in_order = np.tile(double.parameters(), (N, 1))
     for name, values in p.items():
-        in_order[:, double.metadata["parameters"].index(name)] = values
+        in_order[:, double.metadata.parameters.index(name)] = values
     same = {"c": 0.0, "numpy": 1e-13}[double.backend]
     np.testing.assert_allclose(found, wanted, rtol=same, atol=same)
     assert (double.rhs_batch(0.0, x, in_order) == found).all()
@@ -66,8 +66,8 @@ def test_parameters_that_vary(double: Any) -> None:
 
 
 def test_inputs_and_times_that_vary(oscillator: Any) -> None:
-    names = oscillator.metadata["inputs"]
-    x = np.random.default_rng(6).normal(size=(N, oscillator.metadata["sizes"]["x"]))
+    names = oscillator.metadata.inputs
+    x = np.random.default_rng(6).normal(size=(N, oscillator.metadata.sizes.x))
     given, t = np.random.default_rng(7).normal(size=(N, len(names))), np.linspace(0, 2, N)
     wanted = oscillator.evaluate("rhs", t, x, None, given)
     np.testing.assert_allclose(oscillator.rhs_batch(t, x, None, given), wanted, rtol=1e-14, atol=1e-14)
@@ -97,8 +97,8 @@ def test_a_bad_parameter_is_reported(double: Any) -> None:
 def test_constraints_and_their_algorithms(four_bar: Any) -> None:
     """Also where constraints depend on each other, which another way of the function computes, lane by lane."""
     rng = np.random.default_rng(8)
-    n_q = four_bar.metadata["sizes"]["q"]
-    x = rng.uniform(-1, 1, (N, four_bar.metadata["sizes"]["x"]))
+    n_q = four_bar.metadata.sizes.q
+    x = rng.uniform(-1, 1, (N, four_bar.metadata.sizes.x))
     x[5, :n_q] = 0.0
     assert (four_bar.rhs_batch(0.0, x) == four_bar.evaluate("rhs", 0.0, x)).all()
 
@@ -158,14 +158,14 @@ def test_backward_and_with_given_steps(fast: Any) -> None:
 
 def test_inputs_are_constants_of_each_motion(compiled: Callable[..., Any]) -> None:
     module = compiled("driven_oscillator", "c")
-    name, span = module.metadata["inputs"][0], np.array([0.0, 1.0])
+    name, span = module.metadata.inputs[0], np.array([0.0, 1.0])
     forces = np.linspace(-1, 1, N)
     many = module.simulate_batch(inputs={name: forces}, t=(0, 1))
     assert all((module.simulate(span, inputs={name: f}).x[-1] == x[-1]).all() for f, x in zip(forces, many.x))
-    table = (np.array([0.0, 1.0]), np.array([[0.0], [1.0]]).repeat(len(module.metadata["inputs"]), 1))
-    slow = module.simulate_batch(q=np.zeros((2, module.metadata["sizes"]["q"])), inputs=table, t=(0, 1))
+    table = (np.array([0.0, 1.0]), np.array([[0.0], [1.0]]).repeat(len(module.metadata.inputs), 1))
+    slow = module.simulate_batch(q=np.zeros((2, module.metadata.sizes.q)), inputs=table, t=(0, 1))
     assert slow.note == "one by one: inputs vary over time" and slow.success.all()
-    assert (slow.x[0, -1] == module.simulate(span, q=np.zeros(module.metadata["sizes"]["q"]), inputs=table).x[-1]).all()
+    assert (slow.x[0, -1] == module.simulate(span, q=np.zeros(module.metadata.sizes.q), inputs=table).x[-1]).all()
 
 
 def test_results_by_name(fast: Any) -> None:
@@ -216,9 +216,9 @@ def test_what_is_projected_runs_one_by_one(four_bar: Any, system: str) -> None:
         body = model.add_body("b", mass=1, inertia=[1, 2, 3])
         model.add_joint(sd.Spherical("s", model.ground, body, sd.coordinates("e0 e1 e2 e3"), orientation=sd.EulerParameters()))
         module, why = model.embedding().compile(backend="c"), "the mechanism has Euler parameters"
-    q = module.metadata["initial"]
-    start = np.array([q.get(n, float(n == "e0")) for n in module.metadata["q"]])
-    u = np.full(module.metadata["sizes"]["u"], 0.0 if system == "four_bar" else 0.5)
+    q = module.metadata.initial
+    start = np.array([q.get(n, float(n == "e0")) for n in module.metadata.q])
+    u = np.full(module.metadata.sizes.u, 0.0 if system == "four_bar" else 0.5)
     many = module.simulate_batch(np.tile(start, (2, 1)), u, t=(0, 0.2))
     assert why in many.note and many.width == 1 and many.success.all()
     assert (many.x[1, -1] == module.simulate(np.array([0, 0.2]), start, u).x[-1]).all()

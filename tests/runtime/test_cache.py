@@ -314,7 +314,7 @@ def test_a_full_disk_is_an_error_of_its_own(
 
 def test_long_names_fit_into_names_of_files(fake: Callable[[str], Compiler], folder: Path) -> None:
     assert build("a", "m" * 300, fake('cp "$3" "$2"')).parent == folder
-    assert PythonUnit.from_source("METADATA = {}\n", "m" * 300).metadata == {}
+    assert PythonUnit.from_source("METADATA = {}\n", "m" * 300).module.METADATA == {}
 
 
 # -- NumPy modules

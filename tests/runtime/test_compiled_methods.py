@@ -18,7 +18,7 @@ from symdyn.runtime import methods, simulate
 from symdyn.runtime.automatic import Modes, automatic
 from symdyn.runtime.compiler import find_compiler
 from symdyn.runtime.inputs import Inputs
-from symdyn.runtime.methods import COMPILED, split_name, unit_name
+from symdyn.runtime.methods import COMPILED
 from symdyn.runtime.outcome import Outcome, Request
 from tests.runtime.constrained import module as constrained
 
@@ -258,8 +258,6 @@ def test_records_are_those_that_can_be_compiled() -> None:
     assert set(METHODS) == set(COMPILED)
     for name, record in METHODS.items():
         assert record.name == name and set(COMPILED[name].needs) <= set(record.needs) | {"jacobian_x"}
-        assert split_name(unit_name("rhs_work", name)) == ("rhs_work", name)
-    assert unit_name("rhs", "dop853") == "rhs" and unit_name("rhs", "bs54") == "rhs:bs54"
 
 
 def test_a_unit_holds_one_method(derived: Callable[..., Any]) -> None:

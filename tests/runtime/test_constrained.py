@@ -94,7 +94,7 @@ def test_order_is_that_of_the_method(method: str, order: int, steps: tuple[float
 
 def test_as_many_steps_and_evaluations_as_without() -> None:
     for name in ("four_bar", "spatial_slider_crank"):
-        ends = np.array([0, module(name).metadata["duration"]])
+        ends = np.array([0, module(name).metadata.duration])
         free, kept = (module(name).simulate(ends, rtol=1e-8, stabilization=s) for s in ("none", "projection"))
         assert abs(kept.n_steps - free.n_steps) <= 0.02 * free.n_steps and abs(kept.nfev - free.nfev) <= 0.02 * free.nfev
         assert kept.corrections.n_evaluations <= 2.1 * kept.n_steps + 10
@@ -125,7 +125,7 @@ def test_work_goes_along() -> None:
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 def test_euler_parameters_keep_their_norm(backend: str) -> None:
     top = module("top", backend)
-    spin = dict(zip(top.metadata["u"][3:], (0.3, 2.0, 0.1), strict=True))
+    spin = dict(zip(top.metadata.u[3:], (0.3, 2.0, 0.1), strict=True))
     span = (0, 100) if backend == "c" else (0, 5)
     kept, free = (top.simulate(span, u=spin, rtol=1e-6, stabilization=s) for s in (None, "none"))
     norms = [np.abs(np.linalg.norm(s.q[:, 3:], axis=1) - 1).max() for s in (kept, free)]

@@ -31,7 +31,7 @@ def test_agrees_with_the_compiled_integrator(backend: str) -> None:
 @pytest.mark.parametrize("name", ["four_bar", "skate"])
 def test_mechanisms(name: str) -> None:
     loop = module(name)
-    span = (0, 0.3 if loop.metadata["duration"] > 1 else 0.01)
+    span = (0, 0.3 if loop.metadata.duration > 1 else 0.01)
     solution, exact = loop.simulate(span, rtol=1e-6, method="ggl", steps=True), loop.simulate(span, rtol=1e-10)
     assert np.abs(solution.constraint_violation).max() < 1e-6 and np.abs(solution.velocity_violation).max() < 1e-5
     scale = np.abs(exact.x).max(axis=0) + 1e-3 * np.abs(exact.x).max()

@@ -15,12 +15,12 @@ LOOPS = ["pendulum_absolute", "four_bar", "spatial_slider_crank", "bricard", "ro
 
 
 def initial(loop: Any) -> tuple[np.ndarray, np.ndarray]:
-    start = loop.metadata["initial"]
-    return np.array([start.get(n, 0.0) for n in loop.metadata["q"]]), np.array([start.get(n, 0.0) for n in loop.metadata["u"]])
+    start = loop.metadata.initial
+    return np.array([start.get(n, 0.0) for n in loop.metadata.q]), np.array([start.get(n, 0.0) for n in loop.metadata.u])
 
 
 def residuals(loop: Any, q: np.ndarray, u: np.ndarray, **of: Any) -> float:
-    x = np.concatenate([q, u, np.zeros(loop.metadata["sizes"]["z"])])
+    x = np.concatenate([q, u, np.zeros(loop.metadata.sizes.z)])
     return max(float(np.abs(loop.evaluate(name, of.get("t", 0.0), x, of.get("params"))).max()) for name in ("C", "C_dot"))
 
 
@@ -34,8 +34,8 @@ def test_from_rough_guesses(name: str) -> None:
     q0, u0 = initial(loop)
     for _ in range(5):
         guess = q0 + 0.2 * random.standard_normal(len(q0))
-        for group in loop.metadata["unit_groups"]:
-            places = [loop.metadata["q"].index(n) for n in group]
+        for group in loop.metadata.unit_groups:
+            places = [loop.metadata.q.index(n) for n in group]
             guess[places] /= np.linalg.norm(guess[places])
         q, u = loop.consistent(guess, u0 + random.standard_normal(len(u0)))
         assert residuals(loop, q, u) < 1e-10
@@ -70,7 +70,7 @@ def test_what_must_stay_stays() -> None:
     assert (q[0], u[0]) == (0.7, 3.0) and residuals(loop, q, u) < 1e-12
     disc = module("rolling_disc")
     q, u = disc.consistent({"theta": 1.0, "z": 0.5}, {"phi_dot": 2.0}, keep=["theta", "phi_dot"])
-    assert q[disc.metadata["q"].index("theta")] == 1.0 and u[disc.metadata["u"].index("phi_dot")] == 2.0
+    assert q[disc.metadata.q.index("theta")] == 1.0 and u[disc.metadata.u.index("phi_dot")] == 2.0
     assert residuals(disc, q, u) < 1e-12
 
 

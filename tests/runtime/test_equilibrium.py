@@ -124,7 +124,7 @@ def test_steady_turning_shaft() -> None:
 def test_constraints_are_fulfilled_at_the_same_time() -> None:
     """A pendulum in x and y from a start off its circle; and from the horizontal, where gravity meets no stiffness at all."""
     module = systems.pendulum_absolute().augmented().compile(backend="numpy")
-    weight = 9.81 * module.metadata["defaults"][module.metadata["parameters"].index("m")]
+    weight = 9.81 * module.metadata.defaults[module.metadata.parameters.index("m")]
     down = module.equilibrium(start={"x": 0.3, "y": -2.0})
     assert np.allclose(down.q, [0, -1], atol=1e-13) and down.stable
     forces = module.evaluate("C_r", 0.0, down.x).T @ down.lam
@@ -181,7 +181,7 @@ def test_ballast_is_solved_for_so_that_a_coordinate_takes_its_value() -> None:
     """m2 b = m1 a keeps the lever level; at another angle the torsion spring takes part."""
     level = lever().equilibrium(free=["theta", "m2"], fixed={"theta": 0.0})
     assert np.isclose(level["m2"], 3 * 0.4 / 1.5, rtol=1e-14) and level.solved == {"m2": level["m2"]}
-    assert level.params[lever().metadata["parameters"].index("m2")] == level["m2"] and level["theta"] == 0.0
+    assert level.params[lever().metadata.parameters.index("m2")] == level["m2"] and level["theta"] == 0.0
     tilted = lever().equilibrium(unknown_params="m2", fixed={"theta": -0.2})
     assert np.isclose((tilted["m2"] * 1.5 - 3 * 0.4) * 9.81 * np.cos(0.2), 25 * 0.2, rtol=1e-13)
     assert "solved for" in tilted.describe()

@@ -161,7 +161,7 @@ def test_ordinary_events_are_proved_without_a_warning(name: str) -> None:
     s.add_event("distance", sp.sqrt(place[0] ** 2 + place[1] ** 2) - sp.Rational(4, 5))
     s.add_event("stands", v[0])
     module = s.compile()
-    assert all(event["enclosed"] for event in module.metadata["events"])
+    assert all(event.enclosed for event in module.metadata.events)
     run = module.simulate((0, 2))
     fine = module.simulate((0, 2), event_spacing=1e-3)
     for event, rows in run.events.items():

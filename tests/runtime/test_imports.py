@@ -61,14 +61,17 @@ def test_generated_module_imports_numpy_only(derived: Callable[..., Any], tmp_pa
 PROGRAM = """
 import json, sys
 from pathlib import Path
+from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.runtime.module import Module
 from symdyn.runtime.unit import CUnit, PythonUnit
 from symdyn.runtime.compiler import find_compiler
-metadata = json.loads(Path("metadata.json").read_text())
-def provide(name):
+metadata = ModuleMetadata.of_plain(json.loads(Path("metadata.json").read_text()))
+def provide(what):
+    name = what if isinstance(what, str) else "rhs"
     if {backend!r} == "numpy":
         return PythonUnit.from_file(Path(name + ".py"))
-    return CUnit(Path(name + ".c").read_text(), json.loads(Path(name + ".json").read_text()), find_compiler())
+    return CUnit(Path(name + ".c").read_text(), Metadata.of_plain(json.loads(Path(name + ".json").read_text())),
+                 find_compiler())
 module = Module(metadata, provide, {backend!r})
 solution = module.simulate((0, 1), method="Radau")
 assert solution.success and module.simulate((0, 1)).success and abs(solution.energy_error()) < 1e-5
@@ -84,8 +87,8 @@ def test_simulation_without_sympy(backend: str, derived: Callable[..., Any], tmp
     for name in functions:
         source = emit(derived("double_pendulum"), backend, [name], standalone=False)
         (tmp_path / f"{name}.{'c' if backend == 'c' else 'py'}").write_text(next(iter(source.files.values())))
-        (tmp_path / f"{name}.json").write_text(json.dumps(dict(source.metadata)))
-    record = {**source.metadata, "functions": functions, "duration": 1.0, "conservative": True}
+        (tmp_path / f"{name}.json").write_text(json.dumps(source.metadata.as_plain()))
+    record = {**source.metadata.as_plain(), "functions": functions, "duration": 1.0, "conservative": True}
     (tmp_path / "metadata.json").write_text(json.dumps(record))
     packages = imported(PROGRAM.format(backend=backend), tmp_path)
     assert "scipy" in packages and not SYMBOLIC & packages and not {"matplotlib", "tqdm"} & packages

@@ -16,7 +16,8 @@ from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError
-from symdyn.pipeline import DERIVATIVES, STATICS, emit, write_source
+from symdyn.functions.table import DERIVATIVES, STATICS
+from symdyn.pipeline import emit, write_source
 from tests.mechanisms import kitchen_sink
 
 
@@ -77,7 +78,7 @@ def test_along_a_motion_it_is_the_derivative_of_the_right_hand_side(seed: int) -
     """With extra states, inputs, a ground that shakes: another derivation, through the factorized mass matrix."""
     module = kitchen()
     stream = np.random.default_rng(seed)
-    x, inputs, t = stream.uniform(-0.4, 0.4, module.metadata["sizes"]["x"]), stream.uniform(-1, 1, 2), 0.37
+    x, inputs, t = stream.uniform(-0.4, 0.4, module.metadata.sizes.x), stream.uniform(-1, 1, 2), 0.37
     lin = module.linearize(x, t=t, inputs=inputs)
     jacobian = module.jacobian(t, x, inputs=inputs, wrt=("x", "inputs"))
     for found, expected in ((lin.A, jacobian.x), (lin.B, jacobian.inputs)):
@@ -97,7 +98,7 @@ def kitchen() -> Any:
 def test_pendulum_in_absolute_coordinates_is_the_pendulum() -> None:
     """Constraint forces give the stiffness: in x, m g / l; in y there is none, so that it cannot be independent."""
     lin = absolute().linearize(absolute().equilibrium(start={"x": 0.1, "y": -1.1}))
-    defaults = dict(zip(absolute().metadata["parameters"], absolute().metadata["defaults"], strict=True))
+    defaults = dict(zip(absolute().metadata.parameters, absolute().metadata.defaults, strict=True))
     assert lin.coordinates == ("x",) and np.allclose(lin.Z, [[1], [0]], atol=1e-14)
     assert np.isclose(lin.K.item() / lin.M.item(), defaults["g"] / defaults["l"], rtol=1e-13)
     with pytest.raises(ArgumentError, match="pendulum_absolute: the other velocities do not follow from y_dot here"):
@@ -137,7 +138,7 @@ def test_four_bar_at_rest_by_the_derivative_of_its_right_hand_side() -> None:
     lin = module.linearize(module.equilibrium())
     T = scipy.linalg.block_diag(lin.Z, lin.Z)
     assert np.allclose(module.evaluate("C_r", 0.0, lin.x) @ lin.Z, 0, atol=1e-14)
-    k = lin.module.metadata["q"].index(lin.coordinates[0])
+    k = lin.module.metadata.q.index(lin.coordinates[0])
     A = (module.jacobian(0.0, lin.x, wrt=("x",)).x @ T)[[k, 3 + k]]
     assert np.allclose(lin.A, A, rtol=1e-11, atol=1e-11)
 
@@ -214,7 +215,7 @@ def test_both_backends_and_the_parts_by_themselves(compiled: Any) -> None:
     ud = one.ud
     assert np.allclose(numpy.evaluate("stiffness", 0.0, x, ud=ud), one.K, rtol=1e-12)
     assert np.allclose(numpy.evaluate("damping", 0.0, x, ud=ud), one.C, rtol=1e-12)
-    name = c.metadata["parameters"][1]
+    name = c.metadata.parameters[1]
     assert np.isclose(c.linearize(c.equilibrium()).derivative(0, name).eigenvalue,
                       numpy.linearize(numpy.equilibrium()).derivative(0, name).eigenvalue, rtol=1e-12)
 

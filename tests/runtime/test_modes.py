@@ -191,7 +191,7 @@ def test_derivatives_under_constraints(name: str) -> None:
     module = getattr(systems, name)().augmented().compile(backend="numpy")
     e = module.equilibrium()
     lin = module.linearize(e)
-    defaults = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
+    defaults = dict(zip(module.metadata.parameters, module.metadata.defaults, strict=True))
     checked = 0
     for parameter in list(defaults)[:5]:
         def eigenvalue(value: float, parameter: str = parameter) -> complex:

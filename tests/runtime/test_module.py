@@ -41,9 +41,9 @@ def test_no_body_has_a_negative_mass(double: Any) -> None:
 
 def test_parameters_in_every_form(double: Any) -> None:
     m1, g = sp.symbols("m1 g")
-    names = double.metadata["parameters"]
+    names = double.metadata.parameters
     array = double.parameters()
-    np.testing.assert_array_equal(array, double.metadata["defaults"])
+    np.testing.assert_array_equal(array, double.metadata.defaults)
     changed = array.copy()
     changed[names.index("m1")], changed[names.index("g")] = 2.5, 1.6
     wanted = double.rhs(0.0, X, changed)
@@ -217,7 +217,7 @@ def test_inverse_dynamics_undoes_rhs(sink: Any) -> None:
     rng = np.random.default_rng(6)
     for _ in range(3):
         q, u, inputs, t = rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 2), rng.uniform()
-        states = [sink.metadata["initial"].get(z, 0.0) for z in sink.metadata["z"]]
+        states = [sink.metadata.initial.get(z, 0.0) for z in sink.metadata.z]
         ud = sink.rhs(t, [*q, *u, *states], None, inputs)[3:6]
         tau = sink.inverse_dynamics(q, u, ud, None, t, inputs)
         np.testing.assert_allclose(tau, 0, atol=1e-12 * np.abs(ud).max())
@@ -277,9 +277,9 @@ def differences(module: Any, t: float, x: Any, p: Any, inputs: Any) -> list[np.n
 @pytest.mark.parametrize("name", ["double_pendulum", "three_link_arm", "kitchen_sink", "driven_oscillator"])
 def test_jacobian_against_differences(name: str, compiled: Callable[..., Any], backend: str) -> None:
     module = compiled(name, backend)
-    sizes = module.metadata["sizes"]
+    sizes = module.metadata.sizes
     rng = np.random.default_rng(7)
-    x, inputs, p = rng.uniform(-1, 1, sizes["x"]), rng.uniform(-1, 1, sizes["inputs"]), module.parameters()
+    x, inputs, p = rng.uniform(-1, 1, sizes.x), rng.uniform(-1, 1, sizes.inputs), module.parameters()
     exact = module.jacobian(0.3, x, p, inputs)
     for found, wanted in zip(exact, differences(module, 0.3, x, p, inputs), strict=True):
         assert found.shape == wanted.shape

@@ -19,7 +19,7 @@ def energy(module: Any, params: Any) -> float:
 
 def test_one_array_of_parameters_for_several_runs(double: Any) -> None:
     p, factors = double.parameters(), (1.0, 2.0, 3.0)
-    base, place = p.copy(), double.metadata["parameters"].index("g")
+    base, place = p.copy(), double.metadata.parameters.index("g")
     runs, bounds = [], []
     for factor in factors:
         p[place] = factor * base[place]
@@ -69,7 +69,7 @@ def test_a_function_of_a_loop_variable_gives_the_inputs_of_its_own_run(compiled:
 
 
 def test_default_parameters_cannot_be_changed(double: Any) -> None:
-    place = double.metadata["parameters"].index("g")
+    place = double.metadata.parameters.index("g")
     with pytest.raises(ValueError, match="read-only"):
         double.default_parameters[place] = 1.0
     with pytest.raises(ValueError, match="read-only"):
@@ -78,11 +78,11 @@ def test_default_parameters_cannot_be_changed(double: Any) -> None:
         double.simulate((0, 0.01)).params[place] = 1.0
     own = double.parameters()
     own[place] = 1.0
-    np.testing.assert_array_equal(double.parameters(), double.metadata["defaults"])
+    np.testing.assert_array_equal(double.parameters(), double.metadata.defaults)
 
 
 def test_parameters_changed_in_place_count_in_every_form(double: Any) -> None:
-    names = double.metadata["parameters"]
+    names = double.metadata.parameters
     g = np.array(9.81)
 
     class Dial:
@@ -116,7 +116,7 @@ def test_equilibria_and_linear_equations_keep_their_values(double: Any) -> None:
     rest = double.equilibrium(start=start, params=p, inputs=inputs)
     x = np.array([-np.pi / 2, 0.0, 0.0, 0.0])
     linear = double.linearize(x, params=p)
-    place = double.metadata["parameters"].index("g")
+    place = double.metadata.parameters.index("g")
     p[place] *= -1.0
     x[:] = 1.0
     assert rest.verdict == linear.verdict == "neutral"

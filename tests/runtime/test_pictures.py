@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import io
 import os
 import re
@@ -276,9 +277,9 @@ def loop(name: str, coordinates: str = "relative", t: Any = (0.0, 0.2), **option
 def ends_of(solution: Solution, joint: str) -> tuple[tuple[str, np.ndarray], tuple[str, np.ndarray]]:
     """Name of the parent and the joint's point on it, (n_t, 3); the same of the child."""
     metadata = solution.module.metadata
-    k = metadata["reactions"].index(joint)
+    k = metadata.reactions.index(joint)
     points = solution.rows("joint_points")[:, k]
-    parent, child = metadata["reaction_bodies"][k]
+    parent, child = metadata.reaction_bodies[k]
     return (parent, points[:, :3]), (child, points[:, 3:])
 
 
@@ -298,7 +299,7 @@ def test_bodies_meet_at_every_joint_of_their_loops(name: str, coordinates: str, 
     assert drawing is not None
     shown = ["xyz".index(label) for label in drawing.labels]
     size = np.ptp(drawing.limits(), axis=1).max()
-    for joint, kind in zip(metadata["reactions"], metadata["reaction_kinds"], strict=True):
+    for joint, kind in zip(metadata.reactions, metadata.reaction_kinds, strict=True):
         ends = ends_of(solution, joint)
         if kind not in ("rod", "prismatic"):
             assert np.abs(ends[0][1] - ends[1][1]).max() < 1e-6 * size, joint
@@ -307,7 +308,7 @@ def test_bodies_meet_at_every_joint_of_their_loops(name: str, coordinates: str, 
             assert all(missed(drawing.rods, point[:, shown]) < 1e-12 for _, point in ends)
         for body, point in ends:
             if body != "ground":
-                assert missed(drawing.lines[metadata["bodies"].index(body)], point[:, shown]) < 1e-5 * size, f"{joint} on {body}"
+                assert missed(drawing.lines[metadata.bodies.index(body)], point[:, shown]) < 1e-5 * size, f"{joint} on {body}"
             elif kind != "prismatic":
                 assert missed(np.broadcast_to(drawing.pivots, (len(point), *drawing.pivots.shape)), point[:, shown]) < 1e-12
     for line in drawing.lines:
@@ -331,7 +332,7 @@ def test_a_screw_in_absolute_coordinates_has_no_carrier_in_its_picture() -> None
     system.add_joint(symdyn.Revolute("pin", system.ground, arm, axis=[0, 1, 0]))
     system.add_joint(symdyn.Helical("thread", arm, nut, pitch=0.1, parent_point=[1, 0, 0], child_point=[0.2, 0.3, 0]))
     solution = system.augmented("absolute").compile("numpy").simulate((0.0, 0.5))
-    assert solution.module.metadata["bodies"] == ["arm", "nut", "thread_carrier"]
+    assert list(solution.module.metadata.bodies) == ["arm", "nut", "thread_carrier"]
     drawing = Drawing.of(solution)
     assert drawing is not None and len(drawing.lines) == drawing.centres.shape[1] == 2 and dict(drawing.sliders) == {1: [0]}
     place = solution.frames[:, 1, :3] + solution.frames[:, 1, 3:].reshape(-1, 3, 3) @ [0.2, 0.3, 0]
@@ -368,8 +369,9 @@ def test_bodies_without_joints_that_are_told_are_joined_as_they_move() -> None:
     solution = motion("double_pendulum")
     told = Drawing.of(solution)
     metadata = solution.module.metadata
+    fewer = dataclasses.replace(metadata, functions=tuple(f for f in metadata.functions if f != "joint_points"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(metadata, "functions", [f for f in metadata["functions"] if f != "joint_points"])
+        patch.setattr(solution.module, "metadata", fewer)
         assert "joint_points" not in solution.module.functions
         guessed = Drawing.of(solution)
     assert told is not None and guessed is not None and np.allclose(told.pivots, guessed.pivots)

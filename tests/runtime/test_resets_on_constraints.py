@@ -105,7 +105,7 @@ def test_a_joint_coordinate_in_absolute_coordinates_becomes_what_its_reset_says(
     run = module.simulate([0, 0.1 - 1e-10, 0.1 + 1e-10], method=method, rtol=1e-10)
     assert run.success, run.message
     change = run.x[2] - run.x[1]
-    names = list(module.metadata["x"])
+    names = list(module.metadata.x)
     assert change[names.index("b")] == pytest.approx(-1e-4, rel=1e-5)
     assert run.outputs["om"][2] == pytest.approx(1.5, rel=1e-8)
     ratio = float(coupling().subs(b, run.outputs["angle"][1]))

@@ -46,7 +46,7 @@ def module() -> Module:
 
 @pytest.fixture(scope="module")
 def solution(module: Module) -> Solution:
-    name = module.metadata["parameters"][0]
+    name = module.metadata.parameters[0]
     return module.simulate((0.0, 2.0), params={name: 1.75}, inputs={"F": lambda t, x: 2 * np.sin(t)}, rtol=1e-7, work=True)
 
 
@@ -113,12 +113,12 @@ def test_changed_parameters_are_marked(report: Path, solution: Solution) -> None
     text = report.read_text(encoding="utf-8")
     metadata = solution.module.metadata
     given = {row[0]: row for row in rows(text, "given") if len(row) == 4}
-    assert list(given) == metadata["parameters"]
+    assert tuple(given) == metadata.parameters
     assert [value(given[n][1]) for n in given] == pytest.approx(solution.params)
-    assert [value(given[n][3]) for n in given] == pytest.approx(metadata["defaults"])
-    assert re.findall(r'<tr class="changed"><td>(\w+)</td>', text) == [metadata["parameters"][0]]
+    assert [value(given[n][3]) for n in given] == pytest.approx(metadata.defaults)
+    assert re.findall(r'<tr class="changed"><td>(\w+)</td>', text) == [metadata.parameters[0]]
     starts = {row[0]: value(row[1]) for row in rows(text, "given") if len(row) == 3}
-    assert starts == pytest.approx(dict(zip(metadata["x"], solution.x[0], strict=True)))
+    assert starts == pytest.approx(dict(zip(metadata.x, solution.x[0], strict=True)))
 
 
 def test_energy_balance_is_told_where_it_is_known(report: Path, solution: Solution, module: Module,
@@ -197,7 +197,7 @@ def test_what_loads_look_at_is_told() -> None:
                  ["tilt", -np.inf, 0.3, "too steep: {value}"]]
     values = np.column_stack([np.linspace(0.5, 4, 11), np.linspace(-1, 0.2, 11)])
     run: Any = SimpleNamespace(t=np.arange(11.0), rows=lambda name: values,
-                               module=SimpleNamespace(metadata={"watches": looked_at}, functions=("watches",)))
+                               module=SimpleNamespace(metadata=SimpleNamespace(watches=looked_at), functions=("watches",)))
     draft, tilt = run_tables.watches(run)
     assert draft["outside"] and draft["message"] == "the box leaves the water at a draft of 0.5 m"
     assert (draft["least"], draft["most"], draft["limits"]) == ("0.5", "4", "from 1 to 9")

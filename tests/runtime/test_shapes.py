@@ -3,6 +3,7 @@ ones."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Iterator
 from typing import Any
@@ -128,7 +129,7 @@ def test_a_blade_lies_along_its_direction() -> None:
 
 
 def test_shapes_are_plain_data_and_move_with_their_bodies(module: Module, solution: Solution) -> None:
-    assert json.loads(json.dumps(module.metadata["drawn"])) == module.metadata["drawn"]
+    assert json.loads(json.dumps(module.metadata.drawn)) == list(module.metadata.drawn)
     solids = Solids.of(solution)
     assert solids is not None
     for index in (0, 400, 1000):
@@ -200,7 +201,7 @@ def test_flexible_bodies_bend_and_end_at_their_tips(shown: bool) -> None:
     for index in (0, 600):
         (places,) = [p for p, part in zip(solids.vertices(index), solids.parts, strict=True) if part.body == 0]
         end = places[-20:].mean(axis=0) if shown else places[-1]
-        head_at = solution.frames.reshape(len(solution.t), -1, 12)[index, module.metadata["bodies"].index("head"), :3]
+        head_at = solution.frames.reshape(len(solution.t), -1, 12)[index, module.metadata.bodies.index("head"), :3]
         assert np.abs(end - head_at).max() < 1e-9 and np.linalg.norm(end) < 9.9
     drawing = Drawing.of(solution)
     assert drawing is not None and not drawing.bare
@@ -383,7 +384,7 @@ def test_wrong_pictures_are_refused(solution: Solution) -> None:
                                ({"t": [0, 1], "view": [(0, 0)] * 3}, "3 views are given for 2 times")):
         with pytest.raises(ArgumentError, match=message):
             solution.picture(**arguments)
-    bare = Module({**solution.module.metadata, "functions": ["rhs"]}, solution.module.unit, "numpy")
+    bare = Module(dataclasses.replace(solution.module.metadata, functions=("rhs",)), solution.module.unit, "numpy")
     with pytest.raises(ArgumentError, match="there is nothing to draw"):
         bare.simulate((0.0, 0.1)).picture()
 

@@ -39,8 +39,8 @@ def test_an_unknown_option_is_an_error(call: Callable[[Any], Any], option: str, 
 
 def test_inputs_by_name_of_one_state(compiled: Callable[..., Any], backend: str) -> None:
     sink = compiled("kitchen_sink", backend)
-    x = np.linspace(0.1, 0.5, len(sink.metadata["x"]))
-    F, tau = sink.metadata["inputs"]
+    x = np.linspace(0.1, 0.5, len(sink.metadata.x))
+    F, tau = sink.metadata.inputs
     wanted = sink.rhs(0.2, x, None, [0.3, -0.5])
     for given in ({F: 0.3, tau: -0.5}, {tau: -0.5, F: 0.3}):
         np.testing.assert_array_equal(sink.rhs(0.2, x, None, given), wanted)
@@ -69,11 +69,11 @@ def test_one_input_by_name(backend: str) -> None:
 def test_both_orders_of_arguments_give_the_same(compiled: Callable[..., Any], backend: str) -> None:
     sink = compiled("kitchen_sink", backend)
     q, u, t, inputs, ud = np.array([0.1, 0.2, 0.3]), np.array([0.4, -0.5, 0.6]), 0.7, [0.3, -0.2], [1.0, 2.0, 3.0]
-    x = np.concatenate([q, u, [sink.metadata["initial"].get(n, 0.0) for n in sink.metadata["z"]]])
+    x = np.concatenate([q, u, [sink.metadata.initial.get(n, 0.0) for n in sink.metadata.z]])
     p = {"m1": 3.0}
     for new, old in (
             (sink.mass_matrix(t, x, p), sink.mass_matrix(q, p, t)), (sink.mass_matrix(t, q, p), sink.mass_matrix(q, p, t=t)),
-            (sink.mass_matrix(t, dict(zip(sink.metadata["x"], x, strict=True)), p), sink.mass_matrix(q=q, params=p, t=t)),
+            (sink.mass_matrix(t, dict(zip(sink.metadata.x, x, strict=True)), p), sink.mass_matrix(q=q, params=p, t=t)),
             (sink.J(t, x, p), sink.J(q, p, t)), (sink.k_tilde(t, x, p), sink.k_tilde(q, u, p, t)),
             (sink.energy(t, x, p), sink.energy(q, u, params=p, t=t)), (sink.energy(t=t, x=x, params=p), sink.energy(q, u, p, t)),
             (sink.F_tilde(t, x, p, inputs), sink.F_tilde(q, u, p, t, inputs)),

@@ -403,7 +403,7 @@ def test_nan_from_an_input(oscillator: Any, method: str | None) -> None:
     assert 0.3 < solution.t[-1] <= 0.5
     for words in ("driven_oscillator: stopped at t = 0.", "not finite", "the state there: q = 0.9", "q_dot = -0.2", "z = 0.3"):
         assert words in solution.message
-    name = oscillator.metadata["inputs"][0]
+    name = oscillator.metadata.inputs[0]
     assert re.search(rf"; the input {name} is nan at t = 0\.\d+", solution.message)
     whole = oscillator.simulate(solution.t, inputs=[0.0, 1.0], rtol=1e-10)
     np.testing.assert_allclose(solution.x, whole.x, atol=1e-5)

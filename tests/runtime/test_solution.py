@@ -66,16 +66,16 @@ def test_round_trip_npz(solution: Any, tmp_path: Path) -> None:
         for name, value in solution.outputs.items():
             np.testing.assert_array_equal(kept[f"output_{name}"], value)
         about = json.loads(str(kept["about"]))
-    assert about["name"] == "kitchen_sink" and about["x"] == solution.module.metadata["x"] and about["success"] is True
-    assert about["parameters"] == solution.module.metadata["parameters"] and about["units"]["q1"] == "m"
+    assert about["name"] == "kitchen_sink" and tuple(about["x"]) == solution.module.metadata.x and about["success"] is True
+    assert tuple(about["parameters"]) == solution.module.metadata.parameters and about["units"]["q1"] == "m"
 
 
 def test_round_trip_csv(solution: Any, tmp_path: Path) -> None:
     solution.save(str(tmp_path / "run.csv"))
     with (tmp_path / "run.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
-    inputs = solution.module.metadata["inputs"]
-    assert rows[0] == ["t", *solution.module.metadata["x"], *inputs, "tip_1", "tip_2", "tip_3", "tip_velocity_1",
+    inputs = solution.module.metadata.inputs
+    assert rows[0] == ["t", *solution.module.metadata.x, *inputs, "tip_1", "tip_2", "tip_3", "tip_velocity_1",
                        "tip_velocity_2", "tip_velocity_3", "smooth", "pair_1", "pair_2"]
     numbers = np.array(rows[1:], dtype=float)  # the digits read back as the same doubles
     np.testing.assert_array_equal(numbers[:, 0], solution.t)

@@ -11,6 +11,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.pipeline import emit
 from symdyn.runtime.compiler import find_compiler
@@ -243,17 +244,18 @@ def test_euler_parameters_stay_of_length_1() -> None:
     np.testing.assert_allclose(np.linalg.norm(found.q[:, 3:], axis=1), 1, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize(("name", "field"), [("four_bar", "rhs_baumgarte:radau"), ("held_mass", "rhs_work:radau")])
-def test_jacobian_of_what_is_integrated(name: str, field: str, mass: Any) -> None:
+@pytest.mark.parametrize(("name", "field"), [("four_bar", RightSide(baumgarte=True, method="radau")),
+                                             ("held_mass", RightSide(work=True, method="radau"))])
+def test_jacobian_of_what_is_integrated(name: str, field: RightSide, mass: Any) -> None:
     """Against differences of the same right-hand side, off the constraints; it is square, with the work, too."""
     module = mass if name == "held_mass" else constrained(name)
-    p = np.append(module.parameters({"b": 2.0} if name == "held_mass" else None), [30.0] * ("baumgarte" in field))
+    p = np.append(module.parameters({"b": 2.0} if name == "held_mass" else None), [30.0] * field.baumgarte)
     evaluators = [module.unit(field).evaluator(f) for f in ("rhs", "jacobian_x")]
     for evaluator in evaluators:
         evaluator.set_params(p)
-    n = module.unit(field).metadata["sizes"]["x"]
+    n = module.unit(field).metadata.sizes.x
     x = np.random.default_rng(3).uniform(0.5, 1.0, n)
-    inputs = np.array([0.7] * module.metadata["sizes"]["inputs"])
+    inputs = np.array([0.7] * module.metadata.sizes.inputs)
     columns = []
     for k in range(n):
         h = np.zeros(n)

@@ -121,9 +121,9 @@ def test_random_trees(seed: int) -> None:
     system = random_tree(seed)
     module = system.embedding().compile("c")
     rng = np.random.default_rng(seed)
-    q, u = (rng.uniform(-0.5, 0.5, module.metadata["sizes"][g]) for g in "qu")
-    for group in module.metadata["unit_groups"]:
-        places = [module.metadata["q"].index(name) for name in group]
+    q, u = (rng.uniform(-0.5, 0.5, n) for n in (module.metadata.sizes.q, module.metadata.sizes.u))
+    for group in module.metadata.unit_groups:
+        places = [module.metadata.q.index(name) for name in group]
         q[places] /= np.linalg.norm(q[places])
     times = np.linspace(0, 0.5, 11)
     wanted, found = (module.simulate(times, q, u, **TIGHT, method=m) for m in ("dop853", "taylor"))
@@ -200,7 +200,7 @@ def test_a_kink_and_what_is_nearly_one(aside: float, thrown: Any) -> None:
     """Straight up the speed is v = w tan, then -w tanh; with a bit of motion aside the kink is a sharp bend."""
     w, rise = np.sqrt(GRAVITY / 0.1), 10.0
     top = np.arctan(rise / w) * w / GRAVITY
-    assert thrown.metadata["not_smooth"] == ""
+    assert thrown.metadata.not_smooth == ""
     found = thrown.simulate([0.0, 2.0], u=[aside, rise], rtol=1e-9, atol=1e-9, **TAYLOR)
     assert found.u[-1, 1] == pytest.approx(-w * np.tanh((2.0 - top) * GRAVITY / w), abs=max(1e-7, aside**2))
     tight = thrown.simulate([0.0, 2.0], u=[aside, rise], **TIGHT)

@@ -162,9 +162,9 @@ def test_rolling_disc(angles: tuple[float, ...], rates: tuple[float, ...]) -> No
     names = [*(f"q{k}" for k in range(1, 7)), *(f"q{k}_dot" for k in range(1, 7))]
     at = dict(zip(names, [*angles, *centre, *rates, *velocity], strict=True))
     wanted = ("q1", "q2", "q3", "q4", "q5", "q1_dot", "q2_dot", "q3_dot")
-    x = np.array([at[n] for n in module.metadata["x"]])
+    x = np.array([at[n] for n in module.metadata.x])
     lin = module.linearize(x)
-    rows = [module.metadata["x"].index(n) for n in wanted]
+    rows = [module.metadata.x.index(n) for n in wanted]
 
     def own(h: float) -> np.ndarray:
         """The wanted changes of those that are independent here, (8, 8), at a time h later in the motion."""
@@ -177,7 +177,7 @@ def test_rolling_disc(angles: tuple[float, ...], rates: tuple[float, ...]) -> No
     A_x = (E @ lin.A + E_dot) @ np.linalg.inv(E)
 
     # Kane's state: w' = S x', w'_dot = (S A_x + S_dot) x'.
-    yaw = float(lin.ud[module.metadata["u"].index("q1_dot")])
+    yaw = float(lin.ud[module.metadata.u.index("q1_dot")])
     s, c = np.sin(q2), np.cos(q2)
     S, S_dot = np.eye(8), np.zeros((8, 8))
     S[5:] = [[0, 0, 0, 0, 0, 0, 1, 0], [0, c * d1, 0, 0, 0, s, 0, 1], [0, -s * d1, 0, 0, 0, c, 0, 0]]
@@ -233,13 +233,13 @@ def test_links_on_a_cart(n: int, moving: int) -> None:
     stream = np.random.default_rng(n)
     for q in (np.zeros(n + 1), stream.uniform(-1, 1, n + 1), np.array([0.3, *[np.pi] * n])):
         u = moving * stream.uniform(-2, 2, n + 1)
-        given = dict(zip(module.metadata["inputs"], stream.uniform(-3, 3, n + 1), strict=True))
+        given = dict(zip(module.metadata.inputs, stream.uniform(-3, 3, n + 1), strict=True))
         lin = module.linearize((q, u), inputs=given)
-        params = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
+        params = dict(zip(module.metadata.parameters, module.metadata.defaults, strict=True))
         A, B = peer.linearize(q, u, params, given)
-        assert lin.states == tuple(module.metadata["x"])
+        assert lin.states == tuple(module.metadata.x)
         assert_same(lin.A, A)
-        assert_same(lin.B[:, [module.metadata["inputs"].index(name) for name in peer.inputs]], B)
+        assert_same(lin.B[:, [module.metadata.inputs.index(name) for name in peer.inputs]], B)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, np.pi])
@@ -277,10 +277,10 @@ def test_masses_in_a_row() -> None:
     module, peer = masses()
     rest = module.equilibrium()
     lin = module.linearize(rest)
-    params = dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True))
+    params = dict(zip(module.metadata.parameters, module.metadata.defaults, strict=True))
     A, B = peer.linearize(rest.q, rest.u, params, {f"f{i}": 0.0 for i in range(3)})
     assert_same(lin.A, A)
-    assert_same(lin.B[:, [module.metadata["inputs"].index(name) for name in peer.inputs]], B)
+    assert_same(lin.B[:, [module.metadata.inputs.index(name) for name in peer.inputs]], B)
     assert lin.verdict == "stable"
     assert_same(np.sort_complex(lin.eigenvalues), np.sort_complex(np.linalg.eigvals(A)))
 

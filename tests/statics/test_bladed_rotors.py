@@ -129,15 +129,15 @@ def test_a_frequency_of_two_blades_is_that_of_the_nacelle() -> None:
     """A free motion that begins in one mode: the nacelle's tilt shows the frequency that is named, by its spectrum."""
     W = 5.0
     found = turbine(2).stability(fixed={"psi_dot": W})
-    mode = max(found.modes, key=lambda m: abs(m.shape[turbine(2).metadata["u"].index("tilt_dot")]))
+    mode = max(found.modes, key=lambda m: abs(m.shape[turbine(2).metadata.u.index("tilt_dot")]))
     functions, m = by_lagrange(2), 4
-    order = [turbine(2).metadata["u"].index(u) for u in ("tilt_dot", "yaw_dot", "b1_dot", "b2_dot")]
+    order = [turbine(2).metadata.u.index(u) for u in ("tilt_dot", "yaw_dot", "b1_dot", "b2_dot")]
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         M, C, K = (np.asarray(each, dtype=float) for each in functions(W * t, W))
         return np.concatenate([x[m:], -np.linalg.solve(M, C @ x[m:] + K @ x[:m])])
 
-    names = [turbine(2).metadata["u"][k] for k in order]
+    names = [turbine(2).metadata.u[k] for k in order]
     lin = turbine(2).linearize(turbine(2).equilibrium(fixed={"psi_dot": W}))
     right = mode.right
     start = np.array([right[lin.states.index(n)] for n in (*[n.removesuffix("_dot") for n in names], *names)])
@@ -159,8 +159,8 @@ def test_flap_and_lag_of_flexible_blades_under_their_weight() -> None:
     params, period = {"Omega": W}, 2 * math.pi / W
     found = module.stability(params=params, period=period)
     assert found.kind == "periodic motion" and found.verdict == "stable" and found.held == ()
-    n_q, start = len(module.metadata["q"]), found.motion[1][0]
-    assert np.ptp(found.motion[1][:, module.metadata["q"].index("blade1_edge1")]) > 0.1  # m, by weight
+    n_q, start = len(module.metadata.q), found.motion[1][0]
+    assert np.ptp(found.motion[1][:, module.metadata.q.index("blade1_edge1")]) > 0.1  # m, by weight
 
     def after_a_turn(x: np.ndarray) -> np.ndarray:
         return module.simulate((0, period), x[:n_q], x[n_q:], params, rtol=1e-11, atol=1e-13).x[-1]

@@ -267,7 +267,7 @@ def shaft(axes: str, turning: str) -> Any:
 
 def asked(module: Any, W: float) -> Any:
     """Stability at W: of a speed that is held, or of a prescribed rotation."""
-    if "phi" in module.metadata["q"]:
+    if "phi" in module.metadata.q:
         return module.stability(fixed={"phi_dot": W})
     return module.stability(params={"W": W}, period=2 * math.pi / W)
 
@@ -529,7 +529,7 @@ def test_weight_in_the_plane_of_a_rotor_makes_a_periodic_motion(W: float, d: flo
     found = module.stability(fixed={"phi_dot": W}, params={"d": d})
     assert found.kind == "periodic motion" and np.isclose(found.period, 2 * math.pi / abs(W), rtol=1e-12)
     t, x = found.motion
-    order = [module.metadata["x"].index(n) for n in ("phi", "a", "b")]
+    order = [module.metadata.x.index(n) for n in ("phi", "a", "b")]
     place = (x[:, order[1]] + 1j * x[:, order[2]]) * np.exp(1j * x[:, order[0]])
     assert len(t) > 8 and np.abs(place - sagging(W, d)).max() < 1e-9 * abs(sagging(W, d))
     expected = whirling(W, d)

@@ -143,16 +143,16 @@ def built(name: str, form: str) -> Any:
 def differences(module: Any, linear: Any, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """B and D by central differences of rates and outputs at states on the constraints, the independent ones kept."""
     metadata, h = module.metadata, 1e-5
-    n_q, n_u = (metadata["sizes"][k] for k in "qu")
-    kept = [n for n in linear.states if n in metadata["q"] or n in metadata["u"]]
-    whole = [metadata["u"].index(n.removesuffix("_dot") + "_dot") for n in linear.coordinates]
+    n_q, n_u = metadata.sizes.q, metadata.sizes.u
+    kept = [n for n in linear.states if n in metadata.q or n in metadata.u]
+    whole = [metadata.u.index(n.removesuffix("_dot") + "_dot") for n in linear.coordinates]
 
     def at(name: str, change: float) -> np.ndarray:
         inputs = values | {name: values[name] + change}
         q, u = module.consistent(linear.x[:n_q], linear.x[n_q:n_q + n_u], keep=kept, inputs=inputs)
         x = np.concatenate([q, u, linear.x[n_q + n_u:]])
         rates, outputs = module.rhs(0.0, x, inputs=inputs), module.outputs(0.0, x, inputs=inputs)
-        picked = [metadata["x"].index(n) for n in linear.states[len(whole):]]
+        picked = [metadata.x.index(n) for n in linear.states[len(whole):]]
         return np.concatenate([u[whole], rates[picked], [float(outputs[n]) for n in linear.outputs]])
 
     columns = np.array([(at(n, h) - at(n, -h)) / (2 * h) for n in NAMES]).T
@@ -165,7 +165,7 @@ def differences(module: Any, linear: Any, values: dict[str, float]) -> tuple[np.
 def test_columns_of_motions_are_differences_at_states_on_the_constraints(name: str, form: str, moving: bool) -> None:
     module = built(name, form)
     values = dict(zip(NAMES, (START.get(name, 0.2), 0.7 * moving, -0.9 * moving), strict=True))
-    q, u = ({n: v for n, v in each.items() if n in module.metadata["x"]} for each in STATES[name])
+    q, u = ({n: v for n, v in each.items() if n in module.metadata.x} for each in STATES[name])
     state = module.consistent(q, u if moving else {}, inputs=values)
     linear = module.linearize(state, inputs=values)
     B, D = differences(module, linear, values)
@@ -194,7 +194,7 @@ def response(linear: Any, amplitude: float, w: float, times: np.ndarray) -> tupl
 def test_small_motions_give_the_outputs_of_simulations(name: str, form: str) -> None:
     module, w, amplitude = built(name, form), 2.3, 1e-4
     z0, times = START.get(name, 0.2), np.linspace(0, 1, 9)
-    q = {n: v for n, v in STATES[name][0].items() if n in module.metadata["q"]}
+    q = {n: v for n, v in STATES[name][0].items() if n in module.metadata.q}
     rest = module.equilibrium(inputs={"z": z0}, start=q)
     linear = module.linearize(rest, hold=())
 

@@ -40,7 +40,7 @@ def eigenvalues(system: sd.System, x: dict[str, float], speeds: tuple[int, ...],
     """Of the derivative of the flow at a state, in all displacements and these speeds, sorted."""
     equations = system.augmented() if system.constraints else system.embedding()
     module = equations.compile(backend="numpy")
-    state = np.array([x.get(name, 0.0) for name in module.metadata["x"]])
+    state = np.array([x.get(name, 0.0) for name in module.metadata.x])
     assert np.array_equal(consistent_state(module, t, state, module.default_parameters), state)
     positions, _ = Flow(module, t, state, module.default_parameters, np.zeros(0), Coordinates((), (), ())).freedoms()
     flow = Flow(module, t, state, module.default_parameters, np.zeros(0), Coordinates(tuple(range(positions)), speeds, ()))

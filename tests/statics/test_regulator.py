@@ -154,7 +154,7 @@ def test_deviations_along_steady_motion_count_from_the_moving_state() -> None:
     theta, turn = 1.2, 1.5
     R, I_t, I_a, g = 1.0, 0.25, 0.5, 1.0
     w = (I_t * turn**2 * np.cos(theta) - g * R / np.tan(theta)) / ((I_a + R**2) * turn)
-    at = {**dict.fromkeys(disc.metadata["x"], 0.0), "z": np.sin(theta), "theta": theta, "psi_dot": turn,
+    at = {**dict.fromkeys(disc.metadata.x, 0.0), "z": np.sin(theta), "theta": theta, "psi_dot": turn,
           "phi_dot": w - turn * np.cos(theta), "x_dot": -w}
     circle = disc.linearize(at, params={"g": g, "m": 1.0, "R": R, "I_t": I_t, "I_a": I_a})
     with pytest.raises(sd.ArgumentError, match="the motion linearized about is no straight one: y accelerates by"):

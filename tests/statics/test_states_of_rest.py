@@ -133,7 +133,7 @@ def test_the_end_of_a_motion_is_a_start_without_its_speeds() -> None:
     assert np.abs(sol.u[-1]).min() > 0.05
     rest = module.equilibrium(start=sol.x[-1])
     assert np.allclose(rest.q, [0, 1], atol=1e-12) and not rest.u.any() and rest.verdict == "neutral"
-    assert np.allclose(module.equilibrium(start=dict(zip(module.metadata["x"], sol.x[-1], strict=True))).q, [0, 1], atol=1e-12)
+    assert np.allclose(module.equilibrium(start=dict(zip(module.metadata.x, sol.x[-1], strict=True))).q, [0, 1], atol=1e-12)
 
 
 def test_a_pendulum_that_swings_through_is_not_at_rest() -> None:
@@ -235,7 +235,7 @@ def test_a_slider_crank_that_is_folded_is_a_singular_configuration(scale: float)
 def test_a_flat_parallelogram_is_a_singular_configuration() -> None:
     """Its loop has the rank 1 of 2 there: it does not have two modes, one freedom has two ways on."""
     module = systems.n_four_bar(1).augmented().compile(backend="numpy")
-    still = dict.fromkeys(module.metadata["u"], 0.0)
+    still = dict.fromkeys(module.metadata.u, 0.0)
     flat = {"theta0": math.pi / 2, "theta1": math.pi / 2, "phi1": -math.pi / 2, **still}
     assert module.rank(list(flat.values())[:3]) == 1 and module.rank([0.3, 0.3, -0.3]) == 2
     assert "singular configuration" in printed(lambda: module.linearize(flat, params={"g": 0.0}).modes())
@@ -458,7 +458,7 @@ def test_a_trimmed_quadrotor_has_all_of_its_states() -> None:
     assert np.allclose(rest.inputs, 1.2 * 9.81 / 4, rtol=1e-12) and np.allclose(rest.z, rest.inputs, rtol=1e-12)
     A, B = hovering()
     for lin in (module.linearize(rest, hold=()), module.linearize(rest)):
-        assert lin.A.shape == (16, 16) and lin.states == tuple(module.metadata["x"]) and lin.held == ()
+        assert lin.A.shape == (16, 16) and lin.states == tuple(module.metadata.x) and lin.held == ()
         assert np.allclose(lin.A, A, rtol=1e-9, atol=1e-9) and np.allclose(lin.B, B, rtol=1e-12)
         assert lin.verdict == "drifts"
     # A^4 (A + 20) = 0: four zeros in a row from a tilt to the place, and the actuators.
@@ -668,11 +668,11 @@ def test_a_governor_with_loops_in_steady_rotation(W: float) -> None:
 def test_the_catalogues_governor_with_rods_prints_in_steady_rotation() -> None:
     module = systems.flyball_governor("rods").augmented().compile(backend="numpy")
     q, _ = module.consistent(keep=["beta1", "beta2"])
-    e = module.equilibrium(fixed={"phi_dot": 2 * math.pi}, start=dict(zip(module.metadata["q"], q, strict=True)))
+    e = module.equilibrium(fixed={"phi_dot": 2 * math.pi}, start=dict(zip(module.metadata.q, q, strict=True)))
     lin = module.linearize(e)
     assert repr(e) and repr(lin) and repr(lin.modes()) and e.verdict in ("neutral", "unstable")
     assert isinstance(e.stable, bool) or e.stable is None
-    at = e.params[module.metadata["parameters"].index("m_b")]
+    at = e.params[module.metadata.parameters.index("m_b")]
 
     def eigenvalue(value: float) -> complex:
         near = module.equilibrium(fixed={"phi_dot": 2 * math.pi}, start=e, params={"m_b": value})

@@ -26,7 +26,7 @@ def sleigh() -> Any:
 
 def sliding(v: float) -> dict[str, float]:
     """Along the line at v, on it."""
-    return {**dict.fromkeys(sleigh().metadata["x"], 0.0), "x_dot": v}
+    return {**dict.fromkeys(sleigh().metadata.x, 0.0), "x_dot": v}
 
 
 def sleigh_polynomial(v: float = 1.0) -> list[float]:
@@ -45,7 +45,7 @@ DISC = {"g": 1.0, "m": 1.0, "R": 1.0, "I_t": 0.25, "I_a": 0.5}
 
 def upright(w: float) -> dict[str, float]:
     """The disc stands upright and rolls straight on along x; nothing is left to the initial values."""
-    return {**dict.fromkeys(disc().metadata["x"], 0.0), "z": 1.0, "theta": math.pi / 2, "x_dot": w, "phi_dot": -w}
+    return {**dict.fromkeys(disc().metadata.x, 0.0), "z": 1.0, "theta": math.pi / 2, "x_dot": w, "phi_dot": -w}
 
 
 @functools.cache
@@ -82,7 +82,7 @@ def bicycle() -> Any:
 
 def riding(v: float) -> dict[str, float]:
     """Upright, straight on along x at v."""
-    return {**dict.fromkeys(bicycle().metadata["x"], 0.0), "z": -0.3, "x_dot": v, "rear_dot": -v / 0.3, "front_dot": -v / 0.35}
+    return {**dict.fromkeys(bicycle().metadata.x, 0.0), "z": -0.3, "x_dot": v, "rear_dot": -v / 0.3, "front_dot": -v / 0.35}
 
 
 def published(v: float) -> np.ndarray:
@@ -224,7 +224,7 @@ def test_a_disc_that_rolls_in_a_circle(turn: float) -> None:
     period = 2 * math.pi / turn
     found = disc().stability(circular_state(theta, turn, omega_3), params=DISC, period=period)
     if found.motion is not None:  # the motion in question, not one near it that closes in phi, too
-        assert np.isclose(found.motion[1][0][disc().metadata["x"].index("theta")], theta, rtol=1e-9)
+        assert np.isclose(found.motion[1][0][disc().metadata.x.index("theta")], theta, rtol=1e-9)
     expected = np.exp(np.sqrt(complex(squared)) * period)
     assert squared < 0 and np.abs(np.exp(np.asarray(found.exponents) * period) - expected).min() < 1e-9
     assert found.verdict == "drifts" and found.kind in ("steady motion", "periodic motion")
@@ -232,7 +232,7 @@ def test_a_disc_that_rolls_in_a_circle(turn: float) -> None:
 
 def circular_state(theta: float, turn: float, omega_3: float) -> dict[str, float]:
     """Coordinates and speeds of a disc of radius 1 at psi = 0 whose lean is constant."""
-    return {**dict.fromkeys(disc().metadata["x"], 0.0), "z": math.sin(theta), "theta": theta, "psi_dot": turn,
+    return {**dict.fromkeys(disc().metadata.x, 0.0), "z": math.sin(theta), "theta": theta, "psi_dot": turn,
             "phi_dot": omega_3 - turn * math.cos(theta), "x_dot": -omega_3}
 
 
@@ -295,7 +295,7 @@ def test_the_benchmark_bicycle_in_all_states(v: float) -> None:
     """
     lin = bicycle().linearize(riding(v))
     assert lin.A.shape == (10, 10) and lin.M.shape == (3, 3) and lin.K.shape == (3, 7)
-    names = list(bicycle().metadata["x"])
+    names = list(bicycle().metadata.x)
     S = lin.tangent()[[names.index(n) for n in ("lean", "steer", "lean_dot", "steer_dot")]]
     size = max(1.0, np.abs(lin.A).max())
     assert np.abs(S @ lin.A - published(v) @ S).max() <= 1e-9 * size

@@ -60,7 +60,7 @@ def test_the_stabilized_index_2_form_tells_it() -> None:
     system.add_joint(sd.Prismatic("rail", system.ground, system.add_body("cart", mass=1), x, axis=[1, 0, 0]))
     system.add_constraint(x - sd.t**2 / 10, "held")
     module = system.augmented().compile()
-    for u, n in (({"x_dot": 0.0}, 0), (dict(zip(module.metadata["u"], [0.0, 2.0, 1e-5, 0.0], strict=True)), 1)):
+    for u, n in (({"x_dot": 0.0}, 0), (dict(zip(module.metadata.u, [0.0, 2.0, 1e-5, 0.0], strict=True)), 1)):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             run = module.simulate(t=np.array([0.0, 0.9]), u=u, rtol=1e-6, method="ggl")

@@ -205,8 +205,8 @@ def test_thresholds_with_units_are_found(double: Subject, monkeypatch: pytest.Mo
         sol.x[-1] += size  # as many of whatever unit
 
     altered(double, monkeypatch, shift)
-    rows = list(units._bits(double, units.EXACT[2], units.factors(double, double.module.metadata["parameters"], units.EXACT[2]),
-                            units.factors(double, double.module.metadata["x"], units.EXACT[2]), True))
+    rows = list(units._bits(double, units.EXACT[2], units.factors(double, double.module.metadata.parameters, units.EXACT[2]),
+                            units.factors(double, double.module.metadata.x, units.EXACT[2]), True))
     assert verdicts(rows) == [verdict]
 
 

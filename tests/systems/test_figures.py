@@ -52,9 +52,9 @@ def test_right_hand_side_agrees_with_30_digits(name, backend):
     module = equations.compile(backend=backend)
     stream = np.random.default_rng(7)
     for _ in range(3):
-        x = stream.uniform(0.2, 1.2, module.metadata["sizes"]["x"])
-        inputs = stream.uniform(-1, 1, module.metadata["sizes"]["inputs"])
-        values = dict(zip([*module.metadata["x"], *module.metadata["inputs"], *module.metadata["parameters"]],
+        x = stream.uniform(0.2, 1.2, module.metadata.sizes.x)
+        inputs = stream.uniform(-1, 1, module.metadata.sizes.inputs)
+        values = dict(zip([*module.metadata.x, *module.metadata.inputs, *module.metadata.parameters],
                           [*x, *inputs, *module.parameters()], strict=True))
         exact = evaluate(equations.tape("rhs"), {**values, "t": 0.3}, 30)["rhs"]
         difference = np.array([float(a - b) for a, b in zip(module.rhs(0.3, x, None, inputs), exact, strict=True)])

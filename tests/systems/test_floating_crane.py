@@ -22,7 +22,7 @@ def hook() -> Any:
 
 
 def numbers(module: Any, **changed: float) -> dict[str, float]:
-    return {**dict(zip(module.metadata["parameters"], module.metadata["defaults"], strict=True)), **changed}
+    return {**dict(zip(module.metadata.parameters, module.metadata.defaults, strict=True)), **changed}
 
 
 class Statics:
@@ -60,7 +60,7 @@ def test_heel_and_draft_with_the_cargo_on_the_hook(hook: Any) -> None:
     assert found["alpha"] == pytest.approx(-heel, rel=1e-12)  # the rope hangs straight down
     assert hook.outputs(0.0, found.x)["draft"] == pytest.approx(statics.draft, rel=1e-13)  # in the middle, at any heel
     assert [found[name] for name in ("z", "phi", "alpha")] == pytest.approx(
-        [hook.metadata["initial"][name] for name in ("z", "phi", "alpha")], rel=1e-13)
+        [hook.metadata.initial[name] for name in ("z", "phi", "alpha")], rel=1e-13)
 
 
 def test_small_heel_and_trim_are_the_moment_by_displacement_and_metacentric_height(hook: Any) -> None:
@@ -83,7 +83,7 @@ def test_before_lifting_it_floats_level() -> None:
     module = sd.systems.floating_crane("ashore").embedding().compile()
     found = module.equilibrium(fixed=HELD, start={"z": -7.0, "phi": 0.1})
     assert found["z"] == pytest.approx(-Statics(numbers(module)).draft, rel=1e-12)
-    assert found["z"] == pytest.approx(module.metadata["initial"]["z"], rel=1e-13)
+    assert found["z"] == pytest.approx(module.metadata.initial["z"], rel=1e-13)
     assert found.stable and abs(found["phi"]) < 1e-12 and abs(found["theta"]) < 1e-12
 
 

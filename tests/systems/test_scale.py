@@ -47,7 +47,7 @@ def test_a_random_tree_compiled() -> None:
     """In parts, against the recursion of the lecture's page on plain floats."""
     system = random_tree(25)
     module = system.recursive().compile(backend="c")
-    n_q, n_u = (len(module.metadata[group]) for group in ("q", "u"))
+    n_q, n_u = (len(module.metadata.names(group)) for group in ("q", "u"))
     rng = np.random.default_rng(6)
     q, u = rng.uniform(-0.8, 0.8, n_q), rng.uniform(-1, 1, n_u)
     numbers = NumericTree(system.check()).at(q, u)

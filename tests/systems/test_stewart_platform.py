@@ -75,7 +75,7 @@ def driven(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         a_2 = (d[1] * a[2] - a[1] * d[2] - 2 * a_1 * (d[1] * v[1] + d[2] * v[2])) / square
         legs.append(((a_0, b_0, s), (a_1, b_1, s_1), (a_2, b_2, s_2)))
     names = [*"xyzabc", *[f"{kind}{i + 1}" for i in range(6) for kind in ("alpha", "beta", "s")]]
-    order = [names.index(n) for n in platform("numpy").metadata["q"]]
+    order = [names.index(n) for n in platform("numpy").metadata.q]
     q, u, ud = (np.concatenate([wave[k], *[leg[k] for leg in legs]])[order] for k in range(3))
     return q, u, ud
 
@@ -125,7 +125,7 @@ class Reference:
 
     def vector(self, values: np.ndarray) -> np.ndarray:
         """From symdyn's order."""
-        known = platform("numpy").metadata["q"]
+        known = platform("numpy").metadata.q
         return np.array([values[known.index(n)] for n in self.names])
 
     def leg_forces(self, q: np.ndarray, u: np.ndarray, ud: np.ndarray) -> np.ndarray:
@@ -182,8 +182,8 @@ def test_legs_follow_a_platform_that_is_kept() -> None:
     """Coordinates, speeds and accelerations of the platform alone; those of the legs are projected, and are the closed forms."""
     q, u, ud = driven(1.1)
     metadata = platform("numpy").metadata
-    moved = [n for n in metadata["x"] if n.removesuffix("_dot") in [*"xyzabc"]]
-    given = [{n: v for n, v in zip(metadata[group], values, strict=True) if n in moved}
+    moved = [n for n in metadata.x if n.removesuffix("_dot") in [*"xyzabc"]]
+    given = [{n: v for n, v in zip(metadata.names(group), values, strict=True) if n in moved}
              for group, values in (("q", q), ("u", u), ("u", ud))]
     found = platform("numpy").actuation(1.1, *given, project=True, keep=moved)
     assert np.allclose(found.q, q, atol=1e-11) and np.allclose(found.u, u, atol=1e-10) and np.allclose(found.ud, ud, atol=1e-9)
@@ -195,9 +195,9 @@ def test_legs_follow_a_platform_that_is_kept() -> None:
 def test_the_initial_forces_hold_the_platform() -> None:
     """The closed form in the catalogue, from moments about the feet and the balance of the platform."""
     module = platform("numpy")
-    q = np.array([module.metadata["initial"].get(n, 0.0) for n in module.metadata["q"]])
+    q = np.array([module.metadata.initial.get(n, 0.0) for n in module.metadata.q])
     held = module.actuation(0.0, q, np.zeros(24), np.zeros(24))
-    initial = [module.metadata["initial"][n] for n in module.metadata["inputs"]]
+    initial = [module.metadata.initial[n] for n in module.metadata.inputs]
     assert np.allclose(held.inputs, initial, rtol=1e-13)
     assert np.abs(module.rhs(0.0, [*q, *np.zeros(24)])[24:]).max() < 1e-11
 

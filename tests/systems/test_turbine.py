@@ -198,7 +198,7 @@ def test_time_series_keep_the_balance_of_energy(moored: Any) -> None:
 
 def test_the_moored_barge_floats_where_weight_and_mooring_are_carried(moored: Any) -> None:
     rest = moored.equilibrium(fixed={"azimuth": 0.0}, start={"z": 1.0, "theta": 0.2, "phi": -0.2, "x": 1.0})
-    found = {name: moored.metadata["initial"].get(name, 0.0) for name in moored.metadata["q"]}
+    found = {name: moored.metadata.initial.get(name, 0.0) for name in moored.metadata.q}
     assert rest.q == pytest.approx(list(found.values()), abs=1e-12) and rest.stable and rest.iterations <= 25
     pull = -nrel.MOORING_FORCE[2] + nrel.MOORING_STIFFNESS[2][2] * rest["z"]
     wanted = (TOTAL * nrel.GRAVITY + pull) / (nrel.WATER_DENSITY * nrel.GRAVITY * 1500.0)

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from symdyn import systems
-from symdyn.pipeline import emit, function_tape
+from symdyn.functions.tapes import function_tape
+from symdyn.pipeline import emit
 from symdyn.tape import Tape
 from symdyn.tape.cycles import FUSED_LATENCY, LATENCY, WIDTH, WINDOW, fused_products, schedule
 from symdyn.tape.node import COORDINATE, PARAMETER

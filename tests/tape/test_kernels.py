@@ -299,7 +299,7 @@ def test_calls_with_parameters_run_in_the_prologue(backend: str) -> None:
     evaluator = unit.evaluator("solve")
     evaluator.set_params(given.for_saddle)
     assert close(np.array(evaluator.one(0.0, np.zeros(0))), given.solution()[0], 1e-10)
-    assert unit.metadata["operations"]["solve"] == 0
+    assert unit.metadata.operations["solve"] == 0
 
 
 # -- derivatives

@@ -15,8 +15,8 @@ from symdyn.bench.peers.pinocchio_peer import PinocchioPeer
 from symdyn.bench.peers.race import agree, race
 from symdyn.bench.peers.symdyn_peer import symdyn_contestant
 from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape
 from symdyn.model.system import System
-from symdyn.pipeline import function_tape
 from symdyn.tape.tape import Tape
 
 SEED = 20

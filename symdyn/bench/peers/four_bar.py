@@ -20,8 +20,8 @@ from symdyn.bench.peers.pinocchio_peer import PinocchioLoopPeer
 from symdyn.bench.peers.race import agree, race
 from symdyn.bench.peers.symdyn_peer import constrained_contestant, symdyn_contestant, with_multipliers
 from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape
 from symdyn.model.system import System
-from symdyn.pipeline import function_tape
 from symdyn.systems import get
 
 # At most, the time for accelerations and multipliers over that of the fastest generated code of CasADi and SymPy.

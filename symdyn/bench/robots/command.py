@@ -19,7 +19,7 @@ from symdyn.bench.robots.collection import ROBOTS, Listed, folder
 from symdyn.bench.robots.pinocchio_aba import PinocchioAba
 from symdyn.bench.robots.pinocchio_robot import PinocchioRobot
 from symdyn.errors import ArgumentError, ModelWarning, SymdynError
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.urdf.read import read_urdf
 
 STATES = 100

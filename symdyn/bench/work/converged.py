@@ -34,12 +34,12 @@ class Exact(Precise):
     def __init__(self, formulation: Formulation, digits: int, compiled: bool = False) -> None:
         super().__init__(formulation.equations, digits, compiled)
         number, module = self.context.mpf, formulation.module
-        given = {**dict(zip(module.metadata["parameters"], module.default_parameters, strict=True)),
-                 **{n: module.metadata["initial"].get(n, 0.0) for n in module.metadata["inputs"]}}
+        given = {**dict(zip(module.metadata.parameters, module.default_parameters, strict=True)),
+                 **{n: module.metadata.initial.get(n, 0.0) for n in module.metadata.inputs}}
         self.fixed = {name: number(float(value)) for name, value in given.items()}
         self.start = [number(float(v)) for v in formulation.x0]
-        for group in module.metadata.get("unit_groups", ()):
-            places = [module.metadata["x"].index(name) for name in group]
+        for group in module.metadata.unit_groups:
+            places = [module.metadata.x.index(name) for name in group]
             norm = self.context.sqrt(sum(self.start[k]**2 for k in places))
             for k in places:
                 self.start[k] /= norm

@@ -127,7 +127,7 @@ def _energy_error(formulation: Formulation, sol: Any, given: dict[str, Any]) -> 
     if not sol.success:
         return NAN
     try:
-        if not formulation.module.metadata["conservative"]:
+        if not formulation.module.metadata.conservative:
             sol = formulation.module.simulate(sol.t, **given, work=True)
         return float(sol.energy_error())
     except ArgumentError:  # equations by hand, which do not tell the energy
@@ -136,8 +136,8 @@ def _energy_error(formulation: Formulation, sol: Any, given: dict[str, Any]) -> 
 
 def _constraint_error(formulation: Formulation, sol: Any) -> float:
     metadata = formulation.module.metadata
-    worst = [float(np.abs(sol.constraint_violation).max(initial=0.0))] if metadata["constraints"] else []
-    for group in metadata.get("unit_groups", ()):
-        places = [metadata["x"].index(name) for name in group]
+    worst = [float(np.abs(sol.constraint_violation).max(initial=0.0))] if metadata.constraints else []
+    for group in metadata.unit_groups:
+        places = [metadata.x.index(name) for name in group]
         worst.append(float(np.abs(np.linalg.norm(sol.x[:, places], axis=1) - 1).max(initial=0.0)))
     return max(worst, default=NAN)

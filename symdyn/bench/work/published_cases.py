@@ -115,13 +115,13 @@ def point(body: str, place: tuple[float, float, float], axes: str) -> History:
 
 def _top(formulation: Formulation, t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Position (m) and velocity (m/s) of B0 of the windows, from the angle of the first upright."""
-    sizes = formulation.module.metadata["sizes"]
-    theta, rate = x[:, 0], x[:, sizes["q"]]
+    sizes = formulation.module.metadata.sizes
+    theta, rate = x[:, 0], x[:, sizes.q]
     return np.transpose([np.sin(theta), np.cos(theta), rate * np.cos(theta), -rate * np.sin(theta)])
 
 
 def _q(formulation: Formulation, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return x[:, :formulation.module.metadata["sizes"]["q"]]
+    return x[:, :formulation.module.metadata.sizes.q]
 
 
 # -- closed forms

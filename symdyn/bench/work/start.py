@@ -42,7 +42,7 @@ def on_constraints(subject: Subject, first: Formulation) -> tuple[Subject, str]:
         return subject, ""
     except ArgumentError:
         pass
-    n_q, n_u = (module.metadata["sizes"][kind] for kind in "qu")
+    n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
     found = np.concatenate(module.consistent(x[:n_q], x[n_q:n_q + n_u]))
     symbols = first.equations.symbols
     start = dict(zip((*symbols.coordinates, *symbols.speeds), map(float, found), strict=True))

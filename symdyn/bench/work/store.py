@@ -60,14 +60,14 @@ def stored() -> dict[str, dict[str, Any]]:
 def _given(formulation: Formulation) -> dict[str, float]:
     module = formulation.module
     metadata = module.metadata
-    return {**dict(zip(metadata["parameters"], module.default_parameters.tolist(), strict=True)),
-            **dict(zip(metadata["x"], formulation.x0.tolist(), strict=True)),
-            **{n: float(metadata["initial"].get(n, 0.0)) for n in metadata["inputs"]}}
+    return {**dict(zip(metadata.parameters, module.default_parameters.tolist(), strict=True)),
+            **dict(zip(metadata.x, formulation.x0.tolist(), strict=True)),
+            **{n: float(metadata.initial.get(n, 0.0)) for n in metadata.inputs}}
 
 
 def _rates(formulation: Formulation, reference: Reference) -> np.ndarray:
     module = formulation.module
-    given = [float(module.metadata["initial"].get(n, 0.0)) for n in module.metadata["inputs"]]
+    given = [float(module.metadata.initial.get(n, 0.0)) for n in module.metadata.inputs]
     return np.array([module.rhs(t, np.array(x, dtype=float), None, given)
                      for t, x in zip(reference.times, reference.x, strict=True)])
 

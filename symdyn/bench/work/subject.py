@@ -12,8 +12,8 @@ import numpy as np
 from symdyn.bench.work.record import NAN, Reference, Skipped
 from symdyn.errors import EvaluationError, SymdynError
 from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape
 from symdyn.model.orientation import EulerAngles
-from symdyn.pipeline import function_tape
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -47,12 +47,12 @@ class Formulation:
         """The start, (n_x,)."""
         from symdyn.runtime.consistent import normalised
 
-        initial = self.module.metadata["initial"]
-        return normalised(self.module, np.array([float(initial.get(n, 0.0)) for n in self.module.metadata["x"]]))
+        initial = self.module.metadata.initial
+        return normalised(self.module, np.array([float(initial.get(n, 0.0)) for n in self.module.metadata.x]))
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        return tuple(self.module.metadata["x"])
+        return tuple(self.module.metadata.x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +164,8 @@ class Yardstick:
 
     def _parts(self, formulation: Formulation, x: np.ndarray, beside: Formulation | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Positions and speeds, (n, ...): of bodies where the coordinates are not the reference's."""
-        sizes = formulation.module.metadata["sizes"]
-        n_q, n_u = sizes["q"], sizes["u"]
+        sizes = formulation.module.metadata.sizes
+        n_q, n_u = sizes.q, sizes.u
         if not self.bodies and (beside or formulation).coordinates == self.first.coordinates:
             return np.hstack((x[:, :n_q], x[:, n_q + n_u:])), x[:, n_q:n_q + n_u]
         module, there = formulation.module, np.isfinite(x).all(axis=1)
@@ -173,12 +173,12 @@ class Yardstick:
         if not there.any():
             return unknown, unknown
         t, x = self.times[:len(x)][there], x[there]
-        given = np.array([float(module.metadata["initial"].get(n, 0.0)) for n in module.metadata["inputs"]])
+        given = np.array([float(module.metadata.initial.get(n, 0.0)) for n in module.metadata.inputs])
         p = module.default_parameters
         places = self._shared(formulation, beside or formulation)
         try:
             frames = module.evaluate("frames", t, x, p, given).reshape(len(x), -1, 12)[:, places]
-            J = module.evaluate("J", t, x, p, given).reshape(len(x), len(module.metadata["bodies"]), -1, n_u)[:, places]
+            J = module.evaluate("J", t, x, p, given).reshape(len(x), len(module.metadata.bodies), -1, n_u)[:, places]
         except EvaluationError:
             return unknown, unknown
         velocities = np.einsum("kbij,kj->kbi", J, x[:, n_q:n_q + n_u])
@@ -187,9 +187,9 @@ class Yardstick:
     def _shared(self, formulation: Formulation, other: Formulation) -> list[int]:
         """Where a formulation has the bodies that the reference's and the other one have: absolute coordinates may have more
         bodies, which carry joints."""
-        names = formulation.module.metadata["bodies"]
-        both = set(other.module.metadata["bodies"])
-        return [names.index(name) for name in self.first.module.metadata["bodies"] if name in both]
+        names = formulation.module.metadata.bodies
+        both = set(other.module.metadata.bodies)
+        return [names.index(name) for name in self.first.module.metadata.bodies if name in both]
 
 
 def _spread(rows: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -51,14 +51,14 @@ class Bending:
 def bendings(solution: Solution) -> dict[int, Bending]:
     """The flexible bodies of a motion, by their place among the bodies.
 
-    metadata["flexible"] lists them: `body` and `tip`, the names of the bodies at its ends; `stations` (n, 3), points of the
+    metadata.flexible lists them: `body` and `tip`, the names of the bodies at its ends; `stations` (n, 3), points of the
     undeformed beam in the axes of `body`; `shapes` (n, 3, n_eta), their displacements by each of `coordinates`, the names of the
     elastic coordinates, and `second` (n, 3, n_eta, n_eta), the second derivatives.
     """
     metadata = solution.module.metadata
     found = {}
-    for record in metadata.get("flexible", ()):
+    for record in metadata.flexible:
         eta = np.column_stack([solution[name] for name in record["coordinates"]])
         points, shapes, second = (np.array(record[name], dtype=float) for name in ("stations", "shapes", "second"))
-        found[metadata["bodies"].index(record["body"])] = Bending(points, shapes, second, eta)
+        found[metadata.bodies.index(record["body"])] = Bending(points, shapes, second, eta)
     return found

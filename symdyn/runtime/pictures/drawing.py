@@ -57,9 +57,9 @@ class Drawing:
         skeleton, kept = _skeleton(solution, centres)
         centres = centres[:, kept]
         solids = Solids.of(solution)
-        tips = {record["tip"] for record in solution.module.metadata.get("flexible", ())}
+        tips = {record["tip"] for record in solution.module.metadata.flexible}
         bare = [k for k, body in enumerate(kept) if solids is None or (
-            body not in solids.bodies and solution.module.metadata["bodies"][body] not in tips)]
+            body not in solids.bodies and solution.module.metadata.bodies[body] not in tips)]
         if solids is not None:
             skeleton = _without(skeleton, bare)
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
@@ -67,7 +67,7 @@ class Drawing:
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
         shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
         if solids is not None:
-            shown = [0, 1] if solution.module.metadata.get("planar") else [0, 1, 2]
+            shown = [0, 1] if solution.module.metadata.planar else [0, 1, 2]
         if not shown:
             return None
         if len(shown) == 1:
@@ -115,7 +115,7 @@ def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[i
         return bare_skeleton(centres), kept
     frames = solution.frames.reshape(n_t, -1, 12)
     origins, rotations = frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3)
-    if "joint_points" not in module.functions or "reaction_kinds" not in module.metadata:
+    if "joint_points" not in module.functions:
         return guess_skeleton(origins, rotations, centres, _ends(solution, kept)), kept
     kept = [k for k in kept if k not in carriers(module.metadata)]
     joints = placed_joints(module.metadata, kept, solution.rows("joint_points").reshape(n_t, -1, 6))

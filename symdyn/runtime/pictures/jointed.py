@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.runtime.pictures.joints import GROUND
 from symdyn.runtime.pictures.skeleton import Skeleton, connect, extent
 
@@ -42,19 +42,19 @@ class PlacedJoint:
         return "slider" if np.linalg.svd(way - way.mean(axis=0), compute_uv=False)[1:].max(initial=0.0) <= near else "float"
 
 
-def placed_joints(metadata: Mapping[str, Any], bodies: Sequence[int], points: np.ndarray) -> list[PlacedJoint]:
+def placed_joints(metadata: ModuleMetadata, bodies: Sequence[int], points: np.ndarray) -> list[PlacedJoint]:
     """The joints between these bodies and the ground; points (n_t, n_joints, 6) on parents, then on children."""
-    places = {metadata["bodies"][body]: k for k, body in enumerate(bodies)}
-    ends = zip(metadata["reaction_bodies"], metadata["reaction_kinds"], strict=True)
+    places = {metadata.bodies[body]: k for k, body in enumerate(bodies)}
+    ends = zip(metadata.reaction_bodies, metadata.reaction_kinds, strict=True)
     return [PlacedJoint(places.get(parent, GROUND), places.get(child, GROUND), points[:, k, :3], points[:, k, 3:], kind)
             for k, ((parent, child), kind) in enumerate(ends)]
 
 
-def carriers(metadata: Mapping[str, Any]) -> set[int]:
+def carriers(metadata: ModuleMetadata) -> set[int]:
     """Places of the massless bodies that joints in loops have been given."""
-    ends = {name for pair in metadata["reaction_bodies"] for name in pair}
-    made = {f"{name}_carrier" for name in metadata["reactions"]} - ends
-    return {k for k, name in enumerate(metadata["bodies"]) if name in made}
+    ends = {name for pair in metadata.reaction_bodies for name in pair}
+    made = {f"{name}_carrier" for name in metadata.reactions} - ends
+    return {k for k, name in enumerate(metadata.bodies) if name in made}
 
 
 def jointed_skeleton(joints: Sequence[PlacedJoint], origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray,

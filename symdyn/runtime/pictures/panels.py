@@ -32,10 +32,10 @@ def panels_of(solution: Solution) -> list[Panel]:
 def _symbols(solution: Solution) -> Iterator[Panel]:
     """A panel for each unit; none for inputs that are zero throughout."""
     metadata = solution.module.metadata
-    units = metadata["units"]
+    units = metadata.units
     for title, group, values in (("coordinates", "q", solution.q), ("speeds", "u", solution.u),
                                  ("states", "z", solution.z), ("inputs", "inputs", solution.inputs)):
-        names = metadata[group]
+        names = metadata.names(group)
         for unit in dict.fromkeys(units.get(n, "") for n in names):
             places = [k for k, n in enumerate(names) if units.get(n, "") == unit]
             if group != "inputs" or values[:, places].any():
@@ -53,7 +53,7 @@ def _outputs(solution: Solution) -> Iterator[Panel]:
             labels = [f"{name} {axis}" for axis in "xyz"[:flat.shape[1]]]
             yield Panel(points[name].quantity, points[name].unit, labels, flat)
         else:
-            unit = solution.module.metadata.get("output_units", {}).get(name, "")
+            unit = solution.module.metadata.output_units.get(name, "")
             labels = [name] if flat.shape[1] == 1 else [f"{name} {'xyz'[k]}" if unit else f"{name}[{k}]"
                                                         for k in range(flat.shape[1])]
             yield Panel("output", unit, labels, flat)

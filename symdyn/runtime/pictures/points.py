@@ -41,7 +41,7 @@ class _Samples:
 def points_of(solution: Solution) -> dict[str, BodyPoint]:
     """The outputs that are points of bodies, by name."""
     module = solution.module
-    names = [n for n, shape in module.metadata["outputs"] if tuple(shape) in ((2,), (3,))]
+    names = [n for n, shape in module.metadata.outputs if tuple(shape) in ((2,), (3,))]
     if not names or "frames" not in module.functions or not len(solution.t):
         return {}
     try:
@@ -54,10 +54,10 @@ def points_of(solution: Solution) -> dict[str, BodyPoint]:
 
 def _sample(solution: Solution) -> _Samples:
     """States of the motion with other speeds: coordinates keep to what they must, Euler parameters to unit length."""
-    module, sizes = solution.module, solution.module.metadata["sizes"]
+    module, sizes = solution.module, solution.module.metadata.sizes
     rows = np.linspace(0, len(solution.t) - 1, _STATES).astype(int)
     t, x, inputs = solution.t[rows], solution.x[rows].copy(), solution.inputs[rows]
-    n_q, n_u = sizes["q"], sizes["u"]
+    n_q, n_u = sizes.q, sizes.u
     x[:, n_q:n_q + n_u] += np.random.default_rng(1).uniform(-1, 1, (_STATES, n_u))
 
     def at(name: str, step: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,7 @@ class Solids:
     def of(cls, solution: Solution) -> Solids | None:
         """The shapes of a motion; None if its module has none. Raises ArgumentError for a colour that does not exist."""
         module = solution.module
-        records = module.metadata.get("drawn", [])
+        records = module.metadata.drawn
         bent = bendings(solution)
         if not (records or bent) or "frames" not in module.functions or not len(solution.t):
             return None
@@ -61,7 +61,7 @@ class Solids:
             return None
         still = np.concatenate([np.zeros(3), np.eye(3).ravel()])
         frames = np.concatenate([frames, np.broadcast_to(still, (len(frames), 1, 12))], axis=1)
-        names = [*module.metadata["bodies"], "ground"]
+        names = [*module.metadata.bodies, "ground"]
         own = [*colors_of(len(names) - 1), _GROUND_COLOR]
         parts, bending, water = [], [], None
         for record in _filled(solution, records):
@@ -131,7 +131,7 @@ def part_way(A: np.ndarray, B: np.ndarray, w: Any) -> np.ndarray:
     return np.asarray(A @ (np.eye(3) + np.sin(turned) * K + (1 - np.cos(turned)) * K @ K))
 
 
-def _filled(solution: Solution, records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def _filled(solution: Solution, records: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """The records with the lengths that follow from the parameters of the run."""
     if "drawn_lengths" not in solution.module.functions:
         return list(records)
@@ -141,7 +141,7 @@ def _filled(solution: Solution, records: Sequence[dict[str, Any]]) -> list[dict[
                                   for name, rows in record["values"].items()}} for record in records]
 
 
-def _water(record: dict[str, Any], name: str) -> Water:
+def _water(record: Mapping[str, Any], name: str) -> Water:
     values, color = record["values"], _color(record["color"] or _WATER_COLOR, name)
     if "size" not in values:
         return Water(values["level"][0][0], None, color)

@@ -130,9 +130,9 @@ def decade(error: float) -> str:
 
 def unit_note(manifold: Manifold) -> list[str]:
     """A line with the units of what shapes of modes consist of."""
-    units = manifold.place.module.metadata["units"]
+    units = manifold.place.module.metadata.units
     by_unit: dict[str, list[str]] = {}
-    speeds = manifold.place.module.metadata["u"]
+    speeds = manifold.place.module.metadata.u
     for label, k in zip(manifold.labels, manifold.displacements, strict=True):
         own = units.get(label, "") if label != speeds[k] else units.get(label, "").removesuffix("/s")
         by_unit.setdefault(own or "1", []).append(label)

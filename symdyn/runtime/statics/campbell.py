@@ -116,7 +116,7 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
     if frame == "rotating" and list(blades):
         raise ArgumentError(f"{owner}: blades are named, whose modes are seen from the fixed frame; leave them out, or "
                             f"frame='rotating'")
-    named = listed(speed, metadata["u"], "speed", owner)
+    named = listed(speed, metadata.u, "speed", owner)
     if len(named) != 1:
         raise ArgumentError(f"{owner}: speed must be one name or symbol, found {shown(speed)}")
     (name,) = named
@@ -126,10 +126,10 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
         raise ArgumentError(f"{owner}: {name} is in fixed, too; leave it out there")
     if isinstance(blades, str) or not isinstance(blades, Iterable):
         raise ArgumentError(f"{owner}: blades must be a list of sets of coordinates, found {shown(blades)}")
-    groups = [listed(group, metadata["q"], "blades", owner) for group in blades]
+    groups = [listed(group, metadata.q, "blades", owner) for group in blades]
     if isinstance(azimuths, bool) or not isinstance(azimuths, (int, np.integer)):
         raise ArgumentError(f"{owner}: azimuths must be a whole number, found {shown(azimuths)}")
-    turned = listed(azimuth if azimuth is not None else name.removesuffix("_dot"), metadata["q"], "azimuth", owner)[0] \
+    turned = listed(azimuth if azimuth is not None else name.removesuffix("_dot"), metadata.q, "azimuth", owner)[0] \
         if groups or azimuth is not None else None
     result: list[_Found] = []
     last: Any = start
@@ -235,8 +235,8 @@ def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
     best, order = size, tuple(range(count))
     for tail in itertools.permutations(range(1, count)):
         other = (0, *tail)
-        rotor = rotor_of(about.rotor.module, _selection_of(about), about.place.module.metadata["u"][about.rotor.speed],
-                         about.place.module.metadata["q"][about.rotor.azimuth], [[g[k] for k in other] for g in groups])
+        rotor = rotor_of(about.rotor.module, _selection_of(about), about.place.module.metadata.u[about.rotor.speed],
+                         about.place.module.metadata.q[about.rotor.azimuth], [[g[k] for k in other] for g in groups])
         T = about.rotor.transform(0.0)[0]
         q = T @ about.a
         turned = Steady(rotor, about.place, np.linalg.solve(rotor.transform(0.0)[0], q), about.omega, about.azimuths)
@@ -254,8 +254,8 @@ def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
 def _selection_of(about: Steady) -> Selection:
     """A selection with the coordinates of a rotor free."""
     module = about.place.module
-    free = {about.place.module.metadata["u"][k] for k in about.rotor.free}
-    kept = tuple(u for u in module.metadata["u"] if u not in free)
+    free = {about.place.module.metadata.u[k] for k in about.rotor.free}
+    kept = tuple(u for u in module.metadata.u if u not in free)
     return Selection(module, kept, {})
 
 

@@ -258,9 +258,9 @@ def _held_rates(place: Place, held: Sequence[str]) -> list[int] | None:
     labels = coordinate_names(metadata)
     found = []
     for name in held:
-        places = [k for k, (label, u) in enumerate(zip(labels, metadata["u"], strict=True)) if name in (label, u)
-                  and label in metadata["q"]]
-        if place.sizes[3] or not (places or name in metadata["z"]):
+        places = [k for k, (label, u) in enumerate(zip(labels, metadata.u, strict=True)) if name in (label, u)
+                  and label in metadata.q]
+        if place.sizes[3] or not (places or name in metadata.z):
             return None
         found += places
     return found
@@ -399,11 +399,11 @@ def _left_open(course: Course) -> np.ndarray:
     manifold, before, after = course.first, course.first.place, course.last
     metadata = before.module.metadata
     gap = after.q - before.q
-    for k, name in enumerate(metadata["q"]):
-        if metadata["units"].get(name) == "rad":
+    for k, name in enumerate(metadata.q):
+        if metadata.units.get(name) == "rad":
             gap[k] = np.remainder(gap[k] + np.pi, 2 * np.pi) - np.pi
-    for group in metadata.get("unit_groups", ()):
-        places = [metadata["q"].index(n) for n in group]
+    for group in metadata.unit_groups:
+        places = [metadata.q.index(n) for n in group]
         if after.q[places] @ before.q[places] < 0:
             gap[places] = -after.q[places] - before.q[places]
     v = np.linalg.lstsq(before.N, gap, rcond=None)[0]

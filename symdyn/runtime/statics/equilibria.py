@@ -124,14 +124,14 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
 def same(a: Equilibrium, b: Equilibrium) -> bool:
     """Whether two are one but for whole turns and the sign of Euler parameters."""
     metadata = a.module.metadata
-    names = metadata["q"]
+    names = metadata.q
     gap, there = a.q - b.q, np.ones(len(names), dtype=bool)
-    for group in metadata.get("unit_groups", ()):
+    for group in metadata.unit_groups:
         places = [names.index(n) for n in group]
         there[places] = False
         if min(np.abs(a.q[places] - b.q[places]).max(), np.abs(a.q[places] + b.q[places]).max()) > APART:
             return False
-    gap = np.array([_turned(g) if metadata["units"].get(n) == "rad" else g for g, n in zip(gap, names, strict=True)])
+    gap = np.array([_turned(g) if metadata.units.get(n) == "rad" else g for g, n in zip(gap, names, strict=True)])
     more = [a.z - b.z, [a[n] - b[n] for n in a.selection.unknown]]
     sizes = [*a.z, *[a[n] for n in a.selection.unknown]]
     return bool((np.abs(gap[there]) <= APART).all()
@@ -159,7 +159,7 @@ def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: A
         x = first.x.copy()
         x[:len(first.q)] = first.moved(B @ (np.linalg.pinv(B) @ v))
         for name in direct:
-            x[metadata["q"].index(name)] += stream.uniform(*spans[name])
+            x[metadata.q.index(name)] += stream.uniform(*spans[name])
         places.append(first.at(x=selection.apply(x)))
     return places
 
@@ -169,16 +169,16 @@ def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
     module = first.module
     metadata = module.metadata
     labels = coordinate_names(metadata)
-    spans = {label: _span(TURNS if turns(metadata["units"].get(u)) else LENGTHS, label, module.name)
-             for label, u in zip(labels, metadata["u"], strict=True)}
+    spans = {label: _span(TURNS if turns(metadata.units.get(u)) else LENGTHS, label, module.name)
+             for label, u in zip(labels, metadata.u, strict=True)}
     if ranges is None:
         return spans
     if not isinstance(ranges, Mapping):
         raise ArgumentError(f"{module.name}: ranges must be a mapping from coordinates to (least, most), found {shown(ranges)}")
-    turned = {n for group in metadata.get("unit_groups", ()) for n in group}
-    known = dict.fromkeys([*labels, *[n for n in metadata["q"] if n not in turned], *metadata["u"]])
+    turned = {n for group in metadata.unit_groups for n in group}
+    known = dict.fromkeys([*labels, *[n for n in metadata.q if n not in turned], *metadata.u])
     names = listed(list(ranges), known, "ranges", module.name)
-    requested = {labels[metadata["u"].index(n)] if n in metadata["u"] else n: _span(value, n, module.name)
+    requested = {labels[metadata.u.index(n)] if n in metadata.u else n: _span(value, n, module.name)
              for n, value in zip(names, ranges.values(), strict=True)}
     return {**dict.fromkeys(labels, (0.0, 0.0)), **requested}
 
@@ -202,9 +202,9 @@ def _named(distinct: list[Equilibrium]) -> list[Equilibrium]:
     if not distinct:
         return []
     metadata = distinct[0].module.metadata
-    turned = [[metadata["q"].index(n) for n in group] for group in metadata.get("unit_groups", ())]
-    single = [k for k in range(len(metadata["q"])) if not any(k in group for group in turned)]
-    sizes = np.where([metadata["units"].get(metadata["q"][k]) == "m" for k in single], natural_length(distinct[0].place), 1.0)
+    turned = [[metadata.q.index(n) for n in group] for group in metadata.unit_groups]
+    single = [k for k in range(len(metadata.q)) if not any(k in group for group in turned)]
+    sizes = np.where([metadata.units.get(metadata.q[k]) == "m" for k in single], natural_length(distinct[0].place), 1.0)
     columns = [np.array([e.q[single] / sizes for e in distinct])]
     columns += [np.array([_attitude(e.q[group]) for e in distinct]) for group in turned]
     # Each entry a column, an attitude three in one.
@@ -217,9 +217,9 @@ def _named(distinct: list[Equilibrium]) -> list[Equilibrium]:
         for i in distinguishing:
             if i < len(single):
                 value = e.q[single[i]]
-                words.append(f"{metadata['q'][single[i]]} = {value if abs(value) > APART else 0:.4g}")
+                words.append(f"{metadata.q[single[i]]} = {value if abs(value) > APART else 0:.4g}")
             else:
-                of = f" ({metadata['q'][turned[i - len(single)][0]]} ...)" if len(turned) > 1 else ""
+                of = f" ({metadata.q[turned[i - len(single)][0]]} ...)" if len(turned) > 1 else ""
                 words.append(_turn(parts[i][k]) + of)
         result.append(replace(e, name=f"{k + 1}: {kind}" + (f" at {', '.join(words)}" if words else "")))
     return result

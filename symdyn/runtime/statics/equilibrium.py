@@ -208,25 +208,25 @@ class Equilibrium:
         """A coordinate, speed, extra state, parameter or input by name or symbol. Raises ArgumentError for an unknown name."""
         name = name_of(name)
         metadata = self.module.metadata
-        for names, values in ((metadata["x"], self.x), (metadata["parameters"], self.params), (metadata["inputs"], self.inputs)):
+        for names, values in ((metadata.x, self.x), (metadata.parameters, self.params), (metadata.inputs, self.inputs)):
             if name in names:
                 return float(values[names.index(name)])
-        raise ArgumentError(f"{self.module.name}: the equilibrium has no {shown(name)}; it has {', '.join(metadata['x'])}, "
+        raise ArgumentError(f"{self.module.name}: the equilibrium has no {shown(name)}; it has {', '.join(metadata.x)}, "
                             "parameters "
                             "and inputs")
 
     def describe(self) -> str:
         """The state as a table, with what was solved for, and whether it is stable."""
         metadata = self.module.metadata
-        shown = [*metadata["q"], *[u for u in metadata["u"] if self[u]], *metadata["z"], *self.selection.unknown]
+        shown = [*metadata.q, *[u for u in metadata.u if self[u]], *metadata.z, *self.selection.unknown]
         width = max([4, *map(len, shown)])
         lines = [f"{self.module.name}: {f'{self.name}, ' if self.name else ''}{self.message}"]
         for name in shown:
-            unit = metadata["units"].get(name, "")
+            unit = metadata.units.get(name, "")
             note = "  solved for" if name in self.selection.unknown else "  held" if name in self.held else \
                 "  kept" if name in self.selection.kept else ""
             value = self[name]
-            shown_value = 0.0 if name in metadata["q"] and abs(value) < ROUNDED else value
+            shown_value = 0.0 if name in metadata.q and abs(value) < ROUNDED else value
             lines.append(f"  {name:<{width}} = {shown_value:>14.8g} {unit}{note}".rstrip())
         lines += [f"  held: {', '.join(self.held)}"] if self.held else []
         return "\n".join([*lines, f"  {self.reason}"])
@@ -260,7 +260,7 @@ def settled(place: Place, selection: Selection) -> Selection:
     effective = by > 1e-9 * by.max(axis=0, initial=0.0)
     result = [n for n in selection.candidates if n in labels and effective[labels.index(n)].any()]
     if len(result) != len(selection.unknown):
-        free = [*[n for n in metadata["q"] if n not in selection.kept], *selection.candidates[:len(selection.unknown)]]
+        free = [*[n for n in metadata.q if n not in selection.kept], *selection.candidates[:len(selection.unknown)]]
         raise ArgumentError(
             f"{place.module.name}: {len(selection.unknown)} values are to be found ({', '.join(selection.unknown)}), which takes "
             f"as many conditions, but fixed gives {len(selection.values)} ({', '.join(selection.values)}); name in free the "
@@ -279,15 +279,15 @@ def begin(module: Module, selection: Selection, start: Any, params: Any, t: floa
     else:
         if start is not None and not isinstance(start, Mapping):
             start = real_of(start, module.name, "start must be numbers")
-            if start.shape == (len(metadata["q"]),):
-                start = dict(zip(metadata["q"], start.tolist(), strict=True))
-        x = take(start, metadata["x"], "start", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
+            if start.shape == (len(metadata.q),):
+                start = dict(zip(metadata.q, start.tolist(), strict=True))
+        x = take(start, metadata.x, "start", metadata.initial_values("x"), module.name)
     # Speeds are those prescribed in fixed, the others zero.
-    x[len(metadata["q"]):len(metadata["q"]) + len(metadata["u"])] = 0.0
+    x[len(metadata.q):len(metadata.q) + len(metadata.u)] = 0.0
     x = normalised(module, selection.apply(x))
     if isinstance(params, Mapping) and selection.parameters:  # a guess need not be given
         passed = {name_of(k) for k in params}
-        known = dict(zip(metadata["parameters"], metadata["defaults"], strict=True))
+        known = dict(zip(metadata.parameters, metadata.defaults, strict=True))
         params = {**dict.fromkeys([n for n in selection.parameters if n not in passed and known[n] is None], 0.0), **params}
     place = rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
     if place.motion_rates:
@@ -302,7 +302,7 @@ def _guesses(module: Module, selection: Selection, start: Any, params: Any, inpu
     if not isinstance(start, Mapping):
         return start, params, inputs
     guesses = {n: v for n, v in ((name_of(k), v) for k, v in start.items())
-               if n in module.metadata["inputs"] or n in selection.parameters}
+               if n in module.metadata.inputs or n in selection.parameters}
     kept = [n for n in guesses if n not in selection.unknown]
     if kept:
         raise ArgumentError(f"{module.name}: start names {', '.join(kept)}, not among what is solved for "
@@ -312,7 +312,7 @@ def _guesses(module: Module, selection: Selection, start: Any, params: Any, inpu
     for what, passed, names in (("params", params, selection.parameters), ("inputs", inputs, selection.inputs)):
         mine = {n: guesses[n] for n in names if n in guesses}
         if mine and passed is not None and not isinstance(passed, Mapping):
-            passed = dict(zip(module.metadata["parameters" if what == "params" else "inputs"], passed, strict=False))
+            passed = dict(zip(module.metadata.names("parameters" if what == "params" else "inputs"), passed, strict=False))
         twice = [n for n in mine if passed is not None and n in {name_of(k) for k in passed}]
         if twice:
             raise ArgumentError(f"{module.name}: {', '.join(twice)} in start and in {what}; leave it out of one of them")
@@ -322,9 +322,9 @@ def _guesses(module: Module, selection: Selection, start: Any, params: Any, inpu
 
 def given_inputs(module: Module, inputs: Any) -> np.ndarray:
     """Inputs in order; what is left out takes its initial value, as in a simulation, else 0, (n_in,)."""
-    names = module.metadata["inputs"]
+    names = module.metadata.inputs
     return take(inputs if inputs is not None else {}, names, "inputs",
-                {n: module.metadata["initial"].get(n, 0.0) for n in names}, module.name)
+                {n: module.metadata.initial.get(n, 0.0) for n in names}, module.name)
 
 
 def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
@@ -368,15 +368,15 @@ def _raise_without_balance(search: Search, reason: str) -> NoReturn:
     forces = _left(trial)
     weighed = np.abs(np.array(list(forces.values()))) * search.columns
     order = [k for k in np.argsort(-weighed, kind="stable") if weighed[k] > 1e-9 * max(weighed.max(initial=0.0), 1e-300)][:LISTED]
-    left = ", ".join(f"{forces[labels[k]]:.6g} {force_unit(metadata['units'].get(metadata['u'][k], ''))}".strip()
+    left = ", ".join(f"{forces[labels[k]]:.6g} {force_unit(metadata.units.get(metadata.u[k], ''))}".strip()
                      + f" along {labels[k]}" for k in order)
-    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata["q"], *metadata["z"], *trial.selection.unknown],
+    where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata.q, *metadata.z, *trial.selection.unknown],
                                                        [*trial.place.q, *trial.place.z, *trial.selection.amounts(trial.place)],
                                                        strict=True))
-    rates = ", ".join(f"{metadata['z'][k]} by {trial.place.rates_z[k]:.3g} a second" for k in trial.selection.states
+    rates = ", ".join(f"{metadata.z[k]} by {trial.place.rates_z[k]:.3g} a second" for k in trial.selection.states
                       if abs(trial.place.rates_z[k]) > 1e-9)
     gaps = trial.place.C * trial.place.scale
-    names = metadata.get("constraints", ())
+    names = metadata.constraints
     open_ = ", ".join(f"{n} by {g:.3g} m" for n, g in zip(names, gaps, strict=True) if abs(g) > 1e-9)
     loose = [f"nothing holds {name}: it has no stiffness there, so it sinks, rises or turns away"
              for k, name in enumerate(labels) if k in order[:1] and _slack(trial, k, search.columns)]
@@ -421,7 +421,7 @@ def _demand_steady(trial: Trial) -> None:
     place = trial.place
     if not place.sizes[3]:
         return
-    names = place.module.metadata["constraints"]
+    names = place.module.metadata.constraints
     speed = max(float(np.abs(place.u).max(initial=0.0)), 1e-300)
     rates, demanded = place.evaluate("C_dot") * place.scale, place.evaluate("F_d") * place.scale
     for what, values, size in (("move with", rates, speed), ("demand accelerations of", demanded, speed * max(speed, 1.0))):
@@ -454,9 +454,9 @@ def _warn_of_validity(search: Search) -> None:
     """Warn where validity checks of elements fail, and of forces that depend on time."""
     trial = search.best
     place, name = trial.place, trial.place.module.name
-    if place.module.metadata.get(WATCHES, ()):
+    if place.module.metadata.watches:
         warn(place.module, place.evaluate(WATCHES), "in equilibrium", 5)
-    if "t" not in place.module.unit("balance").metadata["arguments"].get("balance", ()):
+    if "t" not in place.module.unit("balance").metadata.arguments.get("balance", ()):
         return
     labels, allowed = coordinate_names(place.module.metadata), search.allowed(trial)
     try:
@@ -465,7 +465,7 @@ def _warn_of_validity(search: Search) -> None:
         return
     k = int(np.argmax((np.abs(changes) / np.maximum(allowed, 1e-300)).max(axis=0)))
     if (np.abs(changes[:, k]) > allowed[k]).any():
-        unit = force_unit(place.module.metadata["units"].get(place.module.metadata["u"][k], ""))
+        unit = force_unit(place.module.metadata.units.get(place.module.metadata.u[k], ""))
         warnings.warn(f"{name}: in equilibrium: forces depend on time, which stands still at t = {place.t:g} s: that along "
                       f"{labels[k]} changes by {np.abs(changes[:, k]).max():.3g} {unit}".rstrip() + f" within {LATER[-1]:g} s; "
                       "this is no state that lasts", SimulationWarning, stacklevel=5)

@@ -162,7 +162,7 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
 def _rows_that_do_not_spin(manifold: Manifold) -> np.ndarray:
     """Which rows of J belong to bodies that do not spin."""
     speeds = spinning(manifold)
-    per_body = 3 if manifold.place.module.metadata.get("planar") else 6
+    per_body = 3 if manifold.place.module.metadata.planar else 6
     return np.asarray(np.repeat(speeds <= 1e-9 * max(float(speeds.max(initial=0.0)), 1e-300), per_body))
 
 
@@ -170,7 +170,7 @@ def displacements(course: Course) -> np.ndarray:
     """Displacements of all bodies in fixed axes by those among the variables, (nodes, rows of J, n_d), turns times the natural
     length."""
     place = course.first.place
-    per_body = 3 if place.module.metadata.get("planar") else 6
+    per_body = 3 if place.module.metadata.planar else 6
     fields = np.array([node.place.evaluate("J") @ course.displaced(node) for node in course.nodes])
     turns = np.tile(np.arange(per_body) >= (2 if per_body == 3 else 3), fields.shape[1] // per_body)
     return np.where(turns, natural_length(place), 1.0)[:, None] * fields
@@ -181,7 +181,7 @@ def spinning(manifold: Manifold) -> np.ndarray:
     place = manifold.place
     if "J" not in place.module.functions:
         return np.zeros(0)
-    per_body = 3 if place.module.metadata.get("planar") else 6
+    per_body = 3 if place.module.metadata.planar else 6
     velocities = (place.evaluate("J") @ place.u).reshape(-1, per_body)
     return np.asarray(np.linalg.norm(velocities[:, (2 if per_body == 3 else 3):], axis=1))
 
@@ -189,7 +189,7 @@ def spinning(manifold: Manifold) -> np.ndarray:
 def axis(course: Course) -> np.ndarray:
     """Direction of the rotation, that of the body that spins fastest at the start, n-frame, (3,), with the sense of the spin."""
     place = course.first.place
-    per_body = 3 if place.module.metadata.get("planar") else 6
+    per_body = 3 if place.module.metadata.planar else 6
     velocities = (place.evaluate("J") @ place.u).reshape(-1, per_body)
     turns = velocities[:, 3:] if per_body == 6 else np.hstack([np.zeros((len(velocities), 2)), velocities[:, 2:]])
     sizes = np.linalg.norm(turns, axis=1)
@@ -217,7 +217,7 @@ class Observer:
         if self.blind:
             return
         self.fields = displacements(course)
-        self.per_body = 3 if course.first.place.module.metadata.get("planar") else 6
+        self.per_body = 3 if course.first.place.module.metadata.planar else 6
         self.still = _rows_that_do_not_spin(course.first)
         self.turning = bool(not self.still.all())
         self.axis = axis(course) if self.turning else np.array([0.0, 0.0, 1.0])

@@ -22,7 +22,7 @@ TURN = 0.4
 def lock(place: Place) -> str:
     """The coordinate whose value brings gimbal lock, as "theta = 90 deg"; "" where there is none."""
     metadata = place.module.metadata
-    angles = [k for k, n in enumerate(metadata["q"]) if metadata["units"].get(n) == "rad"]
+    angles = [k for k, n in enumerate(metadata.q) if metadata.units.get(n) == "rad"]
     if not angles:
         return ""
     here = independence(place)
@@ -31,8 +31,8 @@ def lock(place: Place) -> str:
     turned = [independence(place.at(x=_turned(place.x, k))) for k in angles]
     if max(turned) * LOST <= here:
         return ""
-    name = metadata["q"][angles[int(np.argmax(turned))]]
-    return f"{name} = {np.degrees(place.q[metadata['q'].index(name)]):.6g} deg"
+    name = metadata.q[angles[int(np.argmax(turned))]]
+    return f"{name} = {np.degrees(place.q[metadata.q.index(name)]):.6g} deg"
 
 
 def demand_no_lock(place: Place, what: str) -> None:

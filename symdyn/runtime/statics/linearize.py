@@ -103,18 +103,18 @@ class Linearization:
     def outputs(self) -> tuple[str, ...]:
         """Names of the rows of C_out and D."""
         names: list[str] = []
-        for name, shape in self.module.metadata["outputs"]:
+        for name, shape in self.module.metadata.outputs:
             names += [name + (f"[{', '.join(map(str, index))}]" if index else "") for index in np.ndindex(*shape)]
         return tuple(names)
 
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second."""
-        known = self.module.metadata["units"]
-        displaced = {label: known.get(label, known.get(self.module.metadata["u"][k], "").removesuffix("/s") or "")
+        known = self.module.metadata.units
+        displaced = {label: known.get(label, known.get(self.module.metadata.u[k], "").removesuffix("/s") or "")
                      for label, k in zip(self.coordinates, self._manifold.displacements, strict=True)}
-        others = {n: known.get(n, "") for n in (*self.states[len(self.coordinates):], *self.module.metadata["inputs"])}
-        points = self.module.metadata.get("output_units", {})
+        others = {n: known.get(n, "") for n in (*self.states[len(self.coordinates):], *self.module.metadata.inputs)}
+        points = self.module.metadata.output_units
         return {**others, **displaced, **{n: points.get(n.partition("[")[0], "") for n in self.outputs}}
 
     @cached_property
@@ -197,14 +197,14 @@ class Linearization:
         """
         place, manifold = self._manifold.place, self._manifold
         metadata = self.module.metadata
-        state = take(x, metadata["x"], "x", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, self.module.name)
+        state = take(x, metadata.x, "x", metadata.initial_values("x"), self.module.name)
         n_q, n_u, *_ = place.sizes
         rates = place.balance[place.parts["q_dot"]]
         if rates.any():
             bent = place.balance[place.parts["q_ddot"]]
             k = int(np.argmax(np.abs(bent)))
             if abs(bent[k]) > 1e-9 * float(np.abs(rates).max()) * max(1.0, float(np.abs(rates).max())):
-                raise ArgumentError(f"{self.module.name}: the motion linearized about is no straight one: {metadata['q'][k]} "
+                raise ArgumentError(f"{self.module.name}: the motion linearized about is no straight one: {metadata.q[k]} "
                                     f"accelerates by {bent[k]:.4g} a second; apply the gain K to changes of your own")
         off = state - place.x
         off[:n_q] -= rates * (t - self.t)
@@ -225,7 +225,7 @@ class Linearization:
         except ImportError:
             raise MissingExtra("linear.to_control() needs the package control: pip install 'symdyn[control]'") from None
         C, D, outputs = self._observed()
-        return control.ss(self.A, self.B, C, D, states=list(self.states), inputs=list(self.module.metadata["inputs"]),
+        return control.ss(self.A, self.B, C, D, states=list(self.states), inputs=list(self.module.metadata.inputs),
                           outputs=list(outputs), name=self.module.name)
 
     def _observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
@@ -245,7 +245,7 @@ class Linearization:
         manifold = self._manifold
         place, selection = manifold.place, manifold.selection
         owner = self.module.name
-        named = listed(parameter, self.module.metadata["parameters"], "parameter", owner)
+        named = listed(parameter, self.module.metadata.parameters, "parameter", owner)
         if len(named) != 1:
             raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {shown(parameter)}")
         (name,) = named
@@ -256,7 +256,7 @@ class Linearization:
         if (np.count_nonzero(rows, axis=1) > 1).any() and not _fixed_space(rows):
             raise ArgumentError(f"{owner}: derivatives of eigenvalues with a part of an orientation kept are not available; fix "
                                 "all of its coordinates, or none")
-        if not all(self.module.metadata.get("holonomic") or [True]):
+        if not all(self.module.metadata.holonomic or [True]):
             raise ArgumentError(f"{owner}: derivatives of eigenvalues are not available with constraints of velocities")
         if manifold.Z_u is not manifold.Z_v or manifold.W.any():
             raise ArgumentError(f"{owner}: derivatives of eigenvalues along a motion under constraints are not available; they "
@@ -268,8 +268,8 @@ class Linearization:
 
     def _labelled_states(self) -> tuple[str, ...]:
         """Names of x' with units; a displacement along a speed that is no rate of a coordinate is marked."""
-        units = self.module.metadata["units"]
-        speeds = self.module.metadata["u"]
+        units = self.module.metadata.units
+        speeds = self.module.metadata.u
         result = []
         for label, k in zip(self.coordinates, self._manifold.displacements, strict=True):
             if label == speeds[k]:
@@ -292,7 +292,7 @@ class Linearization:
 
     def describe(self) -> str:
         """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
-        inputs = tuple(self.module.metadata["inputs"])
+        inputs = tuple(self.module.metadata.inputs)
         lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
                  "has the unit of its row by that of its column and s, of C_out and D by that of its column"]
         states = self._labelled_states()
@@ -354,7 +354,7 @@ def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any,
     selection = holding(select(module, free, fixed, None), hold)
     x = selection.apply(place.x)
     if guess and place.sizes[3]:
-        kept = [n for n in selection.values if n in module.metadata["q"] or n in module.metadata["u"]]
+        kept = [n for n in selection.values if n in module.metadata.q or n in module.metadata.u]
         n_q, n_u, *_ = place.sizes
         q, u = consistent(place.bound, x[:n_q], x[n_q:n_q + n_u], place.p, place.t, kept)
         x = np.concatenate([q, u, x[len(q) + len(u):]])
@@ -371,7 +371,7 @@ def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int]
     """Places of independent displacements; where rates are named, too, of independent displacements and speeds."""
     if coordinates is None:
         return None
-    labels, speeds = list(coordinate_names(module.metadata)), list(module.metadata["u"])
+    labels, speeds = list(coordinate_names(module.metadata)), list(module.metadata.u)
     names = listed(coordinates, [*labels, *speeds], "coordinates", module.name)
     displaced = [labels.index(n) for n in names if n in labels]
     rates = [speeds.index(n) for n in names if n not in labels]
@@ -387,9 +387,9 @@ def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -
     if at is None:
         at = {}
     if isinstance(at, tuple) and len(at) == 2 and np.ndim(at[0]) == 1:
-        at = np.concatenate([take(at[0], metadata["q"], "q", {}, module.name), take(at[1], metadata["u"], "u", {}, module.name),
-                             [metadata["initial"].get(n, 0.0) for n in metadata["z"]]])
-    x = take(at, metadata["x"], "at", {n: metadata["initial"].get(n, 0.0) for n in metadata["x"]}, module.name)
+        at = np.concatenate([take(at[0], metadata.q, "q", {}, module.name), take(at[1], metadata.u, "u", {}, module.name),
+                             list(metadata.initial_values("z").values())])
+    x = take(at, metadata.x, "at", metadata.initial_values("x"), module.name)
     free = given_inputs(module, inputs)
     return rest(module, time, normalised(module, x), real_parameters(module, params), free)
 

@@ -67,7 +67,7 @@ def held_rows(place: Place, selection: Selection) -> Held:
     metadata = place.module.metadata
     n_u = place.sizes[1]
     coordinates, speeds = held_indices(place, selection)
-    parts, n_x, n_in = place.parts, len(metadata["x"]), len(metadata["inputs"])
+    parts, n_x, n_in = place.parts, len(metadata.x), len(metadata.inputs)
     first, second = (np.arange(s.start, s.stop)[coordinates] for s in (parts["q_dot"], parts["q_ddot"]))
     positions = place.N[coordinates]
     by_x, by_in = (np.zeros((len(speeds), n)) for n in (n_x, n_in))
@@ -87,12 +87,12 @@ def held_indices(place: Place, selection: Selection) -> tuple[list[int], list[in
     coordinates: list[int] = []
     speeds: list[int] = []
     for name in selection.held:
-        if name in metadata["q"]:
-            coordinates.append(metadata["q"].index(name))
-        elif name in metadata["u"]:
-            k = metadata["u"].index(name)
-            if labels[k] in metadata["q"]:
-                coordinates.append(metadata["q"].index(labels[k]))
+        if name in metadata.q:
+            coordinates.append(metadata.q.index(name))
+        elif name in metadata.u:
+            k = metadata.u.index(name)
+            if labels[k] in metadata.q:
+                coordinates.append(metadata.q.index(labels[k]))
             else:
                 speeds.append(k)
     return list(dict.fromkeys(coordinates)), speeds
@@ -114,7 +114,7 @@ class Manifold:
                  independent: Sequence[int] | tuple[Sequence[int], Sequence[int]] | None = None,
                  partition: tuple[Sequence[int], Sequence[int]] | None = None) -> None:
         self.place, self.selection = place, selection
-        following = [*place.module.metadata.get("implicit_loads", ()), *place.module.metadata.get("of_reactions", ())]
+        following = [*place.module.metadata.implicit_loads, *place.module.metadata.of_reactions]
         if following and selection.held:
             raise ArgumentError(f"{place.module.name}: {', '.join(selection.held)} held, where {', '.join(following)} "
                                 f"{'depends' if len(following) == 1 else 'depend'} on reactions, which what is held would "
@@ -122,7 +122,7 @@ class Manifold:
         self.held = held_rows(place, selection)
         self.states = selection.free_states
         n_c = place.sizes[3]
-        self._holonomic = np.array(place.module.metadata.get("holonomic") or [True] * n_c, dtype=bool)[:n_c]
+        self._holonomic = np.array(place.module.metadata.holonomic or [True] * n_c, dtype=bool)[:n_c]
         self.P = np.vstack([place.C_r[self._holonomic], self.held.positions])
         self.S = np.vstack([place.C_r, self.held.speeds])
         if isinstance(independent, tuple):
@@ -172,12 +172,12 @@ class Manifold:
     @property
     def speed_labels(self) -> tuple[str, ...]:
         """Names of the independent speeds."""
-        return tuple(self.place.module.metadata["u"][k] for k in self.speeds)
+        return tuple(self.place.module.metadata.u[k] for k in self.speeds)
 
     @property
     def state_labels(self) -> tuple[str, ...]:
         """Names of the extra states that are free."""
-        return tuple(self.place.module.metadata["z"][k] for k in self.states)
+        return tuple(self.place.module.metadata.z[k] for k in self.states)
 
     @property
     def second_order(self) -> bool:
@@ -248,8 +248,8 @@ class Manifold:
         n_u = place.sizes[1]
         result = np.zeros((n_u, n_u))
         metadata = place.module.metadata
-        turned = [n for n in self.selection.held if n in metadata["q"]
-                  and np.abs(np.sort(np.abs(place.N[metadata["q"].index(n)]))[:-1]).max(initial=0.0) > UNIT_ROW]
+        turned = [n for n in self.selection.held if n in metadata.q
+                  and np.abs(np.sort(np.abs(place.N[metadata.q.index(n)]))[:-1]).max(initial=0.0) > UNIT_ROW]
         if not turned:
             return result
         reaction = np.linalg.lstsq(self.held.speeds.T, -place.forces, rcond=1e-12)[0]
@@ -258,8 +258,8 @@ class Manifold:
             pushed = place.at(ud=place.ud + np.eye(n_u)[j]).whole_x[place.parts["q_ddot"], :place.sizes[0]]
             change = (pushed - base) @ place.N
             for name in turned:
-                k = metadata["q"].index(name)
-                row = list(dict.fromkeys(n for n in self.selection.held if n in metadata["q"])).index(name)
+                k = metadata.q.index(name)
+                row = list(dict.fromkeys(n for n in self.selection.held if n in metadata.q)).index(name)
                 result[j] += reaction[row] * change[k]
         return result
 
@@ -279,7 +279,7 @@ class Manifold:
         """Raises ArgumentError where a motion moves what the constraints hold fast, so that there are no B and D."""
         if self._unfollowed.any():
             metadata = self.place.module.metadata
-            told = ", ".join(n for n, lost in zip(metadata["inputs"], self._unfollowed, strict=True) if lost)
+            told = ", ".join(n for n, lost in zip(metadata.inputs, self._unfollowed, strict=True) if lost)
             raise ArgumentError(f"{self.place.module.name}: B and D are requested where the constraints do not let the mechanism "
                                 f"follow changes of {told}, to first order: the position is singular, or the constraints and "
                                 "what is held leave nothing to follow by; move away from there, or hold less")
@@ -288,11 +288,11 @@ class Manifold:
         """C_out (n_y, m) and D (n_y, n_in); accelerations in outputs are those of the constrained motion, what is held held."""
         place = self.place
         metadata = place.module.metadata
-        if not metadata["outputs"]:
+        if not metadata.outputs:
             return np.zeros((0, self.n_d + self.n_s + len(self.states))), np.zeros((0, self.F_in.shape[1]))
-        by_x = place.variations(metadata["x"], "outputs_variation")
-        by_in = place.variations(metadata["inputs"], "outputs_variation")
-        by_ud = place.variations([f"{u}_dot" for u in metadata["u"]], "outputs_variation")
+        by_x = place.variations(metadata.x, "outputs_variation")
+        by_in = place.variations(metadata.inputs, "outputs_variation")
+        by_ud = place.variations([f"{u}_dot" for u in metadata.u], "outputs_variation")
         inverse = _factorized(self.M, place.module.name)
         accelerations = [self.Z_u @ -inverse(pull) + demanded
                          for pull, demanded in zip((self.K, self.C, self.K_z), self.demanded, strict=True)]
@@ -406,7 +406,7 @@ def _basis(place: Place, rows: np.ndarray, independent: Sequence[int] | None,
         pool = list(range(len(Z))) if among is None else list(among)
         order = scipy.linalg.qr((Z[pool] * weights[pool, None]).T, mode="r", pivoting=True)[1][:Z.shape[1]].tolist()
         independent = sorted(pool[k] for k in order)
-    names = [place.module.metadata["u"][k] for k in independent]
+    names = [place.module.metadata.u[k] for k in independent]
     if len(independent) != Z.shape[1]:
         raise ArgumentError(f"{place.module.name}: there are {Z.shape[1]} independent velocities here, but {len(names)} are "
                             f"named: {', '.join(names) or 'none'}")
@@ -455,13 +455,13 @@ def in_motion(place: Place, selection: Selection) -> Place:
     rows, right = [place.C_r], [place.evaluate("F_d") * place.scale if n_c else np.zeros(0)]
     drift = place.balance[place.parts["q_ddot"]]
     for name in selection.held:
-        label = labels[metadata["u"].index(name)] if name in metadata["u"] and name not in metadata["q"] else name
-        if label in metadata["q"]:
-            k = metadata["q"].index(label)
+        label = labels[metadata.u.index(name)] if name in metadata.u and name not in metadata.q else name
+        if label in metadata.q:
+            k = metadata.q.index(label)
             rows.append(place.N[k:k + 1])
             right.append(-drift[k:k + 1])
-        elif name in metadata["u"]:
-            rows.append(np.eye(n_u)[[metadata["u"].index(name)]])
+        elif name in metadata.u:
+            rows.append(np.eye(n_u)[[metadata.u.index(name)]])
             right.append(np.zeros(1))
     masses = np.abs(np.diag(place.M))
     scale = 1 / np.sqrt(np.maximum(masses, MASSLESS * masses.max(initial=1e-300)))

@@ -224,18 +224,18 @@ def steady(start: Steady) -> tuple[Steady, Averaged]:
 def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, blades: Sequence[Sequence[str]]) -> Rotor:
     """The rotor with these names. Raises ArgumentError for what cannot be seen from the fixed frame."""
     metadata, owner = module.metadata, module.name
-    if metadata.get("constraints") or metadata["z"]:
+    if metadata.constraints or metadata.z:
         raise ArgumentError(f"{owner}: multi-blade coordinates are for systems without constraints and extra states; derive "
                             "it in relative coordinates, or leave blades out")
     labels = list(coordinate_names(metadata))
-    free = tuple(k for k, (label, u) in enumerate(zip(labels, metadata["u"], strict=True))
+    free = tuple(k for k, (label, u) in enumerate(zip(labels, metadata.u, strict=True))
                  if label not in selection.kept and u not in selection.kept)
     faults = []
     groups = []
     for group in blades:
         if len(group) < 3:
             faults.append(f"{len(group)} blades ({', '.join(group)}) are named; multi-blade coordinates need at least 3")
-        for name in (n for n in group if n not in metadata["q"] or n not in labels):
+        for name in (n for n in group if n not in metadata.q or n not in labels):
             faults.append(f"{name} is no coordinate whose rate is a speed")
         for name in (n for n in group if n in labels and labels.index(n) not in free):
             faults.append(f"{name} is kept, but a coordinate of a blade has to be free")
@@ -245,5 +245,5 @@ def rotor_of(module: Module, selection: Selection, speed: str, azimuth: str, bla
         faults.append("a coordinate is named for two blades")
     if faults:
         raise ArgumentError(f"{owner}: blades: {'; '.join(faults)}")
-    coordinates = tuple(metadata["q"].index(labels[k]) for k in flat)
-    return Rotor(module, metadata["u"].index(speed), metadata["q"].index(azimuth), tuple(groups), coordinates, free)
+    coordinates = tuple(metadata.q.index(labels[k]) for k in flat)
+    return Rotor(module, metadata.u.index(speed), metadata.q.index(azimuth), tuple(groups), coordinates, free)

@@ -146,7 +146,7 @@ def rounded(place: Place, stream: np.random.Generator) -> Place:
 
     x = near(place.x)
     q = place.q
-    units = [place.module.metadata["units"].get(n) for n in place.module.metadata["q"]]
+    units = [place.module.metadata.units.get(n) for n in place.module.metadata.q]
     sizes = np.where([unit == "m" for unit in units], natural_length(place), 1.0)
     x[:len(q)] += np.where(q != 0, sizes, 0.0) * EPSILON * stream.uniform(-1, 1, len(q))
     return place.at(x=x, p=near(place.p), inputs=near(place.inputs))

@@ -60,7 +60,7 @@ class Regulator:
 
     def __call__(self, t: float, x: Any) -> np.ndarray:
         found: np.ndarray = self.linear.inputs.copy()
-        names = self.linear.module.metadata["inputs"]
+        names = self.linear.module.metadata.inputs
         found[[names.index(n) for n in self.driven]] -= np.asarray(self.K) @ self.linear.deviation(t, x)
         return found
 
@@ -72,7 +72,7 @@ class Regulator:
         if wrong:
             raise ArgumentError(f"{self.linear.module.name}: the regulator does not drive {', '.join(map(shown, wrong))}; it "
                                 f"drives {', '.join(self.driven)}")
-        places = [self.linear.module.metadata["inputs"].index(n) for n in wanted]
+        places = [self.linear.module.metadata.inputs.index(n) for n in wanted]
         index: Any = places if isinstance(inputs, tuple) else places[0]
         return lambda t, x: self(t, x)[index]
 
@@ -90,7 +90,7 @@ class Regulator:
 def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
     """See Linearization.lqr."""
     module = linear.module
-    owner, inputs = module.name, tuple(module.metadata["inputs"])
+    owner, inputs = module.name, tuple(module.metadata.inputs)
     if not inputs:
         raise ArgumentError(f"{owner}: a regulator was requested, but the system has no inputs; add loads with sd.inputs(...)")
     free = tuple(n for n in inputs if n not in motion_inputs(module.metadata))

@@ -150,7 +150,7 @@ class Search:
         place, names = trial.place, self.module.metadata
         n_u = place.sizes[1]
         values = np.concatenate([place.p, place.inputs])
-        by = place.by([*names["parameters"], *names["inputs"]])[:n_u]
+        by = place.by([*names.parameters, *names.inputs])[:n_u]
         acting = np.abs(by) @ np.abs(values)
         if place.sizes[3]:
             acting += np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
@@ -273,9 +273,9 @@ class Search:
             x[start + k] += change
         p, inputs = place.p.copy(), place.inputs.copy()
         for k, name in enumerate(selection.parameters):
-            p[names["parameters"].index(name)] += step[n + n_z + k]
+            p[names.parameters.index(name)] += step[n + n_z + k]
         for k, name in enumerate(selection.inputs):
-            inputs[names["inputs"].index(name)] += step[n + n_z + len(selection.parameters) + k]
+            inputs[names.inputs.index(name)] += step[n + n_z + len(selection.parameters) + k]
         new = Trial(place.at(x=x, p=p, inputs=inputs), selection)
         try:
             new = self._closed(new).with_multipliers(self.weights[:self.n_e])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -50,12 +50,12 @@ class Selection:
     @cached_property
     def free_states(self) -> list[int]:
         """Places of the extra states that are not held."""
-        return [k for k, name in enumerate(self.module.metadata["z"]) if name not in self.held]
+        return [k for k, name in enumerate(self.module.metadata.z) if name not in self.held]
 
     @cached_property
     def states(self) -> list[int]:
         """Places of the extra states that are free."""
-        return [k for k, name in enumerate(self.module.metadata["z"]) if name not in self.kept]
+        return [k for k, name in enumerate(self.module.metadata.z) if name not in self.kept]
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -64,19 +64,19 @@ class Selection:
     def amounts(self, place: Place) -> np.ndarray:
         """The values of what is solved for, (n,)."""
         metadata = self.module.metadata
-        return np.array([*[place.p[metadata["parameters"].index(n)] for n in self.parameters],
-                         *[place.inputs[metadata["inputs"].index(n)] for n in self.inputs]])
+        return np.array([*[place.p[metadata.parameters.index(n)] for n in self.parameters],
+                         *[place.inputs[metadata.inputs.index(n)] for n in self.inputs]])
 
     def rows(self, place: Place, equations: bool = False) -> np.ndarray:
         """R with R v = 0 for what stays, (n, n_u); equations: only for those whose equations do not hold."""
         metadata = self.module.metadata
-        n_u = len(metadata["u"])
+        n_u = len(metadata.u)
         named: dict[str, np.ndarray] = {}
         for name in self.kept:
-            if name in metadata["q"]:
-                named[name] = place.N[metadata["q"].index(name)]
-            elif name in metadata["u"]:
-                named[name] = np.eye(n_u)[metadata["u"].index(name)]
+            if name in metadata.q:
+                named[name] = place.N[metadata.q.index(name)]
+            elif name in metadata.u:
+                named[name] = np.eye(n_u)[metadata.u.index(name)]
         held = [named[name] for name in self.conditions if equations and name in named]
         rows = [row for name, row in named.items()
                 if not (equations and (name in self.conditions or any(_same(row, h) for h in held)))]
@@ -92,7 +92,7 @@ class Selection:
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """The state with given values."""
-        names = self.module.metadata["x"]
+        names = self.module.metadata.x
         x = x.copy()
         for name, value in self.values.items():
             x[names.index(name)] = value
@@ -102,25 +102,25 @@ class Selection:
 def select(module: Module, free: Any, fixed: Any, unknown: Any) -> Selection:
     """The selection from what a user names; see Module.equilibrium. Raises ArgumentError with what does not fit."""
     metadata, owner = module.metadata, module.name
-    owners = {**dict.fromkeys(metadata["parameters"], "parameter"), **dict.fromkeys(metadata["inputs"], "input"),
-              **dict.fromkeys(metadata["x"], "state")}
+    owners = {**dict.fromkeys(metadata.parameters, "parameter"), **dict.fromkeys(metadata.inputs, "input"),
+              **dict.fromkeys(metadata.x, "state")}
     named = None if free is None else listed(free, owners, "free", owner)
     if named == []:
         raise ArgumentError(f"{owner}: free names nothing; name what is to be found, or leave it out for all coordinates")
     more = listed(unknown, {n: k for n, k in owners.items() if k != "state"}, "unknown_params", owner)
-    values = {} if fixed is None else _numbers(fixed, metadata["x"], owner)
+    values = {} if fixed is None else _numbers(fixed, metadata.x, owner)
     solved = list(dict.fromkeys([*(n for n in named or () if owners[n] != "state"), *more]))
     moving = None if named is None else [n for n in named if owners[n] == "state"]
     kept = set(values)
     if moving:
-        wrong = [n for n in moving if n in metadata["u"] and n not in metadata["q"]]
+        wrong = [n for n in moving if n in metadata.u and n not in metadata.q]
         if wrong:
             raise ArgumentError(f"{owner}: free names the speeds {', '.join(wrong)}; name coordinates, and give speeds their "
                                 "values in fixed")
         if not (solved and set(moving) <= set(values)):  # conditions alone leave the others free
-            kept |= {n for n in metadata["q"] if n not in moving}
+            kept |= {n for n in metadata.q if n not in moving}
     conditions, candidates = _conditions(module, solved, values, moving or ())
-    order = [n for n in metadata["x"] if n in kept]
+    order = [n for n in metadata.x if n in kept]
     return Selection(module, tuple(order), values, tuple(n for n in solved if owners[n] == "parameter"),
                      tuple(n for n in solved if owners[n] == "input"), tuple(conditions), tuple(candidates))
 
@@ -129,7 +129,7 @@ def holding(selection: Selection, hold: Any) -> Selection:
     """The selection with what is held when the state is disturbed, by name or symbol; None: what stays, but for conditions."""
     if hold is None:
         return selection
-    return replace(selection, holding=tuple(dict.fromkeys(listed(hold, selection.module.metadata["x"], "hold",
+    return replace(selection, holding=tuple(dict.fromkeys(listed(hold, selection.module.metadata.x, "hold",
                                                                  selection.module.name))))
 
 
@@ -142,7 +142,7 @@ def _conditions(module: Module, solved: list[str], values: Mapping[str, float], 
             raise ArgumentError(f"{module.name}: {', '.join(both)} is both free and fixed; leave it out of one of them, or name "
                                 "in free the parameter that makes it take its value")
         return [], []
-    coordinates = [n for n in values if n in module.metadata["q"]]
+    coordinates = [n for n in values if n in module.metadata.q]
     for candidates in ([n for n in values if n in free], coordinates, list(values)):
         if len(candidates) == len(solved):
             return candidates, []
@@ -153,7 +153,7 @@ def _conditions(module: Module, solved: list[str], values: Mapping[str, float], 
                         "for each")
 
 
-def _numbers(fixed: Any, names: list[str], owner: str) -> dict[str, float]:
+def _numbers(fixed: Any, names: Sequence[str], owner: str) -> dict[str, float]:
     if not isinstance(fixed, Mapping):
         raise ArgumentError(f"{owner}: fixed must be a mapping from coordinates and speeds to numbers, found {shown(fixed)}")
     array = take(fixed, names, "fixed", dict.fromkeys(names, 0.0), owner)

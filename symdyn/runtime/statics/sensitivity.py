@@ -59,8 +59,8 @@ def shift(place: Place, selection: Selection, parameter: str) -> dict[str, float
     found = np.linalg.lstsq(whole / rows[:, None] / columns, -right / rows, rcond=1e-13)[0] / columns
     n = trial.directions.shape[1]
     parts = np.split(found, np.cumsum([n, len(selection.states), len(selection.unknown)]))
-    changes = dict(zip(metadata["q"], place.N @ trial.directions @ parts[0], strict=True))
-    changes |= {metadata["z"][k]: v for k, v in zip(selection.states, parts[1], strict=True)}
+    changes = dict(zip(metadata.q, place.N @ trial.directions @ parts[0], strict=True))
+    changes |= {metadata.z[k]: v for k, v in zip(selection.states, parts[1], strict=True)}
     changes |= dict(zip(selection.unknown, parts[2], strict=True))
     changes |= {multiplier(k): v for k, v in enumerate(parts[3] * place.scale)}
     return {name: float(v) for name, v in changes.items() if v}
@@ -118,6 +118,6 @@ def second(place: Place, changes: Mapping[str, float], v: np.ndarray, u: np.ndar
     """Derivative of the statics along (v, u, ud, z, lam), differentiated along `changes` of what is named, (n_u + n_c + n_z,)."""
     names = place.module.metadata
     vary = {f"{group} {name}": value for group, values, of in (("v", v, "u"), ("u", u, "u"), ("ud", ud, "u"), ("z", z, "z"))
-            for name, value in zip(names[of], values, strict=True)}
+            for name, value in zip(names.names(of), values, strict=True)}
     vary |= {multiplier(k): value for k, value in enumerate(lam)}
     return place.along("second_variation", vary=vary, along=dict(changes))

@@ -105,7 +105,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
             raise ArgumentError(f"{module.name}: {', '.join(given)} given with an equilibrium, which has its own; leave them out")
         selection = holding(at.selection, hold)
         return of_manifold(Manifold(in_motion(at.place, selection), selection), period)
-    speeds = {name_of(k) for k in fixed} & set(module.metadata["u"]) if isinstance(fixed, Mapping) else set()
+    speeds = {name_of(k) for k in fixed} & set(module.metadata.u) if isinstance(fixed, Mapping) else set()
     if start is not None and period is None and not speeds:
         rest = equilibrium(module, free, fixed, start, params, t, inputs)
         return of_manifold(Manifold(in_motion(rest.place, holding(rest.selection, hold)), holding(rest.selection, hold)))
@@ -121,7 +121,7 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
 def _still(module: Module) -> dict[str, float]:
     """The initial values with speeds zero: where a search for a motion with prescribed speeds begins."""
     metadata = module.metadata
-    return {n: 0.0 if n in metadata["u"] and n not in metadata["q"] else metadata["initial"].get(n, 0.0) for n in metadata["x"]}
+    return {n: 0.0 if n in metadata.u and n not in metadata.q else metadata.initial.get(n, 0.0) for n in metadata.x}
 
 
 def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool = False) -> Stability:
@@ -308,9 +308,9 @@ def found_period(manifold: Manifold) -> float | None:
     place = manifold.place
     metadata = place.module.metadata
     labels = coordinate_names(metadata)
-    turning = {name: abs(float(u)) for u, name, label in zip(place.u, metadata["u"], labels, strict=True)
-               if u and metadata["units"].get(label, metadata["units"].get(name)) in ("rad", "rad/s")}
-    held = [speed for (name, speed), label in ((each, labels[metadata["u"].index(each[0])]) for each in turning.items())
+    turning = {name: abs(float(u)) for u, name, label in zip(place.u, metadata.u, labels, strict=True)
+               if u and metadata.units.get(label, metadata.units.get(name)) in ("rad", "rad/s")}
+    held = [speed for (name, speed), label in ((each, labels[metadata.u.index(each[0])]) for each in turning.items())
             if name in manifold.selection.held or label in manifold.selection.held]
     if held:
         return common_period(held)

@@ -83,7 +83,7 @@ def accelerating(place: Place, manifold: Manifold) -> str:
     """The largest acceleration, or rate of an extra state, that is more than rounding of what single loads make; "" if
     none."""
     metadata = place.module.metadata
-    names = [*metadata["parameters"], *metadata["inputs"]]
+    names = [*metadata.parameters, *metadata.inputs]
     values = np.concatenate([place.p, place.inputs])
     by = np.abs(place.by(names)) @ np.abs(values)
     acting = by[place.parts["forces"]]
@@ -96,13 +96,13 @@ def accelerating(place: Place, manifold: Manifold) -> str:
     sizes = np.abs(place.ud / natural_scales(place))
     if sizes.max(initial=0.0) > STILL * level:
         k = int(np.argmax(sizes))
-        return f"{metadata['u'][k]} changes by {place.ud[k]:.4g} a second"
+        return f"{metadata.u[k]} changes by {place.ud[k]:.4g} a second"
     rates = np.abs(place.rates_z)
     of_z = np.abs(place.by_z[place.parts["z_dot"]])
     allowed = STILL * (by[place.parts["z_dot"]] + of_z @ np.abs(place.z)) + ROUNDING * of_z.sum(axis=1)
     for k in manifold.states:
         if rates[k] > allowed[k]:
-            return f"{metadata['z'][k]} changes by {place.rates_z[k]:.4g} a second"
+            return f"{metadata.z[k]} changes by {place.rates_z[k]:.4g} a second"
     return ""
 
 
@@ -138,7 +138,7 @@ def fastest(place: Place) -> float:
 
 def depends_on_time(place: Place) -> bool:
     """Whether t is an argument of the equations."""
-    return "t" in place.module.unit("balance").metadata["arguments"].get("balance", ())
+    return "t" in place.module.unit("balance").metadata.arguments.get("balance", ())
 
 
 def _difference(a: Manifold, b: Manifold, slowest: float) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.metadata import ModuleMetadata
 from symdyn.runtime.arguments import fixed
 from symdyn.runtime.constraints import names as constraint_names
 from symdyn.runtime.following import RATES
@@ -52,16 +53,16 @@ class Place:
     @property
     def motion_rates(self) -> dict[str, float]:
         """Rates and accelerations of motions that inputs follow, by name, as far as they are not zero."""
-        names = self.module.metadata["inputs"]
-        rates = [f"{motion}{end}" for motion in self.module.metadata.get("motions", ()) for end in RATES]
+        names = self.module.metadata.inputs
+        rates = [f"{motion}{end}" for motion in self.module.metadata.motions for end in RATES]
         values = {name: float(self.inputs[names.index(name)]) for name in rates}
         return {name: value for name, value in values.items() if value != 0}
 
     @property
     def sizes(self) -> tuple[int, int, int, int]:
         """n_q, n_u, n_z, n_c."""
-        sizes = self.module.metadata["sizes"]
-        return sizes["q"], sizes["u"], sizes["z"], len(constraint_names(self.module))
+        sizes = self.module.metadata.sizes
+        return sizes.q, sizes.u, sizes.z, len(constraint_names(self.module))
 
     @property
     def q(self) -> np.ndarray:
@@ -89,7 +90,7 @@ class Place:
         """
         given = {f"({kind} {key})": value for kind, entries in groups.items() for key, value in entries.items()}
         given |= self._given_rates()
-        ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata["ud"]]
+        ud = [given.get(n, 0.0) for n in self.module.unit(name).metadata.ud]
         return self.module.evaluate(name, self.t, self.x, self.p, self.inputs, ud)
 
     def by(self, names: Sequence[str]) -> np.ndarray:
@@ -101,7 +102,7 @@ class Place:
 
         Names are those of coordinates, speeds, states, inputs, parameters, accelerations ("u_dot") and multipliers.
         """
-        about = self.module.unit(function).metadata["ud"]
+        about = self.module.unit(function).metadata.ud
         given = self._given_rates()
         rows = np.tile([given.get(n, 0.0) for n in about], (len(names), 1))
         for row, name in zip(rows, names, strict=True):
@@ -127,7 +128,7 @@ class Place:
 
     def _given_rates(self) -> dict[str, float]:
         """Accelerations and multipliers by the names that generated code has for them."""
-        return {**dict(zip([f"{u}_dot" for u in self.module.metadata["u"]], self.ud, strict=True)),
+        return {**dict(zip([f"{u}_dot" for u in self.module.metadata.u], self.ud, strict=True)),
                 **{multiplier(k): value for k, value in enumerate(self.lam)}}
 
     # -- the balance and its parts
@@ -152,12 +153,12 @@ class Place:
     @cached_property
     def whole_x(self) -> np.ndarray:
         """Derivatives of the balance by x, (rows, n_x)."""
-        return self.variations(self.module.metadata["x"])
+        return self.variations(self.module.metadata.x)
 
     @cached_property
     def whole_inputs(self) -> np.ndarray:
         """Derivatives of the balance by the inputs, (rows, n_in)."""
-        return self.variations(self.module.metadata["inputs"])
+        return self.variations(self.module.metadata.inputs)
 
     @property
     def balance_x(self) -> np.ndarray:
@@ -212,8 +213,8 @@ class Place:
     def moved(self, v: np.ndarray) -> np.ndarray:
         """The coordinates after the velocities v (n_u,) for a unit of time, unit vectors of length 1."""
         q = self.q + self.N @ v
-        for group in self.module.metadata.get("unit_groups", ()):
-            places = [self.module.metadata["q"].index(name) for name in group]
+        for group in self.module.metadata.unit_groups:
+            places = [self.module.metadata.q.index(name) for name in group]
             q[places] /= np.linalg.norm(q[places])
         return q
 
@@ -225,7 +226,7 @@ def multiplier(k: int) -> str:
 
 def rest(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> Place:
     """A place without accelerations and multipliers."""
-    return Place(module, t, x, p, inputs, np.zeros(module.metadata["sizes"]["u"]), np.zeros(len(constraint_names(module))))
+    return Place(module, t, x, p, inputs, np.zeros(module.metadata.sizes.u), np.zeros(len(constraint_names(module))))
 
 
 def null_space(A: np.ndarray, tolerance: float = RANK) -> np.ndarray:
@@ -244,6 +245,6 @@ def null_space(A: np.ndarray, tolerance: float = RANK) -> np.ndarray:
     return basis
 
 
-def coordinate_names(metadata: Any) -> tuple[str, ...]:
+def coordinate_names(metadata: ModuleMetadata) -> tuple[str, ...]:
     """Names of what moves along each speed: its coordinate, or the speed if it is not the rate of one."""
-    return tuple(u.removesuffix("_dot") if u.removesuffix("_dot") in metadata["q"] else u for u in metadata["u"])
+    return tuple(u.removesuffix("_dot") if u.removesuffix("_dot") in metadata.q else u for u in metadata.u)

@@ -33,7 +33,7 @@ def demand_stiffness(search: Search) -> None:
     lost: list[str] = []
     if trial.selection.conditions or drifting:  # all unknowns take part, as many as equations, seen by the scaled derivative
         J = search.scaled(trial)[1]
-        labels = [*_direction_names(trial), *[module.metadata["z"][k] for k in states], *trial.selection.unknown]
+        labels = [*_direction_names(trial), *[module.metadata.z[k] for k in states], *trial.selection.unknown]
         _, values, Vt = np.linalg.svd(J)
         loose = Vt[len(values):] if len(values) < J.shape[1] else Vt[values <= LEAST * values.max(initial=0.0)]
         if not trial.selection.conditions:  # extra states that nothing brings back may be anything
@@ -101,7 +101,7 @@ def _lost(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, leader:
     found = [each for each in (_contribution(place, states, u, v, k) for k in range(len(place.p) + len(place.inputs))) if each]
     if not found:
         return ""
-    unit = _STIFFNESSES.get(place.module.metadata["units"].get(place.module.metadata["u"][leader], ""), "(N, m)")
+    unit = _STIFFNESSES.get(place.module.metadata.units.get(place.module.metadata.u[leader], ""), "(N, m)")
     by = abs(u[leader] * v[leader]) or float(np.abs(u).max() * np.abs(v).max())
     most, together = max(abs(each) for each in found) / by, abs(sum(found)) / by
     return (f"loads make a stiffness of {together:.3g} {unit} in sums of terms of {max(terms / by, most):.3g} {unit}, known to "
@@ -122,7 +122,7 @@ def _lost_in_trim(search: Search, direction: np.ndarray) -> str:
 def _contribution(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, k: int) -> float:
     """What the load of parameter (or input) k contributes to u^T K v, with its part in the multipliers; 0 within rounding."""
     metadata = place.module.metadata
-    name = (*metadata["parameters"], *metadata["inputs"])[k]
+    name = (*metadata.parameters, *metadata.inputs)[k]
     value = float(np.concatenate([place.p, place.inputs])[k])
     _, n_u, n_z, n_c = place.sizes
     if not value:

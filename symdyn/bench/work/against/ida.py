@@ -39,7 +39,7 @@ class Ida:
             raise Unfit("it has no constraints; CVODE is SUNDIALS' program for it")
         module = equations.compile(backend="c")
         inputs = [*sundials.constant_inputs(equations).values()]
-        if int(module.rank(x0[:module.metadata["sizes"]["q"]], params)) < n_c:
+        if int(module.rank(x0[:module.metadata.sizes.q], params)) < n_c:
             raise Unfit("its constraints depend on each other, and IDA needs independent ones")
         lam = module.evaluate("lam", 0.0, x0, params, inputs)
         y0 = np.concatenate([x0, np.zeros(2 * n_c)])

@@ -145,15 +145,15 @@ class Sundials:
 
     def _compile(self, equations: Any, functions: Sequence[str], params: np.ndarray) -> None:
         source = emit(equations, "c", functions, standalone=False, integrator=False)
-        sizes = source.metadata["sizes"]
-        places = {"t": "t", "q": "x", "u": f"x + {sizes['q']}", "z": f"x + {sizes['q'] + sizes['u']}", "ud": "rates",
+        sizes = source.metadata.sizes
+        places = {"t": "t", "q": "x", "u": f"x + {sizes.q}", "z": f"x + {sizes.q + sizes.u}", "ud": "rates",
                   "inputs": "frame->inputs", "p": "frame->p", "c": "frame->c"}
         calls = {f.name: ", ".join(places[g] for g in f.arguments) for f in source.program.functions}
-        n = source.metadata["shapes"][functions[0]][0]
+        n = source.metadata.shapes[functions[0]][0]
         text = next(iter(source.files.values())) + "".join(_TEXTS[f] if k else _HEAD + _TEXTS[f] for k, f in enumerate(
-            functions)).format(name=source.metadata["name"], n=n, n_x=sizes["x"], **calls)
+            functions)).format(name=source.metadata.name, n=n, n_x=sizes.x, **calls)
         self.unit = CUnit(text, source.metadata, require_compiler())
-        self.p, self.c = np.zeros(max(1, sizes["p"])), np.zeros(max(1, source.metadata["n_c"]))
+        self.p, self.c = np.zeros(max(1, sizes.p)), np.zeros(max(1, source.metadata.n_c))
         self.p[:len(params)] = params
         self.unit.prologue(self.p, self.c)
         self.inputs = np.array([*constant_inputs(equations).values(), 0.0])

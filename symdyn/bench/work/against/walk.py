@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 
 from symdyn.bench.work.against.peer import Unfit
-from symdyn.pipeline import function_tape
+from symdyn.functions.tapes import function_tape
 from symdyn.tape.evaluate import functions_of
 from symdyn.tape.node import Node
 from symdyn.tape.tape import reachable

@@ -1,0 +1,36 @@
+"""What a right-hand side is made with, when it is more than the function `rhs`: what identifies the library that holds it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+# The method of the integrator that is compiled with a right-hand side where none is chosen.
+METHOD = "dop853"
+
+
+@dataclass(frozen=True)
+class RightSide:
+    """A right-hand side with its integrator.
+
+    work        whether one more state integrates the work of all loads but gravity and springs
+    baumgarte   whether it is stabilized by Baumgarte's method, with one more parameter: its gain, 1/s
+    method      of the integrator, one of symdyn.backend.methods.METHODS
+    """
+
+    work: bool = False
+    baumgarte: bool = False
+    method: str = METHOD
+
+    @property
+    def label(self) -> str:
+        """Plain words for messages."""
+        parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte))
+        added = [text for text, there in parts if there]
+        return ("rhs" + (f" with {' and '.join(added)}" if added else "")
+                + (f" and the method {self.method}" if self.method != METHOD else ""))
+
+
+def key_of(what: str | RightSide) -> str:
+    """A text that identifies what a library is made for, as a name in files."""
+    return what if isinstance(what, str) else json.dumps(asdict(what), sort_keys=True)

@@ -1,0 +1,112 @@
+"""What is emitted: from equations and names of functions to the tapes, names, units and records that a backend takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from symdyn.backend.metadata import Chart, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
+from symdyn.backend.right_side import RightSide
+from symdyn.backend.source import Content
+from symdyn.formulation.constrained import BAUMGARTE
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns
+from symdyn.formulation.skipped import skipped
+from symdyn.functions.table import FUNCTIONS, title_of
+from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
+from symdyn.model.symbols import GivenMotion
+from symdyn.shown import name_of
+from symdyn.tape.balance import balance
+from symdyn.tape.jumps import description
+from symdyn.tape.node import Node
+from symdyn.tape.passes import specialize
+from symdyn.tape.tape import Tape
+from symdyn.tape.taylor import not_smooth
+
+# The extra state of a simulation that integrates the work of the loads.
+WORK = "(work)"
+
+
+def content_of(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
+               right_side: RightSide) -> Content:
+    """What a backend takes to emit the named functions.
+
+    standalone   with what is documented in a file that is written
+    bound        parameters that become numbers in the code, by name
+    """
+    symbols = equations.symbols
+    tapes = tapes_of(equations, names, right_side)
+    if equations.otherwise is not None:
+        there = tapes_of(equations.otherwise, names, right_side)
+        differ = {n: t for n, t in there.items() if _entries(t) != _entries(tapes[n])}
+        tapes |= {f"{n} otherwise": t for n, t in differ.items()}
+    if bound:
+        tapes = _together(tapes, lambda whole: specialize(whole, bound))
+    tapes = _together(tapes, balance)
+    otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
+    groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
+              "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work], "ud": given_rates(equations, names),
+              "inputs": [s.name for s in symbols.inputs],
+              "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte]}
+    outputs = output_shapes(equations) if "outputs" in names else ()
+    titles = {n: title_of(n, bool(equations.constraints)) for n in names}
+    return Content(equations.name, equations.formulation, tapes, titles, groups,
+                   {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
+                   _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
+                   [[q.name for q in group] for group in equations.unit_groups], otherwise,
+                   event_records(equations) if "events" in names else (), event_leaves(equations) if BOUNDS in names else ())
+
+
+def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
+    """What a module documents of its mechanism, with what the code of its right-hand side documents of itself."""
+    rates = tuple(given_rates(equations, ("rhs",)))
+    parts = {f.name: getattr(of_code, f.name) for f in fields(Metadata)} | {"ud": rates, "outputs": output_shapes(equations)}
+    return ModuleMetadata(
+        **parts, functions=tuple(n for n in FUNCTIONS if has_function(equations, n)),
+        conservative="power" in equations.quantities and not isinstance(equations.quantity("power").item(), Node),
+        duration=equations.symbols.duration, constraints=tuple(equations.constraints), holonomic=tuple(equations.holonomic),
+        unit_groups=tuple(tuple(q.name for q in group) for group in equations.unit_groups),
+        bodies=tuple(equations.bodies), planar=equations.planar,
+        masses={p.name: body for p, body in equations.symbols.masses.items()},
+        reactions=tuple(name for name, *_ in equations.joints),
+        reaction_bodies=tuple((parent, child) for _, parent, child, _ in equations.joints),
+        reaction_kinds=tuple(kind for *_, kind in equations.joints),
+        implicit_loads=tuple(equations.implicit_loads), of_reactions=tuple(equations.of_reactions),
+        motions=tuple(s.name for s in equations.symbols.inputs if isinstance(s, GivenMotion)),
+        events=event_records(equations), event_leaves=tuple(event_leaves(equations)),
+        charts=tuple(Chart(*chart) for chart in equations.charts),
+        watches=tuple(ValidityRange(w.label, w.least, w.most, w.message) for w in equations.watched()),
+        switches=tuple(JumpRecord(**description(jump, equations.printed_leaves())) for jump in switches(equations)),
+        not_smooth=not_smooth(equations.quantity("rhs").tolist()),
+        drawn=tuple(equations.drawn), flexible=tuple(equations.flexible), output_units=dict(equations.symbols.point_units))
+
+
+def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    """Names and shapes of the user's outputs."""
+    return tuple((q.removeprefix("output_"), tuple(equations.quantity(q).shape))
+                 for q in equations.quantities if q.startswith("output_"))
+
+
+def event_records(equations: Equations) -> tuple[EventRecord, ...]:
+    """Events as plain data."""
+    symbols = equations.symbols
+    places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
+    about = zip(equations.events, enclosed(equations), unknowns(equations), strict=True)
+    return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
+                             tuple(functions)) for e, can, (inputs, functions) in about)
+
+
+def _entries(tape: Tape) -> tuple[Any, ...]:
+    return next(iter(tape.outputs.values())).entries
+
+
+def _together(tapes: Mapping[str, Tape], change: Callable[[Tape], Tape]) -> dict[str, Tape]:
+    """A pass over all functions' tapes as one, so that they still share their steps."""
+    recorder = next(iter(tapes.values())).recorder
+    whole = change(Tape(recorder, {n: next(iter(t.outputs.values())) for n, t in tapes.items()}))
+    return {n: whole.prune((n,)) for n in tapes}
+
+
+def _by_name(values: Any) -> dict[str, float]:
+    return {name_of(key): float(value) for key, value in values.items()}

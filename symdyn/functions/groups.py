@@ -1,0 +1,65 @@
+"""Which functions are emitted together: into a file, or into one compiled library of a module."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from symdyn.backend.methods import method_of
+from symdyn.backend.right_side import RightSide
+from symdyn.backend.source import CORRECTIONS
+from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.event_bounds import BOUNDS, RANGES
+from symdyn.functions.table import CONSISTENCY, DERIVATIVES, FUNCTIONS, STANDARD, STATICS, VARIATIONS
+from symdyn.functions.tapes import has_function
+from symdyn.shown import shown
+
+# What constraints add to the standard functions; with the corrections the integrator keeps a motion on its manifold.
+OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
+# Many states of a right-hand side at once.
+BATCH = "rhs_batch"
+_OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
+
+
+def written(equations: Equations, functions: Sequence[str] | None, method: str | None) -> tuple[str, ...]:
+    """The functions that go into a file: those named, or the standard ones; with what the method of an integrator needs.
+
+    Raises SymdynError for what is no list of names, and for functions that the equations do not have.
+    """
+    if functions is None:
+        standard = (*STANDARD, *(OF_CONSTRAINTS if equations.constraints else ()))
+        names = tuple(n for n in standard if has_function(equations, n))
+    elif isinstance(functions, (list, tuple)) and functions and all(isinstance(n, str) for n in functions):
+        names = tuple(functions)
+    else:
+        raise SymdynError(f"{equations.name}: functions is {shown(functions)}; pass a list of names such as "
+                          "['rhs', 'mass_matrix']")
+    if method is not None and "rhs" in names:
+        names = tuple(dict.fromkeys((*names, *method_of(method).needs)))
+    unknown = [n for n in names if not has_function(equations, n)]
+    if unknown:
+        there = ", ".join(n for n in FUNCTIONS if has_function(equations, n))
+        raise SymdynError(f"{equations.name} has no function {', '.join(n[:80] for n in unknown)}; it has {there}")
+    return names
+
+
+def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...]:
+    """The functions in the library of a right-hand side and its integrator."""
+    names = ["rhs", *(CORRECTIONS if equations.constraints else ())]
+    if right_side == RightSide():  # evaluated in or after every simulation
+        names += [n for n in ("watches", "switches") if has_function(equations, n)]
+    return (*names, *(n for n in _OF_EVENTS if has_function(equations, n)))
+
+
+def with_function(equations: Equations, name: str) -> tuple[str, ...]:
+    """The functions in the library that is made when a function is first called."""
+    if name == BATCH:
+        return ("rhs",)
+    if name in STATICS:
+        return (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
+    return CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
+
+
+def seldom_called(name: str) -> bool:
+    """Whether a function is called so seldom that compiling it quickly counts for more than running it quickly."""
+    return name in STATICS or name in VARIATIONS or name in DERIVATIVES

@@ -1,0 +1,132 @@
+"""The functions of a module in one table: the quantity behind each, the shape of its result, what it says, what it needs.
+
+Shapes are in these letters: n_q coordinates, n_u speeds, n_z further states, n_x = n_q + n_u + n_z, n_in inputs, n_p parameters,
+n_c rows of constraints, n_b bodies, n_j joints, n_e events, d = 6 velocities of a body, in a plane 3. What has no shape here has
+one that the mechanism decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FunctionEntry:
+    """A function: title is what the header of generated code says; needs: what the mechanism must have, "" for nothing."""
+
+    quantity: str
+    shape: tuple[str, ...] | None
+    title: str
+    needs: str = ""
+
+
+def _entries(*rows: tuple[str, str, tuple[str, ...] | None, str, str]) -> dict[str, FunctionEntry]:
+    return {name: FunctionEntry(quantity, shape, title, needs) for name, quantity, shape, title, needs in rows}
+
+
+_BODIES, _CONSTRAINTS = "bodies and joints", "constraints"
+_ROW_OF_X, _ROW_OF_U, _ROW_OF_C = ("n_x",), ("n_u",), ("n_c",)
+
+FUNCTIONS = _entries(
+    ("rhs", "rhs", _ROW_OF_X, "x_dot = f(t, x) with x = [q; u; z]: M_tilde u_dot = F_tilde - k_tilde", ""),
+    ("mass_matrix", "M_tilde", ("n_u", "n_u"), "mass matrix M_tilde = J^T M J", ""),
+    ("k_tilde", "k_tilde", _ROW_OF_U, "k_tilde = J^T (M J_dot u + Q J u): Coriolis, centrifugal and gyroscopic terms", ""),
+    ("F_tilde", "F_tilde", _ROW_OF_U, "F_tilde = J^T F: generalized forces of loads and gravity", ""),
+    ("J", "J", None, "velocity transformation: [v_G; omega] of every body = J u, n-frame", ""),
+    ("energy", "energy", ("2",), "kinetic and potential energy, J", _BODIES),
+    ("inverse_dynamics", "inverse_dynamics", _ROW_OF_U, "tau = M_tilde u_dot + k_tilde - F_tilde for given accelerations ud", ""),
+    ("outputs", "outputs", None, "the named outputs, one after the other", "outputs"),
+    ("coriolis", "coriolis", ("n_u", "n_u"), "C with C u = k_tilde and M_tilde_dot - 2 C skew-symmetric", _BODIES),
+    ("gravity_load", "gravity_load", _ROW_OF_U, "forces along the speeds that hold the weights", _BODIES),
+    ("momentum", "momentum", ("6",), "angular momentum about the origin, then linear momentum, n-frame", _BODIES),
+    ("momentum_G", "momentum_G", ("6",), "angular momentum about the centre of mass, then linear momentum, n-frame", _BODIES),
+    ("center_of_mass", "center_of_mass", ("3",), "centre of mass of all bodies, n-frame, m", _BODIES),
+    ("regressor", "regressor", ("n_u", "10 n_b"),
+     "Y, tau = Y pi: ten inertial parameters a body, for given accelerations ud", _BODIES),
+    ("inertial_parameters", "inertial_parameters", ("10 n_b",),
+     "pi: m, h = m c, I about its origin (xx xy xz yy yz zz) of every body", _BODIES),
+    ("base_regressor", "base_regressor", None, "Y_b, tau = Y_b pi_b: base parameters, for given accelerations ud", _BODIES),
+    ("base_parameters", "base_parameters", None, "pi_b from the parameters of the model", _BODIES),
+    ("C", "C", _ROW_OF_C, "constraints, zero where they hold; 0 in rows of velocity constraints", _CONSTRAINTS),
+    ("C_r", "C_r", ("n_c", "n_u"), "Jacobian of the constraints in the speeds", _CONSTRAINTS),
+    ("C_t", "C_t", _ROW_OF_C, "partial derivative of the constraints by time", _CONSTRAINTS),
+    ("C_dot", "C_dot", _ROW_OF_C, "rate of the constraints, C_r u + C_t", _CONSTRAINTS),
+    ("F_d", "F_d", _ROW_OF_C, "right side of C_r u_dot = F_d", _CONSTRAINTS),
+    ("lam", "lam", _ROW_OF_C, "multipliers: M_tilde u_dot + k_tilde + C_r^T lam = F_tilde", _CONSTRAINTS),
+    ("reactions", "reactions", ("n_j", "6"),
+     "force and moment of every joint on its child, at the joint's point on it, n-frame", _BODIES),
+    ("cut_loads", "cut_loads", ("n_j", "6"),
+     "the whole load in every joint: its reaction, and what acts along its speeds, likewise", _BODIES),
+    ("ground_rotation", "ground_rotation", ("3", "3"),
+     "rotation of the ground's frame, which moves, to the n-frame", "a ground that moves"),
+    ("reactions_by_lam", "reactions_by_lam", ("6 n_j", "n_c"), "derivatives of the reactions, row by row, by the multipliers",
+     _CONSTRAINTS),
+    ("C_scale", "C_scale", _ROW_OF_C, "factors that make every constraint a length", _CONSTRAINTS),
+    ("length", "length", (), "the mechanism's length, m", _CONSTRAINTS),
+    ("N", "N", ("n_q", "n_u"), "q_dot = N u + what is given", ""),
+    ("position_correction", "position_correction", ("n_c + n_q",),
+     "constraints as lengths, and the smallest change of q that makes them zero", _CONSTRAINTS),
+    ("velocity_correction", "velocity_correction", ("n_c + n_u",),
+     "their rates, m/s, and the smallest change of u that makes them zero", _CONSTRAINTS),
+    ("residual", "residual", ("n_x + 2 n_c",),
+     "residual of the stabilized index-2 form; ud: q_dot, u_dot, z_dot, lam, mu", _CONSTRAINTS),
+    ("power", "power", (), "power of all loads but gravity and springs, and of prescribed motions, W", _BODIES),
+    ("power_x", "power_x", _ROW_OF_X, "derivative of the power by x", _BODIES),
+    ("Jd_qd", "Jd_qd", None, "accelerations [a_G; alpha] of every body with u_dot = 0, n-frame", ""),
+    ("joint_points", "joint_points", ("n_j", "6"),
+     "where every joint sits on its parent, then on its child, n-frame, m", _BODIES),
+    ("frames", "frames", ("n_b", "12"), "origin and rotation (row by row) of every body's frame, n-frame", _BODIES),
+    ("positions", "positions", None, "centres of mass, n-frame, m", ""),
+    ("watches", "watches", None,
+     "values that have a range of validity: draft, tilt and the like", "loads with a range of validity"),
+    ("events", "events", ("n_e",), "what vanishes at the events, in their order", "events"),
+    ("event_resets", "event_resets", None, "what entries of the state become at events that reset them", "events with resets"),
+    ("reset_directions", "reset_directions", None, "changes of [q; u] along each coordinate and speed that events reset",
+     "events with resets"),
+    ("switches", "switches", None, "what passes zero where the right-hand side may jump", "jumps"),
+    ("drawn_lengths", "drawn_lengths", None, "lengths in pictures that follow from parameters, m", "shapes"),
+    ("jacobian_x", "jacobian_x", ("n_x", "n_x"), "exact derivative of x_dot by x", ""),
+    ("jacobian_inputs", "jacobian_inputs", ("n_x", "n_in"), "exact derivative of x_dot by the inputs", ""),
+    ("jacobian_params", "jacobian_params", ("n_x", "n_p"), "exact derivative of x_dot by the parameters", ""),
+    ("input_matrix", "input_matrix", ("n_u", "n_in"), "exact derivative of F_tilde by the inputs", "inputs"),
+)
+# What the header adds where there are constraints, which these functions leave out.
+OF_THE_CUT_TREE = {"inverse_dynamics": ", of the tree: loops cut, without constraints"}
+
+# Of statics and linearization, compiled together.
+STATICS = _entries(
+    ("balance", "balance", None,
+     "[M_tilde u_dot + k_tilde - F_tilde + C_r^T lam; C; z_dot; C_dot; C_ddot; q_dot; q_ddot]; ud: u_dot, lam", ""),
+    ("N_dot", "N_dot", ("n_q", "n_u"), "derivative of N by time", ""),
+)
+# Along directions that are arguments: one short function in place of long matrices.
+VARIATIONS = _entries(
+    ("variation", "variation", None, "derivative of the balance along a direction of [q; u; z; inputs; p; u_dot; lam]", ""),
+    ("second_variation", "second_variation", None,
+     "the same derivative of the linear form of its first three parts in v (q' = N v), u', u_dot', z', lam'", ""),
+    ("outputs_variation", "outputs_variation", None, "the same derivative of the outputs", "outputs"),
+)
+# Further derivatives, each made by itself when it is asked for.
+DERIVATIVES = _entries(
+    ("stiffness", "stiffness", ("n_u", "n_q"),
+     "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by q; ud: u_dot, lam", ""),
+    ("damping", "damping", ("n_u", "n_u"),
+     "derivative of M_tilde u_dot + k_tilde - F_tilde + C_r^T lam by u; ud: u_dot, lam", ""),
+)
+ALL = {**FUNCTIONS, **STATICS, **VARIATIONS, **DERIVATIVES}
+
+# What consistent states are found with: compiled together.
+CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")
+# What is written to files unless asked otherwise; Jacobians and the like are long and made on request.
+STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
+
+
+def quantity_of(name: str) -> str:
+    """The quantity behind a function; any quantity is a function under its own name, too."""
+    return ALL[name].quantity if name in ALL else name
+
+
+def title_of(name: str, constrained: bool) -> str:
+    """What the header of generated code says about a function."""
+    title = ALL[name].title if name in ALL else name
+    return title + (OF_THE_CUT_TREE.get(name, "") if constrained else "")

@@ -1,0 +1,86 @@
+"""The tapes behind the functions of a module, as they are emitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symdyn.backend.right_side import RightSide
+from symdyn.formulation.constrained import residual_names
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
+from symdyn.formulation.linearization import multiplier_names, variation_names
+from symdyn.functions.table import DERIVATIVES, STATICS, VARIATIONS, quantity_of
+from symdyn.tape.balance import balance
+from symdyn.tape.jumps import Jump, jumps
+from symdyn.tape.tape import Output, Tape
+
+
+def has_function(equations: Equations, name: str) -> bool:
+    """Whether the equations can give a function."""
+    if name == "outputs":
+        return any(q.startswith("output_") for q in equations.quantities)
+    if name == "switches":
+        return bool(switches(equations))
+    if name in (BOUNDS, RANGES):
+        return bool(event_leaves(equations))
+    return quantity_of(name) in equations.quantities
+
+
+def switches(equations: Equations) -> list[Jump]:
+    """Where the right-hand side may jump along a motion."""
+    return jumps(equations.recorder, equations.quantity("rhs").tolist())
+
+
+def function_tape(equations: Equations, name: str) -> Tape:
+    """The tape behind a function of a module, as it is emitted."""
+    return balance(tape_as_derived(equations, name))
+
+
+def tape_as_derived(equations: Equations, name: str) -> Tape:
+    """The quantities that a function of a module returns."""
+    if name == "switches":
+        surfaces = np.array([jump.surface for jump in switches(equations)], dtype=object)
+        return Tape(equations.recorder, {name: Output.of(name, surfaces)})
+    if name in (BOUNDS, RANGES):
+        return event_bounds(equations, name)
+    if name != "outputs":
+        return equations.tape(quantity_of(name))
+    values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
+    whole = np.concatenate(values) if values else np.zeros(0, dtype=object)
+    return Tape(equations.recorder, {"outputs": Output.of("outputs", whole)})
+
+
+def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) -> dict[str, Tape]:
+    """The tapes of functions; of rhs and its derivative by x with what the right-hand side is made with."""
+    work, baumgarte = right_side.work, right_side.baumgarte
+    tapes = {name: tape_as_derived(equations, name) for name in names}
+    if work or baumgarte:
+        field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
+        if work:
+            field = np.concatenate([field, equations.quantity("power").reshape(1)])
+        tapes["rhs"] = Tape.of(equations.recorder, rhs=field)
+    if (work or baumgarte) and "jacobian_x" in names:
+        by_x = equations.quantity("jacobian_x_baumgarte" if baumgarte else "jacobian_x")
+        if work:  # nothing depends on the work
+            by_x = np.vstack([by_x, equations.quantity("power_x").reshape(1, -1)])
+            by_x = np.column_stack([by_x, np.zeros(len(by_x), dtype=object)])
+        tapes["jacobian_x"] = Tape.of(equations.recorder, jacobian_x=by_x)
+    return tapes
+
+
+def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
+    """What stands in the group ud: accelerations; for the balance also multipliers, for its variations what they are along;
+    for the residual the rates of the coordinates, too, and multipliers."""
+    symbols, n_c = equations.symbols, len(equations.constraints)
+    if BOUNDS in names:
+        return bound_names(event_leaves(equations))
+    if "residual" in names:
+        return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
+    given = [f"{s.name}_dot" for s in symbols.speeds]
+    if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
+        given += multiplier_names(n_c)
+    if any(n in VARIATIONS for n in names):
+        given += variation_names(symbols, n_c, "second_variation" in names)
+    return given
