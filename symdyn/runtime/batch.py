@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.c_records import fields_of
 from symdyn.errors import ArgumentError, EvaluationWarning
 from symdyn.real_numbers import real_of
 from symdyn.runtime.batch_arguments import take_rows, together
@@ -24,9 +25,9 @@ TOLD = 8
 
 
 class Table(ctypes.Structure):
-    """Numbers with a row for each trajectory, or one for all; see `table` in the generated source."""
+    """Numbers with a row for each trajectory, or one for all; see c/runtime/table_type.h."""
 
-    _fields_ = [("at", ctypes.c_void_p), ("row", ctypes.c_long), ("entry", ctypes.c_long)]
+    _fields_ = fields_of("runtime/table_type.h")
 
 
 def tables_of(arrays: list[np.ndarray]) -> Any:

@@ -21,6 +21,7 @@ from symdyn.runtime.events import wanted
 from symdyn.runtime.inputs import demand_rest, take_inputs, varies_over_time
 from symdyn.runtime.masses import negative_masses
 from symdyn.runtime.memory import demand
+from symdyn.runtime.run_record import STATUS, RunReport
 from symdyn.runtime.sampled import check_span
 from symdyn.runtime.simulate import checked_method, checked_positive, checked_spacing, checked_times, checked_tolerances
 from symdyn.runtime.stops import describe_stop
@@ -36,9 +37,6 @@ PATIENCE = 4
 METHOD = "dop853"
 NO_VECTORS = "the C compiler has no vectors"
 TOLD = 3
-_DONE, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE, _BAD_START, _NO_CONSTANTS = 0, -1, -2, -3, -4, -7
-# A report: the status and what simulation_report tells, x and x_fail from _X on and 8 numbers behind them.
-_STATUS, _T, _H, _STEPS, _REJECTED, _, _REASON, _BAD, _T_FAIL, _X = range(10)
 
 
 @dataclass(frozen=True)
@@ -149,14 +147,16 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     unit: Any = module.unit(UNIT)
     n, n_x = asked.n, module.metadata.sizes.x
     x = np.full((n, len(asked.times), n_x), np.nan)
-    report = np.full((n, _X + 2 * n_x + 8), np.nan)
+    reports = np.zeros(n, dtype=np.dtype(RunReport))
+    reports["status"] = STATUS.STEP_LIMIT
+    states = np.full((n, 2, n_x), np.nan)
     size = unit.function("batch_size")
     size.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(size() + 64)
     batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
     span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
     real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
-    out = (ctypes.c_void_p * 2)(x.ctypes.data, report.ctypes.data)
+    out = (ctypes.c_void_p * 2)(x.ctypes.data, states.ctypes.data)
     params, wrong = _real(module, asked)
     tables = tables_of([asked.starts, asked.inputs, params])
     go = unit.function("batch_go")
@@ -165,18 +165,19 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     interrupted, done, waited = False, 0, 0
     jumping = bool(module.metadata.switches)
     try:
-        unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out)
+        unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
+                                     ctypes.c_void_p(reports.ctypes.data))
         while (now := go(batch, ctypes.c_long(PIECE))) < n and not (jumping and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
     seconds = clock.perf_counter() - begun
-    late = np.flatnonzero(np.isnan(report[:, _STATUS]))
+    late = np.flatnonzero(reports["status"] == STATUS.STEP_LIMIT)
     if len(late) and not interrupted:
-        return _with_late(module, asked, x, report, late, begun)
-    success = report[:, _STATUS] == _DONE
-    messages = {int(k): wrong.get(int(k)) or _message(unit, report[k]) for k in np.flatnonzero(~success)}
-    counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
+        return _with_late(module, asked, x, reports, states, late, begun)
+    success = reports["status"] == STATUS.DONE
+    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
+    counts = _counts(reports)
     solution = BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], width(module),
                              "" if width(module) > 1 else NO_VECTORS, seconds)
     if interrupted:
@@ -184,16 +185,17 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     return solution
 
 
-def _with_late(module: Module, asked: _Asked, x: np.ndarray, report: np.ndarray, late: np.ndarray, begun: float) -> BatchSolution:
+def _with_late(module: Module, asked: _Asked, x: np.ndarray, reports: np.ndarray, states: np.ndarray, late: np.ndarray,
+               begun: float) -> BatchSolution:
     """Motions some of which take so many steps that they may chatter: these one by one, which finds that out."""
     part = replace(asked, n=len(late), **{name: rows[late] if len(rows := getattr(asked, name)) > 1 else rows
                                           for name in ("starts", "params", "inputs")})
     single = _one_by_one(module, part, None, part.inputs, "", {"events": False})
-    success = report[:, _STATUS] == _DONE
+    success = reports["status"] == STATUS.DONE
     unit: Any = module.unit(UNIT)
-    messages = {int(k): _message(unit, report[k]) for k in np.flatnonzero(~success) if k not in late}
+    messages = {int(k): _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success) if k not in late}
     messages |= {int(late[k]): message for k, message in single.messages.items()}
-    counts = np.nan_to_num(report[:, [_STEPS, _REJECTED]]).astype(int)
+    counts = _counts(reports)
     x[late], success[late] = single.x, single.success
     counts[late] = np.column_stack([single.n_steps, single.n_rejected])
     note = (f"{len(late)} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and the right-hand side "
@@ -214,22 +216,27 @@ def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
     return params, wrong
 
 
-def _message(unit: Any, row: np.ndarray) -> str:
-    status, metadata = row[_STATUS], unit.metadata
-    if np.isnan(status):
+def _counts(reports: np.ndarray) -> np.ndarray:
+    """Accepted steps and attempts given up, (n, 2)."""
+    return np.column_stack([reports["n_steps"], reports["n_rejected"]])
+
+
+def _message(unit: Any, row: np.ndarray, states: np.ndarray) -> str:
+    of, metadata = RunReport.from_buffer_copy(row.tobytes()), unit.metadata
+    if of.status == STATUS.STEP_LIMIT:
         return f"{metadata.name}: not finished"
-    reason, bad = unit.reason(int(row[_REASON])), int(row[_BAD])
-    if status == _NO_CONSTANTS:
+    reason, bad = unit.reason(of.reason), of.bad_index
+    if of.status == STATUS.NO_CONSTANTS:
         return f"{metadata.name}: {reason}; check the parameters"
-    n_x, failed = metadata.sizes.x, status in (_FIELD_FAILED, _NOT_FINITE)
-    x = row[_X + n_x * failed:][:n_x]
-    if status == _BAD_START:
+    failed = of.status in (STATUS.FIELD_FAILED, STATUS.STATE_NOT_FINITE)
+    x = states[int(failed)]
+    if of.status == STATUS.BAD_ARGUMENT:
         wrong = [name for name, value in zip(metadata.x, x, strict=True) if not np.isfinite(value)]
         return f"{metadata.name}: the start is not finite: {', '.join(wrong)}"
-    why = {_FIELD_FAILED: reason, _STEP_TOO_SMALL: f"the step became too small ({row[_H]:.3g} s) for the tolerances",
-           _NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
-    t = row[_T_FAIL if failed else _T]
-    return describe_stop(metadata, t, x, why.get(int(status), f"the integrator refused (status {int(status)})"))
+    why = {STATUS.FIELD_FAILED: reason, STATUS.STEP_TOO_SMALL: f"the step became too small ({of.h:.3g} s) for the tolerances",
+           STATUS.STATE_NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
+    return describe_stop(metadata, of.t_fail if failed else of.t, x,
+                         why.get(of.status, f"the integrator does not go on (status {of.status})"))
 
 
 # -- one by one

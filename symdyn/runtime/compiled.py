@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.backend.c_records import fields_of
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import SimulationWarning, SymdynError
 from symdyn.runtime.chatter import STEPS, chatter_of
@@ -20,8 +21,9 @@ from symdyn.runtime.interrupts import Interrupts
 from symdyn.runtime.methods import DEFAULT, with_own_tolerances
 from symdyn.runtime.outcome import Outcome, Request
 from symdyn.runtime.raised import InputRaised
+from symdyn.runtime.run_record import STATUS, Report, RunReport
 from symdyn.runtime.short_steps import ShortSteps
-from symdyn.runtime.stabilization import Corrections, not_converged, reset_refused
+from symdyn.runtime.stabilization import Corrections, not_converged, reset_rejected
 from symdyn.runtime.stops import describe_stop, lost_rank, nearly_singular, with_last
 
 if TYPE_CHECKING:
@@ -31,25 +33,17 @@ if TYPE_CHECKING:
 # Attempted steps in one call; a fraction of a second even for large systems.
 PIECE = 20_000
 STEPS_AT_ONCE = 4096
-_DONE, _STEP_LIMIT, _STORE_FULL, _FIELD_FAILED, _STEP_TOO_SMALL, _NOT_FINITE = 0, 1, 2, -1, -2, -3
-_PROJECTION_FAILED = -6
-_EVENT_STOPPED, _EVENT_FAILED, _EVENT_AT_ONCE = 3, -7, -8
-_NO_SERIES, _RESET_REFUSED = -9, -10
 # Most events that wait to be taken, besides three of each kind; see `noted` in the generated source.
 _EVENTS_WAITING = 64
-_INPUT_STOPPED = 100_000
-_InputFunction = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_double),
-                                  ctypes.POINTER(ctypes.c_double))
 
 
 class Problem(ctypes.Structure):
-    """Parameters, constants and inputs of a run; see `problem` in the generated source."""
+    """Parameters, constants and inputs of a run."""
 
-    _fields_ = [("p", ctypes.c_void_p), ("c", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("n_pieces", ctypes.c_long),
-                ("breaks", ctypes.c_void_p), ("pieces", ctypes.c_void_p), ("n_stops", ctypes.c_long), ("stops", ctypes.c_void_p),
-                ("function", _InputFunction),
-                # only in units that can project; the others do not read as far
-                ("project", ctypes.c_int), ("length", ctypes.c_double)]
+    _fields_ = fields_of("runtime/problem_type.h")
+
+
+_InputFunction = dict(Problem._fields_)["function"]
 
 
 class _Run:
@@ -157,18 +151,11 @@ class _Run:
         self.seconds += clock.perf_counter() - begun
         return status
 
-    @property
-    def reset_gap(self) -> float:
-        """By how much what was refused as a reset is off."""
-        gap = self.unit.function("simulation_reset_gap")
-        gap.restype = ctypes.c_double
-        return float(gap(self.address))
-
-    def report(self) -> np.ndarray:
-        """See `simulation_report` in the generated source."""
-        out = np.zeros(8 + 2 * self.n_x + 8)
-        self.unit.function("simulation_report")(self.address, ctypes.c_void_p(out.ctypes.data))
-        return out
+    def report(self) -> Report:
+        """What the run reports now."""
+        out, states = RunReport(), np.zeros((2, self.n_x))
+        self.unit.function("simulation_report")(self.address, ctypes.byref(out), ctypes.c_void_p(states.ctypes.data))
+        return Report(out, *states)
 
 
 def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
@@ -191,28 +178,29 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     status, position = run.status, request.span[0]
     try:
         while True:
-            done = int(run.report()[2])
+            done = run.report().of.n_steps
             left = None if request.max_steps is None else request.max_steps - done
-            if left is not None and left <= 0 and status != _STORE_FULL:
+            if left is not None and left <= 0 and status != STATUS.STORE_FULL:
                 stopped = True
                 break
             limit = piece if left is None else min(piece, left)
             status = run.at(t_out, x_out, limit) if times is not None else run.steps(t_out, x_out, limit)
-            if times is None and (status == _STORE_FULL or run.written.value == len(t_out)):
+            if times is None and (status == STATUS.STORE_FULL or run.written.value == len(t_out)):
                 n = run.written.value
                 stored.append((t_out[:n].copy(), x_out[:n].copy()))
                 run.written.value = 0
             if bar is not None:
-                now = run.report()[0]
+                now = run.report().of.t
                 bar.update(abs(now - position))
                 position = now
-            if status not in (_STEP_LIMIT, _STORE_FULL):
+            if status not in (STATUS.STEP_LIMIT, STATUS.STORE_FULL):
                 break
             report = run.report()
-            chatters = chatter(float(report[0]), report[8:8 + n_x], int(report[2])) if chatter is not None else ""
+            of = report.of
+            chatters = chatter(of.t, report.x, of.n_steps) if chatter is not None else ""
             if chatters:
                 break
-            if short is not None and (warning := short(float(report[0]), report[8:8 + n_x], int(report[2]))):
+            if short is not None and (warning := short(of.t, report.x, of.n_steps)):
                 warned.append(warning)
                 warnings.warn(warning, SimulationWarning, stacklevel=5)  # now: such a run may take very long
     except KeyboardInterrupt:
@@ -229,23 +217,23 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
         t, x = times[:written], x_out[:written]
     report = run.report()
     early = interrupted or stopped or bool(chatters) or run.raised is not None
-    over = status == _EVENT_STOPPED and not early
-    success = over or (status == _DONE and not early)
+    over = status == STATUS.STOPPED and not early
+    success = over or (status == STATUS.DONE and not early)
     message = "reached the end" if success else _message(module, run, status, report, interrupted, stopped, chatters)
     if over:
         stopping = (one.event for one in reversed(run.happened) if module.metadata.events[one.event].stop)
-        message = ended(module, next(stopping), report[0])
+        message = ended(module, next(stopping), report.of.t)
     if over or not success:
-        t, x = with_last(t, x, float(report[0]), report[8:8 + n_x])
+        t, x = with_last(t, x, report.of.t, report.x)
     doubts = [too_quick(module, run.too_quick), not_proved(module, run.hidden, request.event_spacing),
-              _doubt(module, request, method, report) if status >= 0 else ""]
-    dq, du, n_corrected, n_corrections = report[8 + 2 * n_x:12 + 2 * n_x].tolist()
-    return Outcome(t, x, success, message, interrupted, int(report[2]), int(report[3]), int(report[4]), run.seconds,
-                   Corrections(dq, du, int(n_corrected), int(n_corrections)), run.happened, int(report[14 + 2 * n_x]),
-                   int(report[15 + 2 * n_x]), tuple(filter(None, doubts)),
+              _doubt(module, request, method, report.of) if status >= 0 else ""]
+    of = report.of
+    return Outcome(t, x, success, message, interrupted, of.n_steps, of.n_rejected, of.n_evaluations, run.seconds,
+                   Corrections(of.largest_dq, of.largest_du, of.n_corrected, of.n_corrections), run.happened, of.n_jacobians,
+                   of.n_factorizations, tuple(filter(None, doubts)),
                    warned, None if run.raised is None else run.raised.__cause__,
-                   _series_reason(run, report) if status == _NO_SERIES and not early else "",
-                   next_step=float(report[1]))
+                   _series_reason(run, report) if status == STATUS.NO_SERIES and not early else "",
+                   next_step=of.h)
 
 
 def _short_steps(module: Module, request: Request, method: str, field: RightSide | None) -> ShortSteps | None:
@@ -260,25 +248,26 @@ def _short_steps(module: Module, request: Request, method: str, field: RightSide
     return ShortSteps(module, request, trial)
 
 
-def _doubt(module: Module, request: Request, method: str, report: np.ndarray) -> str:
-    """What to say of steps whose errors the method did not see, or which are not those that were asked for; for "gauss" bad_index
-    and reason count them, see its template."""
+def _doubt(module: Module, request: Request, method: str, report: RunReport) -> str:
+    """What to say of steps whose errors the method did not see, or which are not those that were requested."""
     if method != "gauss":
         return ""
-    rough, divided = -1 - int(report[6]), int(report[5]) if request.first_step else 0
+    rough, divided = report.n_rough, report.n_divided if request.first_step else 0
     if rough < 1:
+        if not divided:
+            return ""
         return (f"{module.name}: method 'gauss' divided {divided} of its steps of one length, the latest of them at t = "
-                f"{report[7]:.9g} s: its iteration does not converge over the whole of them. With steps of several lengths it is "
-                "neither symplectic nor symmetric, and energy may drift; give a shorter first_step") if divided else ""
+                f"{report.t_rough:.9g} s: its iteration does not converge over the whole of them. With steps of several lengths "
+                "it is neither symplectic nor symmetric, and energy may drift; give a shorter first_step")
     return (f"{module.name}: method 'gauss' went across kinks or jumps of the right-hand side, the latest of them just before "
-            f"t = {report[7]:.9g} s: of the steps that were done again by halves, {rough} differ by more than ten times the "
+            f"t = {report.t_rough:.9g} s: of the steps that were done again by halves, {rough} differ by more than ten times the "
             f"tolerance; use method='{DEFAULT}'")
 
 
-def _message(module: Module, run: _Run, status: int, report: np.ndarray, interrupted: bool, stopped: bool,
+def _message(module: Module, run: _Run, status: int, report: Report, interrupted: bool, stopped: bool,
              chatters: str) -> str:
-    n, metadata = run.n_x, run.unit.metadata
-    t, x = report[0], report[8:8 + n]
+    metadata, of, x, x_fail = run.unit.metadata, report.of, report.x, report.x_fail
+    t, t_fail = of.t, of.t_fail
     if interrupted:
         return describe_stop(metadata, t, x, "interrupted")
     if run.raised is not None:
@@ -286,44 +275,41 @@ def _message(module: Module, run: _Run, status: int, report: np.ndarray, interru
     if chatters:
         return describe_stop(metadata, t, x, chatters)
     if stopped:
-        return describe_stop(metadata, t, x, f"{int(report[2])} steps were done, as asked")
-    if status == _EVENT_AT_ONCE:
+        return describe_stop(metadata, t, x, f"{of.n_steps} steps were done, as asked")
+    if status == STATUS.EVENT_AT_ONCE:
         near = CHATTER * abs(run.request.span[1] - run.request.span[0])
         return describe_stop(metadata, t, x, at_once(module, run.happened, near))
-    if status == _EVENT_FAILED:
-        why = run.unit.reason(int(report[5])) if report[5] else not_known(module, int(report[6]))
-        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
-    if status == _RESET_REFUSED:
-        why = reset_refused(metadata.x[int(report[6])], run.reset_gap)
-        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
-    if status == _FIELD_FAILED:
-        x_fail = report[8 + n:8 + 2 * n]
-        why = _dependent(module, run, report[7], x_fail) + _inputs(module, run, report[7], x_fail)
-        return describe_stop(metadata, report[7], x_fail, run.unit.reason(int(report[5])) + why)
-    if status == _NO_SERIES:
+    if status == STATUS.EVENT_FAILED:
+        why = run.unit.reason(of.reason) if of.reason else not_known(module, of.bad_index)
+        return describe_stop(metadata, t_fail, x_fail, why)
+    if status == STATUS.RESET_REJECTED:
+        why = reset_rejected(metadata.x[of.bad_index], of.reset_gap)
+        return describe_stop(metadata, t_fail, x_fail, why)
+    if status == STATUS.FIELD_FAILED:
+        why = _dependent(module, run, t_fail, x_fail) + _inputs(module, run, t_fail, x_fail)
+        return describe_stop(metadata, t_fail, x_fail, run.unit.reason(of.reason) + why)
+    if status == STATUS.NO_SERIES:
         why = f"the right-hand side has no Taylor series: {_series_reason(run, report)}; use method='{DEFAULT}'"
-        return describe_stop(metadata, report[7], report[8 + n:8 + 2 * n], why)
-    if status == _NOT_FINITE:
-        bad = int(report[6])
-        name = metadata.x[bad] if 0 <= bad < n else "the state"
-        x_fail = report[8 + n:8 + 2 * n]
-        why = _inputs(module, run, report[7], x_fail)
-        return describe_stop(metadata, report[7], x_fail, f"the derivative of {name} is not finite{why}")
-    if status == _PROJECTION_FAILED:
-        x_fail = report[8 + n:8 + 2 * n]
-        why = _dependent(module, run, report[7], x_fail)
-        return describe_stop(metadata, report[7], x_fail, f"no way back onto the constraints: {_off(module, run, report)}{why}")
-    if status == _STEP_TOO_SMALL:
+        return describe_stop(metadata, t_fail, x_fail, why)
+    if status == STATUS.STATE_NOT_FINITE:
+        bad = of.bad_index
+        name = metadata.x[bad] if 0 <= bad < run.n_x else "the state"
+        why = _inputs(module, run, t_fail, x_fail)
+        return describe_stop(metadata, t_fail, x_fail, f"the derivative of {name} is not finite{why}")
+    if status == STATUS.PROJECTION_FAILED:
+        why = _dependent(module, run, t_fail, x_fail)
+        return describe_stop(metadata, t_fail, x_fail, f"no way back onto the constraints: {_off(module, run, of)}{why}")
+    if status == STATUS.STEP_TOO_SMALL:
         chatter = chatter_of(module, run.request)
         why = nearly_singular(module, t, x[:module.metadata.sizes.x], run.request.p) + _dependent(module, run, t, x)
         why += chatter.of_small_steps(t, x) if chatter is not None else ""
-        return describe_stop(metadata, t, x, f"the step became too small ({report[1]:.3g} s) for the tolerances{why}")
-    return describe_stop(metadata, t, x, f"the integrator refused (status {status})")
+        return describe_stop(metadata, t, x, f"the step became too small ({of.h:.3g} s) for the tolerances{why}")
+    return describe_stop(metadata, t, x, f"the integrator does not go on (status {status})")
 
 
-def _series_reason(run: _Run, report: np.ndarray) -> str:
+def _series_reason(run: _Run, report: Report) -> str:
     """Why a right-hand side that can be evaluated has no series."""
-    reason = int(report[5])
+    reason = report.of.reason
     return run.unit.reason(reason) if reason else "its coefficients are not finite"
 
 
@@ -342,12 +328,11 @@ def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
         return ""
 
 
-def _off(module: Module, run: _Run, report: np.ndarray) -> str:
+def _off(module: Module, run: _Run, report: RunReport) -> str:
     """Why a projection failed."""
-    rows, reason, worst = module.metadata.constraints, int(report[5]), int(report[6])
+    rows, reason, worst = module.metadata.constraints, report.reason, report.bad_index
     if reason:
         return run.unit.reason(reason)
     if 0 <= worst < len(rows):
-        residual, of_speeds = report[12 + 2 * run.n_x:14 + 2 * run.n_x]
-        return not_converged(rows[worst], residual, bool(of_speeds))
+        return not_converged(rows[worst], report.residual, bool(report.of_speeds))
     return "the correction would go further than half the step"

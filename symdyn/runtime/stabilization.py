@@ -166,7 +166,7 @@ class Projector:
                 worst = np.inf
                 break
         if worst > allowed:
-            raise ProjectionFailed(reset_refused(self.module.metadata.x[entry], left))
+            raise ProjectionFailed(reset_rejected(self.module.metadata.x[entry], left))
 
     def step(self, t: float, x: np.ndarray, tolerated: np.ndarray) -> tuple[np.ndarray, bool]:
         """The same for the end of a step, and whether it is a change to speak of, given the tolerated errors (n_x,)."""
@@ -251,7 +251,7 @@ def not_converged(constraint: str, residual: float, of_speeds: bool = False) -> 
     return f"{constraint} stays violated by {residual:.3g} m" + "/s" * of_speeds
 
 
-def reset_refused(entry: str, gap: float) -> str:
+def reset_rejected(entry: str, gap: float) -> str:
     """What to say where a reset asks for what the constraints do not allow."""
     return (f"the constraints do not let {entry} be what the reset of an event makes it: the nearest is {gap:.3g} off; reset "
             "fewer coordinates and speeds, from which the others follow, or to values that the constraints allow")

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from symdyn.backend.c_records import fields_of
 from symdyn.backend.metadata import Metadata
 from symdyn.errors import EvaluationError
 from symdyn.runtime import cache
@@ -56,10 +57,10 @@ class Unit(Protocol):
 
 
 class Frame(ctypes.Structure):
-    """The record that one call of the C library takes; see `frame` in the generated source."""
+    """The record that one call of the C library takes; see c/frame.jinja."""
 
-    _fields_ = [("n", ctypes.c_long), *[(k, ctypes.c_void_p) for k in ("t", "x", "ud", "inputs", "p", "c", "out")],
-                *[(k, ctypes.c_long) for k in ("t_stride", "x_stride", "ud_stride", "inputs_stride", "failed")]]
+    _fields_ = fields_of("frame.jinja")
+    failed: int
 
 
 class CUnit:

@@ -19,6 +19,7 @@ from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.backend.source import _shipped, template_folders
 from symdyn.runtime.compiled import Problem
 from symdyn.runtime.compiler import find_compiler, require_compiler
+from symdyn.runtime.run_record import STATUS, RunReport
 
 RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
 STRICT = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable",
@@ -98,9 +99,9 @@ class Run:
         assert status == 0 and written.value == len(times)
         return x
 
-    def report(self) -> np.ndarray:
-        out = np.zeros(16 + 2 * self.n)
-        self.library.symdyn_simulation_report(self.address, pointer(out))
+    def report(self) -> RunReport:
+        out, states = RunReport(), np.zeros((2, self.n))
+        self.library.symdyn_simulation_report(self.address, ctypes.byref(out), pointer(states))
         return out
 
 
@@ -117,7 +118,7 @@ def test_an_oscillator(method: str, build: Build, tmp_path: Path) -> None:
     run = Run(library, [1.0, 0.0], (0.0, 10.0), 1e-11)
     np.testing.assert_allclose(run.at(times), np.column_stack([np.cos(times), -np.sin(times)]), rtol=0, atol=2e-8)
     report = run.report()
-    assert report[0] == 10.0 and report[2] > 5 and report[4] > report[2]
+    assert report.status == STATUS.DONE and report.t == 10.0 and report.n_evaluations > report.n_steps > 5
     back = Run(library, [np.cos(10.0), -np.sin(10.0)], (10.0, 0.0), 1e-11).at(np.array([0.0]))
     np.testing.assert_allclose(back, [[1.0, 0.0]], rtol=0, atol=2e-8)
 
@@ -140,7 +141,7 @@ def test_projection_onto_a_circle(project: bool, least: float, most: float, buil
     x = run.at(np.linspace(0, 50, 101))
     off = np.abs((x[:, :2]**2).sum(axis=1) - 1).max()
     assert least <= off <= most
-    assert (run.report()[-6] > 0) == project  # steps whose end was moved
+    assert (run.report().n_corrected > 0) == project
 
 
 def test_a_unit_vector_keeps_its_length(build: Build, tmp_path: Path) -> None:
@@ -325,16 +326,17 @@ def test_oscillators_in_lanes(build: Build, tmp_path: Path) -> None:
     good = stiffness > 0
     assert failed == 1 and codes.tolist() == [int(not g) for g in good] and np.isnan(out[4]).all()
     assert (out[good] == np.column_stack([np.zeros(n), -stiffness])[good]).all()
-    times, reports, states = np.linspace(0, 3, 7), np.zeros((n, 21)), np.zeros((n, 7, 2))
+    times, states = np.linspace(0, 3, 7), np.zeros((n, 7, 2))
+    reports, both = np.zeros(n, dtype=np.dtype(RunReport)), np.zeros((n, 2, 2))
     span, atol = np.array([0.0, 3.0, 1e-11, 0.0, 0.0]), np.full(2, 1e-11)
     library.symdyn_batch_size.restype = library.symdyn_batch_go.restype = ctypes.c_long
     memory = ctypes.create_string_buffer(library.symdyn_batch_size() + 64)
     address = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
     given = (Table * 3)(tables[1], tables[2], tables[3])
     real = (ctypes.c_void_p * 3)(span.ctypes.data, atol.ctypes.data, times.ctypes.data)
-    into = (ctypes.c_void_p * 2)(states.ctypes.data, reports.ctypes.data)
-    library.symdyn_batch_start(address, given, pointer(np.array([n, 7])), real, into)
+    into = (ctypes.c_void_p * 2)(states.ctypes.data, both.ctypes.data)
+    library.symdyn_batch_start(address, given, pointer(np.array([n, 7])), real, into, pointer(reports))
     assert library.symdyn_batch_go(address, ctypes.c_long(10_000)) == n
     w = np.sqrt(np.abs(stiffness))[:, None]
     np.testing.assert_allclose(states[good, :, 0], np.cos(w * times)[good], rtol=0, atol=1e-9)
-    assert (reports[good, 0] == 0).all() and reports[4, 0] == -7
+    assert (reports["status"][good] == STATUS.DONE).all() and reports["status"][4] == STATUS.NO_CONSTANTS

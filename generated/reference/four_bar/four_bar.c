@@ -1481,6 +1481,29 @@ typedef struct {
 // A run of the integrator: its memory, failures, the right-hand side, norms. Nothing is allocated or global: a run lives in one
 // struct, and one that was interrupted continues to the same bits.
 
+// What a run reports of itself.
+
+typedef struct {
+    int status;                               // DONE, STEP_LIMIT, ..., or a failure
+    double t, h;                              // present time; length of the step to be tried next
+    long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
+    // The latest evaluation that failed. reason: what a function returned, 0: results that are not finite, or a correction too far;
+    // bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
+    int reason;
+    long bad_index;
+    double t_fail;
+    double residual;  // of that constraint, m, or of_speeds, m/s
+    int of_speeds;
+    double reset_gap;                       // by how much a reset that the constraints do not allow is off
+    double largest_dq, largest_du;          // largest changes by projections after a step, norms
+    long n_corrected, n_corrections;        // steps whose end was moved, calls of the corrections
+    long n_jacobians, n_factorizations;     // of implicit methods
+    long n_divided, n_rough;                // gauss: steps that were divided; those done again by halves that differ
+    double t_rough;                         // the latest of these
+} symdyn_report;
+
+// What a run returns.
+
 enum {
     // The end is reached; under way: call again to continue; no room for the next step: call again with room; ended by an event.
     SYMDYN_DONE = 0,
@@ -1497,7 +1520,8 @@ enum {
     SYMDYN_EVENT_FAILED = -7,       // a quantity of an event is not finite
     SYMDYN_EVENT_AT_ONCE = -8,      // events again and again with hardly any time between
     SYMDYN_NO_SERIES = -9,          // there is a right-hand side but no series of it
-    SYMDYN_RESET_REFUSED = -10      // the constraints do not let an entry be what a reset makes it
+    SYMDYN_RESET_REJECTED = -10,    // the constraints do not let an entry be what a reset makes it
+    SYMDYN_NO_CONSTANTS = -11       // batches: the constants that follow from the parameters cannot be computed
 };
 
 typedef struct {
@@ -1669,7 +1693,7 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_start)(
     void *memory, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     void *memory, int every, long max_steps, double *t, long n, double *x, long *written);
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out);
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states);
 
 // Where the polynomial of an embedded explicit Runge-Kutta pair is not good enough, and steps across singular configurations.
 
@@ -1890,19 +1914,30 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     }
 }
 
-// See the members of the run.
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out) {
+// What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
     const symdyn_run *const run = memory;
-    const double first[8] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations,
-        (double)run->reason, (double)run->bad_index, run->t_fail};
-    const double last[8] = {run->largest_dq, run->largest_du, (double)run->n_corrected, (double)run->n_corrections, run->residual,
-        (double)run->of_speeds, (double)run->n_jacobians, (double)run->n_factorizations};
-    for (int k = 0; k < 8; k++) {
-        out[k] = first[k];
-        out[8 + 2 * SYMDYN_NX + k] = last[k];
-    }
+    *report = (symdyn_report){
+        .status = run->status,
+        .t = run->t,
+        .h = run->h,
+        .n_steps = run->n_steps,
+        .n_rejected = run->n_rejected,
+        .n_evaluations = run->n_evaluations,
+        .reason = run->reason,
+        .bad_index = run->bad_index,
+        .t_fail = run->t_fail,
+        .residual = run->residual,
+        .of_speeds = run->of_speeds,
+        .largest_dq = run->largest_dq,
+        .largest_du = run->largest_du,
+        .n_corrected = run->n_corrected,
+        .n_corrections = run->n_corrections,
+        .n_jacobians = run->n_jacobians,
+        .n_factorizations = run->n_factorizations,
+    };
     for (int i = 0; i < SYMDYN_NX; i++) {
-        out[8 + i] = run->x[i];
-        out[8 + SYMDYN_NX + i] = run->x_fail[i];
+        states[i] = run->x[i];
+        states[SYMDYN_NX + i] = run->x_fail[i];
     }
 }

@@ -143,18 +143,38 @@ typedef struct {
     int project;    // whether states are kept on what holds for them after every step
     double length;  // that residuals are measured by, m
 } symdyn_problem;
+
+// What a run reports of itself.
+
+typedef struct {
+    int status;                               // DONE, STEP_LIMIT, ..., or a failure
+    double t, h;                              // present time; length of the step to be tried next
+    long n_steps, n_rejected, n_evaluations;  // accepted steps, attempts given up, calls of the right-hand side
+    // The latest evaluation that failed. reason: what a function returned, 0: results that are not finite, or a correction too far;
+    // bad_index: the first state that is not finite, or the constraint of the largest residual; or -1.
+    int reason;
+    long bad_index;
+    double t_fail;
+    double residual;  // of that constraint, m, or of_speeds, m/s
+    int of_speeds;
+    double reset_gap;                       // by how much a reset that the constraints do not allow is off
+    double largest_dq, largest_du;          // largest changes by projections after a step, norms
+    long n_corrected, n_corrections;        // steps whose end was moved, calls of the corrections
+    long n_jacobians, n_factorizations;     // of implicit methods
+    long n_divided, n_rough;                // gauss: steps that were divided; those done again by halves that differ
+    double t_rough;                         // the latest of these
+} symdyn_report;
 #endif
 
 // Integration. A run is a block of memory of simulation_size bytes, on a multiple of 64.
 // start    span: t0, t_end, rtol, length of the first step (0: chosen), longest step (0: any); x0, atol: 6. Returns 0 or a failure
 // go       by at most max_steps attempted steps; states at the times t[*written .. n) to the rows of x[n][6], or, with every, start
 //          and end of each step. Returns 0 at the end, 1 under way, 2 without room, 3 where an event ended it, or a failure < 0
-// report   t, h, steps, rejected, evaluations, reason, bad index, time of the failure, x (6), x there (6), largest changes of q and
-//          of u by projections, steps so moved, corrections, residual, whether of speeds, Jacobians, factorizations
+// report   see symdyn_report; states: x (6), and x where an evaluation failed (6)
 long four_bar_simulation_size(void);
 int four_bar_simulation_start(void *run, const symdyn_problem *problem, const double *span, const double *x0, const double *atol);
 int four_bar_simulation_go(void *run, int every, long max_steps, double *t, long n, double *x, long *written);
-void four_bar_simulation_report(const void *run, double *out);
+void four_bar_simulation_report(const void *run, symdyn_report *report, double *states);
 
 #ifdef __cplusplus
 }

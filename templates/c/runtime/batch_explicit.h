@@ -7,7 +7,8 @@
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void);
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
-    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out);
+    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out,
+    symdyn_report *reports);
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps);
 
 // Zeros until batch_start.
@@ -19,14 +20,13 @@ typedef struct {
     long row[SYMDYN_WIDTH], written[SYMDYN_WIDTH];  // -1: no trajectory
     symdyn_table given[3];
     const double *span, *atol, *t_out;
-    double *x_out, *report;
+    double *x_out, *states;
+    symdyn_report *report;
     long n, n_out, next, n_done;
 } symdyn_batch;
 
-enum { SYMDYN_BATCH_NO_CONSTANTS = -7 };
-
-// Write the requested times that a lane has passed. Report on its trajectory if that has ended (its status, then as
-// simulation_report), and begin the next that does not end at once, if there is one.
+// Write the requested times that a lane has passed. Report on its trajectory if that has ended, and begin the next that does not
+// end at once, if there is one.
 static void symdyn_batch_next(symdyn_batch *batch, int l) {
     symdyn_run *run = batch->run + l;
     double x0[SYMDYN_NX], *p = batch->numbers[l], *c = p + SYMDYN_NP;
@@ -34,14 +34,13 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
     for (;;) {
         const long row = batch->row[l];
         if (row >= 0) {
-            double *x = batch->x_out + row * batch->n_out * SYMDYN_NX, *report = batch->report + row * (17 + 2 * SYMDYN_NX);
+            double *x = batch->x_out + row * batch->n_out * SYMDYN_NX;
             const int bad = run->status < 0 ? 0 : symdyn_serve(run, batch->t_out, batch->n_out, x, batch->written + l);
             if (bad) run->status = bad;
             if (run->status == SYMDYN_STEP_LIMIT) return;
-            report[0] = run->status;
             batch->row[l] = -1;
             batch->n_done++;
-            SYMDYN_NAME(simulation_report)(run, report + 1);
+            SYMDYN_NAME(simulation_report)(run, batch->report + row, batch->states + row * 2 * SYMDYN_NX);
         }
         if (batch->next >= batch->n) return;
         const long i = batch->row[l] = batch->next++;
@@ -50,7 +49,7 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
         for (int k = 0; k < SYMDYN_NX; k++) x0[k] = batch->given->at[i * batch->given->row + k * batch->given->entry];
         SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, batch->atol);
         if (code) {
-            run->status = SYMDYN_BATCH_NO_CONSTANTS;
+            run->status = SYMDYN_NO_CONSTANTS;
             run->reason = code;
         }
         for (int k = 0; k < SYMDYN_NX; k++) {
@@ -140,10 +139,11 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_batch); }
 
 // given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP); counts: trajectories, output times; real: span (t0,
-// t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), reports. All
-// have to stay.
+// t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), states of the
+// reports (2 SYMDYN_NX each); reports: one each. All have to stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
-    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out) {
+    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out,
+    symdyn_report *reports) {
     symdyn_batch *const batch = memory;
     for (int k = 0; k < 3; k++) batch->given[k] = given[k];
     batch->n = counts[0];
@@ -152,7 +152,8 @@ SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
     batch->atol = real[1];
     batch->t_out = real[2];
     batch->x_out = out[0];
-    batch->report = out[1];
+    batch->states = out[1];
+    batch->report = reports;
     for (int l = 0; l < SYMDYN_WIDTH; l++) {
         batch->row[l] = -1;
         symdyn_batch_next(batch, l);

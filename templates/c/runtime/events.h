@@ -474,12 +474,6 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_carry)(void *memory, const double *kno
     run->events.kept = !reset;
 }
 
-// By how much what was refused as a reset is off.
-SYMDYN_EXPORT double SYMDYN_NAME(simulation_reset_gap)(const void *memory) {
-    const symdyn_run *const run = memory;
-    return run->events.reset_gap;
-}
-
 // Take the events so far, at most SYMDYN_NOTES: rows of which, time, state before, state after; -1 - k stands for one that varies
 // too quickly for all its zeros to be found from this time on, -1 - SYMDYN_N_EVENTS - k for one that may have others from there
 // on. Returns how many.

@@ -14,7 +14,7 @@ typedef struct {
     int unproved[SYMDYN_N_EVENTS];            // of which it is not proved that the samples show all zeros
     double spacing;                           // of samples at the most, s; 0: any
     double t, after[SYMDYN_NX];               // of the latest reset; the state after it
-    double reset_gap;                         // by how much what was refused as a reset is off
+    double reset_gap;                         // by how much a reset that was rejected is off
     int n_noted;
     double noted[SYMDYN_NOTES * SYMDYN_NOTE];  // events, times, states before and after them, until they are taken
 } symdyn_events;

@@ -174,9 +174,6 @@ static int symdyn_try(symdyn_run *run, double h, double t_new, double *x_new, do
         run->method.n_rough++;
         run->method.t_rough = t_new;
     }
-    run->reason = (int)run->method.n_given_up;
-    run->bad_index = -1 - run->method.n_rough;
-    run->t_fail = run->method.t_rough;
     return 0;
 }
 

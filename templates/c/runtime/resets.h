@@ -97,7 +97,7 @@ static int symdyn_keep_resets(symdyn_run *run, double t, const double *x_old, do
         }
         run->events.reset_gap = left;
         if (worst > size * (speeds ? 1e-8 : fmax(1e-9, 3.6e-15 * far / length)))
-            return symdyn_fail(run, SYMDYN_RESET_REFUSED, 0, symdyn_held[which], t, x_old);
+            return symdyn_fail(run, SYMDYN_RESET_REJECTED, 0, symdyn_held[which], t, x_old);
     }
     return 0;
 }

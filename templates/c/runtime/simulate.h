@@ -78,19 +78,38 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_go)(
     }
 }
 
-// See the members of the run.
-SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, double *out) {
+// What the run reports; states (2 SYMDYN_NX): the present one, and the one where an evaluation failed.
+SYMDYN_EXPORT void SYMDYN_NAME(simulation_report)(const void *memory, symdyn_report *report, double *states) {
     const symdyn_run *const run = memory;
-    const double first[8] = {run->t, run->h, (double)run->n_steps, (double)run->n_rejected, (double)run->n_evaluations,
-        (double)run->reason, (double)run->bad_index, run->t_fail};
-    const double last[8] = {run->largest_dq, run->largest_du, (double)run->n_corrected, (double)run->n_corrections, run->residual,
-        (double)run->of_speeds, (double)run->n_jacobians, (double)run->n_factorizations};
-    for (int k = 0; k < 8; k++) {
-        out[k] = first[k];
-        out[8 + 2 * SYMDYN_NX + k] = last[k];
-    }
+    *report = (symdyn_report){
+        .status = run->status,
+        .t = run->t,
+        .h = run->h,
+        .n_steps = run->n_steps,
+        .n_rejected = run->n_rejected,
+        .n_evaluations = run->n_evaluations,
+        .reason = run->reason,
+        .bad_index = run->bad_index,
+        .t_fail = run->t_fail,
+        .residual = run->residual,
+        .of_speeds = run->of_speeds,
+        .largest_dq = run->largest_dq,
+        .largest_du = run->largest_du,
+        .n_corrected = run->n_corrected,
+        .n_corrections = run->n_corrections,
+        .n_jacobians = run->n_jacobians,
+        .n_factorizations = run->n_factorizations,
+    };
+#if SYMDYN_EVENTS
+    report->reset_gap = run->events.reset_gap;
+#endif
+#if SYMDYN_GAUSS
+    report->n_divided = run->method.n_given_up;
+    report->n_rough = run->method.n_rough;
+    report->t_rough = run->method.t_rough;
+#endif
     for (int i = 0; i < SYMDYN_NX; i++) {
-        out[8 + i] = run->x[i];
-        out[8 + SYMDYN_NX + i] = run->x_fail[i];
+        states[i] = run->x[i];
+        states[SYMDYN_NX + i] = run->x_fail[i];
     }
 }

@@ -1,0 +1,60 @@
+"""Records in C and their mirrors in Python are the same bytes."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from symdyn.backend import c_records
+from symdyn.errors import SymdynError
+from symdyn.runtime.batch import Table
+from symdyn.runtime.compiled import Problem
+from symdyn.runtime.compiler import find_compiler, require_compiler
+from symdyn.runtime.run_record import STATUS, RunReport
+
+RECORDS = {"runtime/report_type.h": (RunReport, "symdyn_report"), "runtime/problem_type.h": (Problem, "symdyn_problem"),
+           "runtime/table_type.h": (Table, "symdyn_table")}
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+@pytest.mark.parametrize("file", RECORDS)
+def test_mirrors_have_the_offsets_that_c_gives(file: str, tmp_path: Path) -> None:
+    mirror, name = RECORDS[file]
+    names = [field[0] for field in mirror._fields_]
+    offsets = ", ".join(f"offsetof({name}, {n})" for n in names)
+    text = (c_records.templates_folder() / "c" / file).read_text(encoding="utf-8").replace("#pragma once", "")
+    path = tmp_path / "offsets.c"
+    path.write_text(f"#include <stddef.h>\n{text}\nlong offsets(int k) {{\nconst long all[] = {{{offsets}, sizeof({name})}};\n"
+                    "return all[k];\n}\n")
+    made = tmp_path / "offsets.so"
+    subprocess.run([*require_compiler().command, "-shared", "-fPIC", "-o", str(made), str(path)], check=True, timeout=60)
+    library = ctypes.CDLL(str(made))
+    library.offsets.restype = ctypes.c_long
+    for k, field in enumerate(names):
+        assert library.offsets(k) == getattr(mirror, field).offset, field
+    assert library.offsets(len(names)) == ctypes.sizeof(mirror) and len(names) >= 3
+
+
+def test_annotations_of_a_report_name_its_members() -> None:
+    assert list(RunReport.__annotations__) == [name for name, _ in RunReport._fields_]
+
+
+def test_codes_are_those_of_the_header() -> None:
+    codes = vars(STATUS)
+    assert (codes["DONE"], codes["STEP_LIMIT"], codes["STOPPED"], codes["FIELD_FAILED"]) == (0, 1, 3, -1)
+    assert len(set(codes.values())) == len(codes) >= 15
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("int x;", "declares no record; declare one with typedef struct"),
+    ("typedef struct {\n    float x;\n} some;", "float x has no mirror in Python; take numbers, pointers"),
+])
+def test_what_has_no_mirror_is_an_error(text: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "some.h").write_text(text)
+    monkeypatch.setattr(c_records, "templates_folder", lambda: tmp_path)
+    with pytest.raises(SymdynError, match=message):
+        c_records.fields_of("some.h")
