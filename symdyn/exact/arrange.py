@@ -10,7 +10,7 @@ Source of the nesting: Ceberio and Kreinovich, Greedy algorithms for optimizing 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -31,8 +31,8 @@ Cost = tuple[int, int]
 # that leaves the fewest terms; Horner's scheme too up to BOTH terms, and where the grouping leaves more than this part of them.
 # Squares of sums are looked for up to BOTH terms.
 FACTORED, ALL, BOTH, CLEAR = 120, 16, 40, 0.6
+_UNIT: frozenset = frozenset({((), 1)})
 _KINDS = (("motion",), ("parameter",), ("position",))
-ONE = Fraction(1)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Sum:
 class Product:
     """number * factors."""
 
-    number: Fraction
+    number: Number
     factors: tuple[tuple[int | Sum, int], ...]
     cost: Cost  # without its sign
 
@@ -76,40 +76,45 @@ def total(tree: Tree) -> Cost:
     return tree.cost
 
 
-class _Members(dict[int, bool]):
-    """Whether a letter is of these kinds."""
+class _Parts(dict[Monomial, tuple[Monomial, Monomial]]):
+    """What of a monomial is in letters of these kinds, and the rest."""
 
-    def __init__(self, letters: Sequence[Letter], kinds: tuple[str, ...]) -> None:
+    def __init__(self, letters: Mapping[int, Letter], kinds: tuple[str, ...]) -> None:
         super().__init__()
         self.letters, self.kinds = letters, kinds
 
-    def __missing__(self, letter: int) -> bool:
-        self[letter] = self.letters[letter].kind in self.kinds
-        return self[letter]
+    def __missing__(self, m: Monomial) -> tuple[Monomial, Monomial]:
+        own = tuple([item for item in m if self.letters[item[0]].kind in self.kinds])
+        self[m] = own, tuple([item for item in m if item not in own])
+        return self[m]
 
 
 class Arranger:
     """Arranges polynomials in these letters."""
 
-    def __init__(self, letters: Sequence[Letter]) -> None:
+    def __init__(self, letters: Mapping[int, Letter]) -> None:
         self.letters = letters
         self._known: dict[frozenset, Tree] = {}
         self._split: dict[frozenset, Any] = {}
-        self._members: dict[tuple[str, ...], _Members] = {}
+        self._parts: dict[tuple[str, ...], _Parts] = {
+            kinds: _Parts(letters, kinds) for kinds in (*_KINDS, ("motion", "position"), ("position", "motion"))}
 
     # -- making trees
 
-    def product(self, number: int | Fraction, factors: Iterable[tuple[int | Sum, int]]) -> Product:
+    def product(self, number: Number, factors: Iterable[tuple[int | Sum, int]]) -> Product:
         """number * factors, without factors to the power zero."""
-        number = Fraction(number)
-        kept = tuple((base, power) for base, power in factors if power)
+        kept = tuple([item for item in factors if item[1]])
         operations, length = max(len(kept) - 1, 0), 0
         for base, power in kept:
-            cost = base.cost if isinstance(base, Sum) else (self.letters[base].operations, self.letters[base].length)
-            operations += cost[0] + (power > 1)
-            length += cost[1] + (power > 1) + 2 * isinstance(base, Sum)
+            if isinstance(base, int):
+                letter = self.letters[base]
+                operations += letter.operations + (power > 1)
+                length += letter.length + (power > 1)
+            else:
+                operations += base.cost[0] + (power > 1)
+                length += base.cost[1] + (power > 1) + 2
         above, below = abs(number.numerator), number.denominator
-        if below != 1 and printed_as_decimal(number):
+        if below != 1 and isinstance(number, Fraction) and printed_as_decimal(number):
             above, below = 2, 1
             length += 4
         if above != 1 and kept:
@@ -128,39 +133,38 @@ class Arranger:
             elif term.number:
                 flat.append(term)
         if not flat:
-            return self.product(Fraction(0), ())
+            return self.product(0, ())
         if len(flat) == 1:
             return flat[0]
         signs = len(flat) - 1 + all(term.number < 0 for term in flat)
         return Sum(tuple(flat), (signs + sum(t.cost[0] for t in flat), signs + sum(t.cost[1] for t in flat)))
 
-    def times(self, number: int | Fraction, factors: Sequence[tuple[int, int]], trees: Sequence[tuple[Tree, int]]) -> Product:
+    def times(self, number: Number, factors: Sequence[tuple[int, int]], trees: Sequence[tuple[Tree, int]]) -> Product:
         """number * letters * trees to their powers."""
-        number = Fraction(number)
         parts: dict[Any, int] = dict(factors)
         for tree, power in trees:
             if isinstance(tree, Sum):
                 parts[tree] = parts.get(tree, 0) + power
             else:
-                number *= tree.number ** power
+                number = integer(number * tree.number ** power)
                 for base, n in tree.factors:
                     parts[base] = parts.get(base, 0) + n * power
         first = sorted(item for item in parts.items() if isinstance(item[0], int))
         sums = [item for item in parts.items() if not isinstance(item[0], int)]
         best = self.product(number, [*first, *sums])
-        size = abs(number)
+        size = abs(Fraction(number))
         if size != 1 and not printed_as_decimal(size):
             # l (2 a + b) / 2 is l (a + b / 2).
             for k, (base, power) in enumerate(sums):
                 if power == 1:
                     inside = self.scaled(base, size)
-                    other = self.product(number / size, [*first, *sums[:k], (inside, 1), *sums[k + 1:]])
+                    other = self.product(1 if number > 0 else -1, [*first, *sums[:k], (inside, 1), *sums[k + 1:]])
                     best = min(best, other, key=lambda tree: tree.cost)
         return best
 
-    def scaled(self, tree: Sum, number: Fraction) -> Sum:
+    def scaled(self, tree: Sum, number: Number) -> Sum:
         """The sum with a number multiplied into its terms."""
-        scaled = self.sum([self.product(t.number * number, t.factors) for t in tree.terms])
+        scaled = self.sum([self.product(integer(t.number * number), t.factors) for t in tree.terms])
         assert isinstance(scaled, Sum)
         return scaled
 
@@ -174,7 +178,7 @@ class Arranger:
         if isinstance(tree, Product) and tree.number < 0:
             for k, (base, power) in enumerate(tree.factors):
                 if isinstance(base, Sum) and power % 2 and len({t.number < 0 for t in base.terms}) == 2:
-                    inside = self.scaled(base, -ONE)
+                    inside = self.scaled(base, -1)
                     return self.product(-tree.number, [*tree.factors[:k], (inside, power), *tree.factors[k + 1:]])
         return tree
 
@@ -199,20 +203,22 @@ class Arranger:
 
     def _groups(self, p: Polynomial, kinds: tuple[str, ...]) -> list[tuple[Polynomial, Polynomial]] | None:
         """Pairs of polynomials whose products add up: letters of these kinds with what is common, and all others."""
-        rows: dict[Monomial, Polynomial] = {}
-        members = self._members.setdefault(kinds, _Members(self.letters, kinds))
-        for m, c in p.items():
-            own = tuple([item for item in m if members[item[0]]])
-            rest = tuple([item for item in m if not members[item[0]]]) if own else m
-            rows.setdefault(own, {})[rest] = c
-        if len(rows) == 1:
+        rows: dict[Monomial, list[Monomial]] = {}
+        parts = self._parts[kinds]
+        for m in p:
+            rows.setdefault(parts[m][0], []).append(m)
+        if len(rows) == 1 or len(rows) == len(p):
             return None
         merged: dict[frozenset, tuple[Polynomial, Polynomial]] = {}
-        for own, row in sorted(rows.items()):
-            number, common, q = stripped(row)
+        for own in sorted(rows):
+            row = rows[own]
+            if len(row) == 1:
+                merged.setdefault(_UNIT, ({}, {(): 1}))[0][row[0]] = p[row[0]]
+                continue
+            number, common, q = stripped({parts[m][1]: p[m] for m in row})
             # What is common goes with the group; what is left tells which groups belong together.
             left, _ = merged.setdefault(frozenset(q.items()), ({}, q))
-            left[multiplied(own, common)] = integer(number)
+            left[multiplied(own, common)] = number
         return None if len(merged) == 1 or len(merged) == len(p) else list(merged.values())
 
     def _gathered(self, groups: Sequence[tuple[Polynomial, Polynomial]], arrange: Callable[[Polynomial], Tree]) -> Tree:
@@ -224,7 +230,7 @@ class Arranger:
             return b
         if isinstance(b, Product) and not b.factors and b.number == 1:
             return a
-        return self.times(ONE, (), [(a, 1), (b, 1)])
+        return self.times(1, (), [(a, 1), (b, 1)])
 
     def nested(self, p: Polynomial) -> Tree:
         """The shortest that factoring, grouping and Horner's scheme lead to, each applied to what the other leaves."""
@@ -232,7 +238,7 @@ class Arranger:
             (m, c), = p.items()
             return self.product(c, m)
         if not p:
-            return self.product(Fraction(0), ())
+            return self.product(0, ())
         number, common, q = stripped(p)
         tree = self._nested(q)
         if number == 1 and not common:
@@ -254,10 +260,10 @@ class Arranger:
             return self.expanded(q)
         if len(q) == 2:
             parts = self._factors(q)
-            return self.expanded(q) if parts is None else self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
+            return self.expanded(q) if parts is None else self.times(1, (), [(self.nested(f), n) for f, n in parts])
         parts = self._factors(q)
         if parts is not None:
-            return self.times(ONE, (), [(self.nested(f), n) for f, n in parts])
+            return self.times(1, (), [(self.nested(f), n) for f, n in parts])
         groups = [g for g in (self._groups(q, kinds) for kinds in _KINDS) if g is not None]
         # Terms that are left to arrange tell which of them are worth it.
         left = [sum(len(a) + len(b) for a, b in g) for g in groups]
@@ -289,7 +295,7 @@ class Arranger:
                     break
             else:
                 outside[m] = c
-        first = self.times(ONE, ((letter, 1),), [(self.nested(inside), 1)])
+        first = self.times(1, ((letter, 1),), [(self.nested(inside), 1)])
         if not outside:
             return first
         return self.sum([first, self.nested(outside)])
@@ -369,37 +375,42 @@ def _resigned(tree: Sum) -> Cost:
     return tree.cost[0] + change, tree.cost[1] + change
 
 
-def stripped(p: Polynomial) -> tuple[Fraction, Monomial, Polynomial]:
+def stripped(p: Polynomial) -> tuple[Number, Monomial, Polynomial]:
     """Number and letters common to all terms, and what is left, in which most terms are positive."""
     numbers: list[Any] = list(p.values())
     number: Any = 1
-    if all(type(c) is int for c in numbers):
+    if all([type(c) is int for c in numbers]):
         number = gcd(*numbers)
     elif any(printed_as_decimal(Fraction(c)) for c in numbers):
         size = abs(numbers[0])
         number = size if all(abs(c) == size for c in numbers) else 1
     else:
         number = Fraction(gcd(*[c.numerator for c in numbers]), lcm(*[c.denominator for c in numbers]))
-    negative = sum(c < 0 for c in numbers)
+    negative = sum([c < 0 for c in numbers])
     if 2 * negative > len(numbers) or (2 * negative == len(numbers) and p[min(p)] < 0):
         number = -number
-    common = dict(next(iter(p)))
-    for m in p:
+    monomials = iter(p)
+    common = dict(next(monomials))
+    for m in monomials:
         if not common:
             break
-        powers = dict(m)
-        common = {letter: min(n, powers[letter]) for letter, n in common.items() if letter in powers}
+        kept = {}
+        for letter, n in m:
+            if letter in common:
+                least = common[letter]
+                kept[letter] = least if least < n else n
+        common = kept
     if number == 1 and not common:
-        return ONE, (), p
+        return 1, (), p
     if common:
         p = {tuple([(letter, n - common.get(letter, 0)) for letter, n in m if n != common.get(letter, 0)]): c
              for m, c in p.items()}
     if number != 1:
         p = {m: _divided(c, number) for m, c in p.items()}
-    return Fraction(number), tuple(sorted(common.items())), p
+    return integer(number), tuple(sorted(common.items())), p
 
 
-def integer(value: Fraction) -> int | Fraction:
+def integer(value: Number) -> Number:
     """An integer as one."""
     return value.numerator if value.denominator == 1 else value
 
@@ -415,6 +426,10 @@ def multiplied(a: Monomial, b: Monomial) -> Monomial:
     """The product of two monomials."""
     if not a or not b:
         return a or b
+    if a[-1][0] < b[0][0]:
+        return a + b
+    if b[-1][0] < a[0][0]:
+        return b + a
     powers = dict(a)
     for letter, n in b:
         powers[letter] = powers.get(letter, 0) + n

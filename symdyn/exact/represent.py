@@ -216,9 +216,12 @@ def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
         groups.setdefault(own, []).append((rest, c))
     result: Polynomial = {}
     for own, row in groups.items():
-        if sum(n for _, n in own) > DEGREE:
+        degree = sum(n for _, n in own)
+        if degree > DEGREE:
             return None
+        scale = 2 ** (DEGREE - degree)
         for trig, factor in _series(own, letters):
+            factor *= scale
             for rest, c in row:
                 m = multiplied(rest, trig)
                 value = result.get(m, 0) + factor * c
@@ -228,23 +231,22 @@ def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
                     result.pop(m, None)
         if len(result) > most:
             return None
-    return {m: integer(Fraction(c)) for m, c in result.items()}
+    return {m: integer(Fraction(c, 2**DEGREE)) for m, c in result.items()}
 
 
-def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, Fraction]]:
-    """A product of sines and cosines as a sum of them: letter (or none) and number."""
+def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, int]]:
+    """A product of d sines and cosines, times 2^d, as a sum of them: letter (or none) and number."""
     n = len(letters.sines)
     zero = (0,) * n
-    parts: dict[tuple[str, Vector], Fraction] = {("cos", zero): Fraction(1)}
-    half = Fraction(1, 2)
+    parts: dict[tuple[str, Vector], int] = {("cos", zero): 1}
     for letter, power in own:
         name, unit = letters.turns[letter]
         for _ in range(power):
-            after: dict[tuple[str, Vector], Fraction] = {}
+            after: dict[tuple[str, Vector], int] = {}
             for (kind, vector), c in parts.items():
                 up = tuple(a + b for a, b in zip(vector, unit))
                 down = tuple(a - b for a, b in zip(vector, unit))
-                # kind(vector) * name(unit) as half a sum.
+                # kind(vector) * name(unit) is half a sum.
                 if kind == name == "cos":
                     made = (("cos", up, 1), ("cos", down, 1))
                 elif kind == name:
@@ -254,9 +256,9 @@ def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, Fraction]]:
                 else:
                     made = (("sin", up, 1), ("sin", down, -1))
                 for what, v, sign in made:
-                    after[what, v] = after.get((what, v), Fraction(0)) + sign * half * c
+                    after[what, v] = after.get((what, v), 0) + sign * c
             parts = after
-    found: dict[Monomial, Fraction] = {}
+    found: dict[Monomial, int] = {}
     for (kind, vector), c in parts.items():
         if not any(vector):
             m: Monomial = ()
@@ -265,7 +267,7 @@ def _series(own: Monomial, letters: Letters) -> list[tuple[Monomial, Fraction]]:
         else:
             letter, sign = letters.of(kind, vector)
             m, c = ((letter, 1),), sign * c
-        found[m] = found.get(m, Fraction(0)) + c
+        found[m] = found.get(m, 0) + c
     return [(m, c) for m, c in found.items() if c]
 
 

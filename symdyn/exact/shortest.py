@@ -37,7 +37,7 @@ WORSE, SHORT, LONG = 1.5, 25, 150
 MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before SymPy
 # combines terms; up to FACTOR_TERMS operations common factors are taken out of it.
-LONGER, FACTOR_TERMS = 2.5, 400
+LONGER, FACTOR_TERMS = 2.1, 250
 
 
 class Writer:
@@ -148,19 +148,19 @@ class Writer:
 
     # -- values
 
-    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], sp.Expr] | None = None) -> sp.Expr:
+    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], tuple[sp.Expr, int]] | None = None) -> sp.Expr:
         """The value in the form asked for.
 
-        operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form, which is
-                     taken if it is the shortest
+        operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form and
+                     counts its operations; it is taken if it is the shortest
         """
         if derived is not None and operations <= len(value.num):
-            return derived()
+            return derived()[0]
         tree = self.tree(value)
         result = self.tree_expression(tree)
         if derived is not None and operations <= LONGER * total(tree)[0]:
-            other = derived()
-            if sp.count_ops(other) < sp.count_ops(result):
+            other, count = derived()
+            if count < sp.count_ops(result):
                 return other
         return result
 
@@ -168,7 +168,7 @@ class Writer:
         """The arrangement of a value."""
         form, a = self.form, self.arranger
         if len(value.num) == 0:
-            return a.product(Fraction(0), ())
+            return a.product(0, ())
         if form == "polynomial":
             base = self._over(plain(value.num), value)
             return a.grouped(base, ("position", "motion"), a.expanded) or a.expanded(base)
@@ -263,27 +263,21 @@ class Writer:
         return e if n == 1 else sp.Pow(e, n)
 
 
-class _Lookup(Sequence[Letter]):
+class _Lookup(dict[int, Letter]):
     """Letters by number, as they come."""
 
     def __init__(self, writer: Writer) -> None:
+        super().__init__()
         self.writer = writer
-        self.known: dict[int, Letter] = {}
 
-    def __getitem__(self, k: Any) -> Any:
-        letter = self.known.get(k)
-        if letter is None:
-            e = self.writer.expression(k)
-            multiples = 0
-            if k in self.writer.letters.turns:
-                multiples = sum(MULTIPLE for a in sp.Add.make_args(e.args[0]) if a.as_coeff_Mul()[0] not in (1, -1))
-            length = 1 if e.is_Symbol else len(str(e))
-            letter = self.known[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k),
-                                            k in self.writer.letters.below)
-        return letter
-
-    def __len__(self) -> int:
-        return len(self.writer.letters.turns) + len(self.writer.exact.leaves)
+    def __missing__(self, k: int) -> Letter:
+        e = self.writer.expression(k)
+        multiples = 0
+        if k in self.writer.letters.turns:
+            multiples = sum(MULTIPLE for a in sp.Add.make_args(e.args[0]) if a.as_coeff_Mul()[0] not in (1, -1))
+        length = 1 if e.is_Symbol else len(str(e))
+        self[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k), k in self.writer.letters.below)
+        return self[k]
 
 
 def _times(coefficient: Any, parts: list[sp.Expr]) -> sp.Expr:
@@ -356,7 +350,10 @@ def _sizes(entries: Sequence[Any]) -> dict[Node, int]:
     return sizes
 
 
-def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float) -> sp.Expr:
-    """As it stands on the tape; common factors are taken out of sums where that is shorter and does not take long."""
+def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float) -> tuple[sp.Expr, int]:
+    """As it stands on the tape, and its operations; common factors are taken out of sums where that is shorter and does not take
+    long."""
     found = expand(Output.of("entry", entry), symbols)
-    return min((found, sp.factor_terms(found)), key=sp.count_ops) if size <= FACTOR_TERMS else found
+    forms = (found, sp.factor_terms(found)) if size <= FACTOR_TERMS else (found,)
+    counts = [int(sp.count_ops(form)) for form in forms]
+    return forms[counts.index(min(counts))], min(counts)

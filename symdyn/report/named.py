@@ -6,7 +6,7 @@ together, so that what stands in several entries is visible as the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import sympy as sp
@@ -106,21 +106,21 @@ def _arrangements(arranger: Arranger, p: Polynomial) -> Iterator[Any]:
             yield tree
 
 
-class _Letters(Sequence[Letter]):
+class _Letters(dict[int, Letter]):
     """Letters of a writer, where sines, cosines and constants have names."""
 
     def __init__(self, writer: Writer, first: int) -> None:
+        super().__init__()
         self.writer, self.first = writer, first
 
-    def __getitem__(self, k: Any) -> Any:
+    def __missing__(self, k: int) -> Letter:
         if k >= self.first:
-            return Letter(0, 2, "parameter")
-        if k in self.writer.letters.turns:
-            return Letter(0, 2, "position")
-        return self.writer.arranger.letters[k]
-
-    def __len__(self) -> int:
-        return self.first
+            self[k] = Letter(0, 2, "parameter")
+        elif k in self.writer.letters.turns:
+            self[k] = Letter(0, 2, "position")
+        else:
+            self[k] = self.writer.arranger.letters[k]
+        return self[k]
 
 
 def _names(letter: str, taken: set[sp.Symbol]) -> Iterator[sp.Symbol]:
