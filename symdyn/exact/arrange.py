@@ -379,7 +379,7 @@ def stripped(p: Polynomial) -> tuple[Number, Monomial, Polynomial]:
     """Number and letters common to all terms, and what is left, in which most terms are positive."""
     numbers: list[Any] = list(p.values())
     number: Any = 1
-    if all([type(c) is int for c in numbers]):
+    if set(map(type, numbers)) == {int}:
         number = gcd(*numbers)
     elif any(printed_as_decimal(Fraction(c)) for c in numbers):
         size = abs(numbers[0])

@@ -148,7 +148,8 @@ class Writer:
 
     # -- values
 
-    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], tuple[sp.Expr, int]] | None = None) -> sp.Expr:
+    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], tuple[sp.Expr, int]] | None = None
+              ) -> sp.Expr:
         """The value in the form asked for.
 
         operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form and
