@@ -11,16 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import gcd, isqrt, lcm
+from math import isqrt
 from typing import Any
 
 from symdyn.exact.angles import Angles, Linear, arguments
-from symdyn.exact.ring import BOUND, Ring, Value, fraction, rational
+from symdyn.exact.ring import BOUND, FACTORED, Ring, Value, fraction
 from symdyn.tape.node import Node, exact
 from symdyn.tape.sympy_bridge import printed_as_decimal
 from symdyn.tape.tape import reachable
 
 _ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)
+# Roots that one is taken apart to, at most.
+ROOTS = 4
 _TRUTH = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 
 
@@ -55,7 +58,7 @@ class Exact:
         groups = [group for group in unit_vectors if all(leaf in leaves for leaf in group)]
         leading = [group[0] for group in groups]
         leaves = [*leading, *[leaf for leaf in leaves if leaf not in leading]]
-        n, m, count = len(others), len(angles.bases), 0
+        n, m, count = sum(ROOTS if node.op == "sqrt" else 1 for node in others), len(angles.bases), 0
         # Functions first, the last one highest; two generators a base angle; plain symbols.
         free = iter(range(n - 1, -1, -1))
         self.bases: list[Linear] = angles.bases
@@ -77,25 +80,35 @@ class Exact:
                 return done[a]
             return a if isinstance(a, bool) else ring.number(exact(a))
 
-        free_of_sign = [k for k, leaf in self.leaves.items() if leaf in positive]
+        free_of_sign = {k for k, leaf in self.leaves.items() if leaf in positive}
+        same: dict[str, list[tuple[Value, Value]]] = {}
 
         def function(node: Node) -> Value:
             item = node.args[1] if node.op == "item" else None
             args = done[node.args[0]] if node.op == "item" else tuple(map(take, node.args))
-            if node.op == "sqrt" and not args[0].under and len(args[0].num):
-                outside, inside = square_taken_out(ring, args[0].num, free_of_sign)
-                if inside.is_one():
-                    return Value(outside)
-                return ring.mul(Value(outside), of_atom(Atom("sqrt", (Value(inside),))))
+            if node.op == "sqrt" and len(args[0].num):
+                result, below = root_taken_apart(ring, args[0], free_of_sign)
+                for inside in below:
+                    result = ring.mul(result, of_atom(Atom("sqrt", (inside,))))
+                return result
             return of_atom(Atom("call" if node.op == "item" else node.op, args, item))
 
         def of_atom(atom: Atom) -> Value:
             args, item = atom.args, atom.item
             key = f"{atom.op}{item}({','.join(self._key(a) for a in args)})"
+            if key not in known and len(args) == 1 and isinstance(args[0], Value):
+                # Of equal fractions, numerators and denominators may differ.
+                others = same.setdefault(f"{atom.op}{item}", [])
+                known.update((key, result) for a, result in others if (a.under or args[0].under)
+                             and len(ring.sub(a, args[0]).num) == 0)
             if key not in known:
                 k = next(free)
                 self.atoms[k] = atom
                 known[key] = ring.generator(k)
+                if len(args) == 1 and isinstance(args[0], Value):
+                    same[f"{atom.op}{item}"].append((args[0], known[key]))
+                if atom.op == "sqrt":
+                    free_of_sign.add(k)
                 squared = atom.op in ("sqrt", "abs") and not args[0].under
                 if squared:
                     ring.relate(k, args[0].num if atom.op == "sqrt" else ring.product(args[0].num, args[0].num))
@@ -147,22 +160,61 @@ class Exact:
         return self._pairs[vector]
 
 
-def square_taken_out(ring: Ring, p: Any, positive: Sequence[int]) -> tuple[Any, Any]:
-    """x and y with p = x^2 y: squares of numbers, and of generators that are not negative, that all terms have in common."""
-    content = p.term_content()
-    powers = content.degrees()
-    outside, square = ring.context.constant(1), ring.context.constant(1)
-    for k in positive:
-        half = int(powers[k]) // 2
-        outside, square = outside * ring.generators[k] ** half, square * ring.generators[k] ** (2 * half)
-    numbers = [fraction(c) for c in p.coeffs()]
-    if not any(map(printed_as_decimal, numbers)):
-        above, below = gcd(*[c.numerator for c in numbers]), lcm(*[c.denominator for c in numbers])
-        # sqrt(a / b) = sqrt(a b) / b
-        root = _root_of_square_in(above * below)
-        factor = rational(Fraction(root, below))
-        outside, square = outside * factor, square * factor**2
-    return outside, divmod(p, square)[0]
+def root_taken_apart(ring: Ring, value: Value, positive: Collection[int]) -> tuple[Value, list[Value]]:
+    """x and what stands under roots, with sqrt(value) = x sqrt(..) sqrt(..) ...: numbers, and factors that are never negative,
+    have roots of their own, so that sqrt(a b) is sqrt(a) sqrt(b) and sqrt(a / b^2) is sqrt(a) / b.
+
+    positive   generators that are not negative
+    """
+    num, outside = value.num, ring.one
+    if any(printed_as_decimal(fraction(c)) for c in num.coeffs()) or len(num) > FACTORED:
+        content = num.term_content()
+        powers = content.degrees()
+        for k in positive:
+            for _ in range(int(powers[k]) // 2):
+                outside = ring.mul(outside, ring.generator(k))
+                num = divmod(num, ring.generators[k] ** 2)[0]
+        return outside, [Value(num, value.under)]
+    under = []
+    for k, n in value.under:
+        factor = ring.factors[k]
+        if _never_negative(factor, positive):
+            # sqrt(a / b) = sqrt(a b) / b
+            if n % 2:
+                num = ring.product(num, factor)
+            outside = ring.mul(outside, Value(ring.one.num, ((k, (n + 1) // 2),)))
+        else:
+            under.append((k, n))
+    unit, parts = num.factor()
+    number = fraction(unit)
+    root = _root_of_square_in(abs(number.numerator) * number.denominator)
+    outside = ring.mul(outside, ring.number(Fraction(root, number.denominator)))
+    # What is left of the number, and its sign, which stays with what may be negative.
+    left = abs(number.numerator) * number.denominator // root**2
+    rest = ring.context.constant(1 if number > 0 else -1)
+    found = []
+    for factor, n in sorted(parts, key=lambda part: str(part[0])):
+        if _never_negative(factor, positive):
+            outside = ring.mul(outside, Value(ring.reduced(factor ** (int(n) // 2))))
+            found += [Value(factor)] * (int(n) % 2)
+        else:
+            rest = ring.reduced(rest * factor ** int(n))
+    for prime in _PRIMES:
+        if left % prime == 0:
+            left //= prime
+            found.append(ring.number(prime))
+    if left != 1:
+        found.append(ring.number(left))
+    if not rest.is_one() or under:
+        found.append(Value(rest, tuple(under)))
+    while len(found) > ROOTS:
+        found[-2:] = [ring.mul(*found[-2:])]
+    return outside, found
+
+
+def _never_negative(p: Any, positive: Collection[int]) -> bool:
+    """Whether all terms of a polynomial are squares times what is not negative."""
+    return all(c > 0 and all(n % 2 == 0 or k in positive for k, n in enumerate(exponents)) for exponents, c in p.terms())
 
 
 def _root_of_square_in(n: int) -> int:
@@ -170,7 +222,7 @@ def _root_of_square_in(n: int) -> int:
     if isqrt(n) ** 2 == n:
         return isqrt(n)
     root = 1
-    for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31):
+    for prime in _PRIMES:
         while n % prime**2 == 0:
             n, root = n // prime**2, root * prime
     return root * isqrt(n) if isqrt(n) ** 2 == n else root

@@ -15,6 +15,7 @@ from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable
 
 x, y, z = sp.symbols("x y z", real=True)
+l, m = sp.symbols("l m", positive=True)
 
 
 @pytest.mark.parametrize(("left", "right"), [
@@ -25,6 +26,11 @@ x, y, z = sp.symbols("x y z", real=True)
     (1 / (x - y) + 1 / (y - x), 0),
     ((sp.sqrt(x**2 + y**2) + x) * (sp.sqrt(x**2 + y**2) - x), y**2),
     (sp.Abs(x) ** 2, x**2),
+    (sp.sqrt(l**2 * m + 2 * x**2 * m), sp.sqrt(2 * m) * sp.sqrt(l**2 / 2 + x**2)),
+    (sp.sqrt(l**4 / (l**2 + x**2) + l**2), l * sp.sqrt(l**2 + l**2 + x**2) / sp.sqrt(l**2 + x**2)),
+    (sp.sqrt(m + x * y / (l + m)), sp.sqrt((l * m + m**2 + x * y) / (l + m))),
+    (sp.sqrt(1 + sp.cot(x) ** 2), sp.sqrt(1 + 1 / sp.tan(x) ** 2)),
+    (sp.exp(sp.cot(x) ** 2), sp.exp(sp.cos(x) ** 2 / (1 - sp.cos(x) ** 2))),
     (sp.exp(x + y) * sp.exp(y + x), sp.exp(x + y) ** 2),
     (sp.Matrix([[x, x + y], [0, sp.cos(z) ** 2]]), sp.Matrix([[x, y + x], [0, 1 - sp.sin(z) ** 2]])),
     (sp.zeros(2, 2), 0),
