@@ -177,10 +177,26 @@ class Arranger:
                     return self.sum([*tree.terms[:k], turned, *tree.terms[k + 1:]])
         if isinstance(tree, Product) and tree.number < 0:
             for k, (base, power) in enumerate(tree.factors):
-                if isinstance(base, Sum) and power % 2 and len({t.number < 0 for t in base.terms}) == 2:
-                    inside = self.scaled(base, -1)
+                inside = self._turned(base) if isinstance(base, Sum) and power % 2 else None
+                if inside is not None:
                     return self.product(-tree.number, [*tree.factors[:k], (inside, power), *tree.factors[k + 1:]])
         return tree
+
+    def _turned(self, tree: Sum) -> Sum | None:
+        """The opposite of a sum with as many signs; None where it has one more."""
+        if len({t.number < 0 for t in tree.terms}) == 2:
+            return self.scaled(tree, -1)
+        if tree.terms[0].number < 0:
+            return None
+        for k, term in enumerate(tree.terms):
+            opposite = self.product(-term.number, term.factors)
+            turned = self.signed(opposite)
+            if turned is not opposite:
+                rest = [self.product(-t.number, t.factors) for t in (*tree.terms[:k], *tree.terms[k + 1:])]
+                inside = self.sum([turned, *rest])
+                assert isinstance(inside, Sum)
+                return inside
+        return None
 
     # -- forms
 

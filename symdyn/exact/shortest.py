@@ -162,7 +162,7 @@ class Writer:
         if derived is not None and operations <= LONGER * total(tree)[0]:
             other, count = derived()
             if count < sp.count_ops(result):
-                return other
+                return min((other, _taken_out(other)), key=sp.count_ops) if count <= FACTOR_TERMS else other
         return result
 
     def tree(self, value: Value) -> Tree:
@@ -349,6 +349,25 @@ def _sizes(entries: Sequence[Any]) -> dict[Node, int]:
         own = node.op not in ("leaf", "neg", "guard", "item")
         sizes[node] = sum([sizes[a] for a in node.args if isinstance(a, Node)]) + own
     return sizes
+
+
+def _taken_out(e: Any) -> Any:
+    """What stands in several terms of a sum, but not in all, taken out of these: a b + a c + d as a (b + c) + d."""
+    if not e.args or not e.has(sp.Add):
+        return e
+    e = e.func(*[_taken_out(a) for a in e.args])
+    if not e.is_Add:
+        return e
+    terms = [sp.Mul.make_args(term) for term in e.args]
+    counts: dict[sp.Expr, int] = {}
+    for factor in [factor for term in terms for factor in term if not factor.is_Number]:
+        counts[factor] = counts.get(factor, 0) + 1
+    most = max(counts.values(), default=0)
+    if most < 2:
+        return e
+    common = min([factor for factor, n in counts.items() if n == most], key=sp.default_sort_key)
+    inside = sp.Add(*[sp.Mul(*[f for f in term if f != common]) for term in terms if common in term])
+    return sp.Mul(common, _taken_out(inside)) + _taken_out(sp.Add(*[sp.Mul(*term) for term in terms if common not in term]))
 
 
 def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float) -> tuple[sp.Expr, int]:

@@ -17,7 +17,8 @@ q1, q2 = exact_expressions.q1, exact_expressions.q2
 MOST = {("four_bar", "M_tilde"): 162, ("four_bar", "k_tilde"): 76, ("four_bar", "F_tilde"): 46,
         ("n_link_pendulum", "M_tilde"): 1244, ("n_link_pendulum", "k_tilde"): 535, ("n_link_pendulum", "F_tilde"): 161,
         ("three_link_arm", "M_tilde"): 79, ("three_link_arm", "k_tilde"): 143, ("puma560", "M_tilde"): 1998,
-        ("puma560", "F_tilde"): 148, ("flyball_governor", "F_tilde"): 246, ("car_axis", "F_tilde"): 86}
+        ("puma560", "F_tilde"): 148, ("flyball_governor", "F_tilde"): 246, ("car_axis", "F_tilde"): 86, ("car_axis", "F_d"): 75,
+        ("vehicle_on_rotating_track_absolute", "F_d"): 10}
 
 
 @pytest.mark.parametrize("seed", range(120))
