@@ -1,15 +1,15 @@
-"""Whether two formulas are the same: after renaming, by limited simplification, at random points.
+"""Whether two formulas are the same: after renaming, by exact algebra, at random points.
 
-Numbers come first as a refutation, since two expressions that differ at one point differ; that a simplification did not
-finish proves nothing. Points lie at ordinary sizes, at tiny, huge and mixed ones, near special values, and in every branch of a
-Piecewise that a search reaches; the words of a decision name what was covered.
+Exact algebra proves that expressions are equal. A point where values differ refutes it. Where neither is found, which decimal
+numbers and functions without relations make possible, values are sampled: points lie at ordinary sizes, at tiny, huge and mixed
+ones, near special values, and in every branch of a Piecewise that a search reaches; the words of a decision name what was covered,
+and why there is no proof.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
@@ -17,8 +17,8 @@ import sympy as sp
 from symdyn.comparison.branches import Branch, Visits, branches
 from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points, wide_points
 from symdyn.errors import UnsupportedExpression
+from symdyn.exact.prove import unproved
 from symdyn.model.symbols import symbols_of
-from symdyn.report.simplify import shown_zero
 
 # Points of ordinary sizes and of other ones at which values must agree.
 POINTS, WIDE = 12, 12
@@ -31,22 +31,22 @@ ROUNDING = 1e-45
 SAME_DECIMAL, OTHER_DECIMAL, DECIMAL_DIGITS = 1e-13, 1e-9, 13
 # The change of a float, relative to it, that measures this, and the digits in which it is done.
 NUDGE, NUDGE_DIGITS = 1e-20, 60
-# Operations from which simplification is not tried.
-LONGEST = 60
+# Terms that a product may have in a proof: what is larger is sampled.
+TERMS = 100_000
 
 
 @dataclass(frozen=True)
 class Decision:
     """equal: True, False or None (not decided); how it was decided; for unequal ones a point with both values.
 
-    agreed   values were the same at all points tried, so that simplification is worth a try
+    proved   equal by algebra, or different at a point; otherwise values were sampled, and `how` says why
     """
 
     equal: bool | None
     how: str
     point: dict[str, float] | None = None
     values: tuple[float, float] | None = None
-    agreed: bool = False
+    proved: bool = False
 
 
 def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int | None = None) -> list[Decision]:
@@ -55,30 +55,18 @@ def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int
     decimals   printed numbers are rounded to so many decimals
     """
     pairs = list(zip(printed, derived, strict=True))
-    found: list[Decision | None] = [Decision(True, "the same after renaming") if a == b else None for a, b in pairs]
+    found: list[Decision | None] = [Decision(True, "the same after renaming", proved=True) if a == b else None for a, b in pairs]
     open_ones = [k for k, decision in enumerate(found) if decision is None]
+    reasons = dict.fromkeys(open_ones, "printed numbers are rounded")
+    if open_ones and decimals is None:
+        reasons = dict(zip(open_ones, unproved([pairs[k] for k in open_ones], TERMS)))
+        found = [Decision(True, "by exact algebra", proved=True) if reasons.get(k) == "" else decision
+                 for k, decision in enumerate(found)]
+        open_ones = [k for k in open_ones if reasons[k]]
     if open_ones:
         for k, by_number in zip(open_ones, _by_numbers([pairs[k] for k in open_ones], decimals)):
-            found[k] = by_number
-    result = []
-    for (a, b), decision in zip(pairs, found):
-        assert decision is not None
-        if decision.agreed and decimals is None and not (_long(a) or _long(b)) and _vanishes(a - b):
-            decision = Decision(True, "by simplification")
-        result.append(decision)
-    return result
-
-
-def _long(e: sp.Expr) -> bool:
-    """Whether an expression is far longer than what is simplified; stops counting there."""
-    return any(True for _ in islice(sp.preorder_traversal(e), 10 * LONGEST, None))
-
-
-def _vanishes(difference: sp.Expr) -> bool:
-    """Whether a short difference simplifies to zero."""
-    if sp.count_ops(difference) > LONGEST or difference.has(sp.Float):
-        return False
-    return shown_zero(difference)
+            found[k] = replace(by_number, how=f"{by_number.how}; not proved: {reasons[k]}") if by_number.equal else by_number
+    return [decision for decision in found if decision is not None]
 
 
 def _by_numbers(pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> list[Decision]:
@@ -204,11 +192,11 @@ class _Entry:
         if self.different is not None:
             # Where values agree at ordinary sizes, a reader wonders about a verdict that only other sizes give.
             elsewhere = f"; the same to {digits} digits at {covered}" if self.ordinary else ""
-            return Decision(False, f"different at a point{elsewhere}", *self.different)
+            return Decision(False, f"different at a point{elsewhere}", *self.different, proved=True)
         if decimals is not None and (self.agreeing >= (FEWEST if self.names else 1)):
             return Decision(True, f"equal when rounded to {decimals} decimals" + (f" at {covered}" if self.names else ""))
         if not self.names and self.agreeing:
-            return Decision(True, f"equal to {digits} digits", agreed=True)
+            return Decision(True, f"equal to {digits} digits")
         if self.doubtful:
             return Decision(None, f"values agree at {_points(self.agreeing)}; at {self.doubtful} they differ by "
                                   f"up to {self.floats_part:.0e} of what the floats in them make up: above "
@@ -218,8 +206,8 @@ class _Entry:
         if self.unvisited:
             named = "; ".join(branch.text for branch in self.unvisited)
             return Decision(None, f"equal at {covered}, {digits} digits, none of which lies in the "
-                                  f"branch{'es' if len(self.unvisited) > 1 else ''} {named}", agreed=True)
-        return Decision(True, f"equal at {covered}, {digits} digits", agreed=True)
+                                  f"branch{'es' if len(self.unvisited) > 1 else ''} {named}")
+        return Decision(True, f"equal at {covered}, {digits} digits")
 
     def _sizes(self) -> str:
         sizes = [abs(point[name]) for point in self.seen for name in self.names if point[name]]

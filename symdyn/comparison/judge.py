@@ -89,7 +89,7 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     shown, right = taken.shown.rebuilt(), derived.rebuilt()
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
         a, b = (shown.entries[k], right.entries[k]) if decision.how != SHAPE else (None, None)
-        entry = EntryResult(place, Verdict.EQUAL, decision.how, "", a, b, decision.point, decision.values)
+        entry = EntryResult(place, Verdict.EQUAL, decision.how, "", a, b, decision.point, decision.values, decision.proved)
         entries.append(_verdict(entry, decision, convention, errata, unreadable.get(place, "")))
     return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(shown), _shown(right),
                          tuple(entries), tuple(e.result for e in errata), convention.name if convention else "",
@@ -164,7 +164,7 @@ def _decide(taken: _Taken, derived: Value) -> list[Decision]:
     printed = taken.printed
     assert printed is not None
     if printed.shape != derived.shape:
-        return [Decision(False, SHAPE)]
+        return [Decision(False, SHAPE, proved=True)]
     try:
         a, b = (v.replaced(by_name(v, taken.where)).entries for v in (printed, derived))
         same = canonical(a, b)

@@ -29,6 +29,7 @@ class EntryResult:
 
     note      convention, sentence about the error, or what could not be read or decided
     point     where printed and derived differ, and `values` there
+    proved    equality is proved by algebra, or refuted at the point; otherwise values were sampled, and `how` says why
     """
 
     index: tuple[int, ...]
@@ -39,6 +40,7 @@ class EntryResult:
     right: Any = None
     point: Mapping[str, float] | None = None
     values: tuple[float, float] | None = None
+    proved: bool = False
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def prove(a: Any, b: Any = 0) -> Proof:
     except (UnsupportedExpression, ZeroDivisionError) as error:
         return Proof(False, reason=str(error))
     n = len(left)
-    recorder = next((leaf.recorder for leaf in symbols), Recorder())
+    recorder = _recorder(nodes)
     pairs = [(x if isinstance(x, Node) else recorder.add(x, 0), y) for x, y in zip(nodes[:n], nodes[n:])]
     proof = decide(recorder, pairs, symbols, columns=columns)
     others = sorted({str(s) for e in right for s in symbols_of(e)} ^ {str(s) for e in left for s in symbols_of(e)})
@@ -114,6 +114,33 @@ def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
     return list(a), list(b), a.cols
 
 
+def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND) -> list[str]:
+    """Why exact algebra does not prove the sides of each pair equal; "" where it does, for real values of their symbols.
+
+    bound   terms that a product may have
+    What stands in the way of all pairs together, such as a pair that is too large, is looked for pair by pair.
+    """
+    try:
+        nodes, symbols = recorded([side for pair in pairs for side in pair])
+        recorder = _recorder(nodes)
+        exact = Exact([recorder.sub(x, y) for x, y in zip(nodes[::2], nodes[1::2])], bound, positive=not_negative(symbols))
+    except (UnsupportedExpression, ZeroDivisionError, TooLarge) as error:
+        return [str(error)] if len(pairs) == 1 else [unproved([pair], bound)[0] for pair in pairs]
+    without = _without_relations(exact)
+    return ["" if not len(value.num) else f"the normal forms differ{without}" for value in exact.values]
+
+
+def _recorder(nodes: Sequence[Any]) -> Recorder:
+    """The recorder of the nodes; of numbers alone a new one."""
+    return next((node.recorder for node in nodes if isinstance(node, Node)), None) or Recorder()
+
+
+def _without_relations(exact: Exact) -> str:
+    """Functions that different normal forms may come from."""
+    names = sorted({atom.op for atom in exact.atoms.values()} - {"pi"})
+    return f"; functions whose relations are not all known: {', '.join(names)}" if names else ""
+
+
 def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mapping[Node, sp.Expr], columns: int = 0,
            unit_vectors: Sequence[Sequence[Node]] = (), bound: int = BOUND) -> Proof:
     """Whether both nodes of every pair have equal values.
@@ -135,9 +162,7 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         if not doubtful:
             return Proof(True)
         reason = "the normal forms differ, at no state that was tried do the values"
-        names = sorted({atom.op for atom in exact.atoms.values()} - {"pi"})
-        if names:
-            reason += f"; functions whose relations are not all known: {', '.join(names)}"
+        reason += _without_relations(exact)
     except TooLarge as error:
         doubtful, exact = list(range(len(pairs))), None
         reason = f"{error}; ask for a part of it, or put numbers in place of parameters"
