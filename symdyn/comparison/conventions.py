@@ -10,7 +10,6 @@ import sympy as sp
 
 from symdyn.comparison.check import as_tuple, is_count, text, told
 from symdyn.comparison.equality import decide
-from symdyn.comparison.values import canonical
 from symdyn.errors import CaseError, ModelError
 from symdyn.model.symbols import as_expression
 
@@ -82,7 +81,7 @@ def scaled(factor: Any, sentence: str) -> Convention:
         taken = as_expression(factor, "the common factor")
     except ModelError as error:
         raise CaseError(error.faults) from None
-    if decide([taken.xreplace(canonical([taken]))], [sp.S.Zero])[0].equal:
+    if decide([taken], [sp.S.Zero])[0].equal:
         raise CaseError([f"the common factor {factor} is zero, and would make all formulas equal; pass one that is not"])
     return Convention("common factor", sentence, lambda derived: derived * taken)
 

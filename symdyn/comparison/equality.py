@@ -8,7 +8,7 @@ and why there is no proof.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ import sympy as sp
 
 from symdyn.comparison.branches import Branch, Visits, branches
 from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, points, wide_points
+from symdyn.comparison.values import canonical
 from symdyn.errors import UnsupportedExpression
 from symdyn.exact.prove import unproved
 from symdyn.model.symbols import symbols_of
@@ -49,24 +50,45 @@ class Decision:
     proved: bool = False
 
 
+SAME = Decision(True, "the same after renaming", proved=True)
+
+
+def unformed(error: Exception) -> Decision:
+    """Of an entry that SymPy does not form with the values or symbols that are put into it."""
+    return Decision(None, f"SymPy cannot form it with real symbols: {error}")
+
+
 def decide(printed: Sequence[sp.Expr], derived: Sequence[sp.Expr], decimals: int | None = None) -> list[Decision]:
-    """Entry by entry; symbols are the same if they are the same objects (see values.canonical).
+    """Entry by entry; symbols of one name are the same (see values.canonical).
 
     decimals   printed numbers are rounded to so many decimals
     """
     pairs = list(zip(printed, derived, strict=True))
-    found: list[Decision | None] = [Decision(True, "the same after renaming", proved=True) if a == b else None for a, b in pairs]
-    open_ones = [k for k, decision in enumerate(found) if decision is None]
-    reasons = dict.fromkeys(open_ones, "printed numbers are rounded")
-    if open_ones and decimals is None:
-        reasons = dict(zip(open_ones, unproved([pairs[k] for k in open_ones], TERMS)))
-        found = [Decision(True, "by exact algebra", proved=True) if reasons.get(k) == "" else decision
-                 for k, decision in enumerate(found)]
-        open_ones = [k for k in open_ones if reasons[k]]
-    if open_ones:
-        for k, by_number in zip(open_ones, _by_numbers([pairs[k] for k in open_ones], decimals)):
-            found[k] = replace(by_number, how=f"{by_number.how}; not proved: {reasons[k]}") if by_number.equal else by_number
-    return [decision for decision in found if decision is not None]
+    found: dict[int, Decision] = {k: SAME for k, (a, b) in enumerate(pairs) if a == b}
+    same = canonical([side for k, pair in enumerate(pairs) if k not in found for side in pair])
+    if decimals is None:
+        _prove(pairs, found, same)
+    for k, pair in enumerate(pairs):
+        if k not in found:
+            try:
+                pairs[k] = pair[0].xreplace(same), pair[1].xreplace(same)
+            except (ValueError, TypeError) as error:  # such as the larger of a complex number and another
+                found[k] = unformed(error)
+            else:
+                found |= {k: SAME} if pairs[k][0] == pairs[k][1] else {}
+    reasons = _prove(pairs, found, {}) if decimals is None else dict.fromkeys(range(len(pairs)), "printed numbers are rounded")
+    rest = [k for k in range(len(pairs)) if k not in found]
+    for k, decision in zip(rest, _by_numbers([pairs[k] for k in rest], decimals) if rest else []):
+        found[k] = replace(decision, how=f"{decision.how}; not proved: {reasons[k]}") if decision.equal else decision
+    return [found[k] for k in range(len(pairs))]
+
+
+def _prove(pairs: Sequence[tuple[sp.Expr, sp.Expr]], found: dict[int, Decision], same: Mapping[Any, Any]) -> dict[int, str]:
+    """Decide what exact algebra proves, and return why it does not prove the others."""
+    open_ones = [k for k in range(len(pairs)) if k not in found]
+    reasons = dict(zip(open_ones, unproved([pairs[k] for k in open_ones], TERMS, same) if open_ones else []))
+    found |= {k: Decision(True, "by exact algebra", proved=True) for k, reason in reasons.items() if not reason}
+    return reasons
 
 
 def _by_numbers(pairs: list[tuple[sp.Expr, sp.Expr]], decimals: int | None) -> list[Decision]:

@@ -9,8 +9,8 @@ from typing import Any
 import sympy as sp
 
 from symdyn.comparison.case import Case, Erratum, Formula
-from symdyn.comparison.equality import Decision, decide
-from symdyn.comparison.values import Value, by_name, canonical, rebuilt, renaming, take
+from symdyn.comparison.equality import Decision, decide, unformed
+from symdyn.comparison.values import Value, by_name, rebuilt, renaming, take
 from symdyn.comparison.values import taken as value_of
 from symdyn.comparison.verdict import EntryResult, ErratumResult, FormulaResult, Verdict
 from symdyn.errors import CaseError
@@ -167,10 +167,8 @@ def _decide(taken: _Taken, derived: Value) -> list[Decision]:
         return [Decision(False, SHAPE, proved=True)]
     try:
         a, b = (v.replaced(by_name(v, taken.where)).entries for v in (printed, derived))
-        same = canonical(a, b)
-        a, b = tuple(e.xreplace(same) for e in a), tuple(e.xreplace(same) for e in b)
-    except (ValueError, TypeError) as error:  # such as the larger of a complex number and another
-        return [Decision(None, f"SymPy cannot form it with real symbols: {error}") for _ in printed.entries]
+    except (ValueError, TypeError) as error:
+        return [unformed(error) for _ in printed.entries]
     decisions = decide(a, b, taken.formula.decimals)
     if printed.sides is None or all(d.equal for d in decisions):
         return decisions

@@ -26,7 +26,8 @@ class Value:
         """With every expression made anew from its parts, as it comes back from another process: SymPy then multiplies
         numbers into sums that were factored."""
         sides = None if self.sides is None else (self.sides[0].rebuilt(), self.sides[1].rebuilt())
-        return Value(self.shape, tuple(map(rebuilt, self.entries)), sides)
+        done: dict[Any, Any] = {}
+        return Value(self.shape, tuple([rebuilt(e, done) for e in self.entries]), sides)
 
     def as_sympy(self) -> Any:
         """The expression or matrix."""
@@ -47,9 +48,15 @@ class Value:
         return [(i, j) if columns > 1 else (i,) for i in range(rows) for j in range(columns)]
 
 
-def rebuilt(e: Any) -> Any:
-    """An expression made anew from its parts."""
-    return e.func(*map(rebuilt, e.args)) if e.args else e
+def rebuilt(e: Any, done: dict[Any, Any] | None = None) -> Any:
+    """An expression made anew from its parts; done: part -> what was made of it."""
+    if not e.args:
+        return e
+    done = {} if done is None else done
+    found = done.get(e)
+    if found is None:
+        found = done[e] = e.func(*[rebuilt(part, done) for part in e.args])
+    return found
 
 
 def take(value: Any, what: str, faults: list[str]) -> Value | None:
@@ -148,6 +155,8 @@ def renaming(given: Mapping[Any, Any], what: str, faults: list[str]) -> dict[str
 
 def by_name(value: Value, replacements: Mapping[str, sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
     """Those replacements that the value's symbols ask for."""
+    if not replacements:
+        return {}
     symbols = {s for e in value.entries for s in symbols_of(e)}
     if value.sides is not None:
         symbols |= {s for side in value.sides for e in side.entries for s in symbols_of(e)}

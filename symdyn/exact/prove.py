@@ -114,18 +114,18 @@ def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
     return list(a), list(b), a.cols
 
 
-def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND) -> list[str]:
+def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same: Mapping[Any, Any] | None = None) -> list[str]:
     """Why exact algebra does not prove the sides of each pair equal; "" where it does, for real values of their symbols.
 
-    bound   terms that a product may have
+    bound   terms that a product may have; same: symbol -> the one that it is taken for
     What stands in the way of all pairs together, such as a pair that is too large, is looked for pair by pair.
     """
     try:
-        nodes, symbols = recorded([side for pair in pairs for side in pair])
+        nodes, symbols = recorded([side for pair in pairs for side in pair], same)
         recorder = _recorder(nodes)
         exact = Exact([recorder.sub(x, y) for x, y in zip(nodes[::2], nodes[1::2])], bound, positive=not_negative(symbols))
     except (UnsupportedExpression, ZeroDivisionError, TooLarge) as error:
-        return [str(error)] if len(pairs) == 1 else [unproved([pair], bound)[0] for pair in pairs]
+        return [str(error)] if len(pairs) == 1 else [unproved([pair], bound, same)[0] for pair in pairs]
     without = _without_relations(exact)
     return ["" if not len(value.num) else f"the normal forms differ{without}" for value in exact.values]
 

@@ -2,37 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ArgumentError
-from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, symbols_of, time
+from symdyn.model.symbols import Acceleration, Coordinate, Input, Rate, Speed, parts_of, symbols_of, time
 from symdyn.shown import shown
 from symdyn.tape.node import COORDINATE, PARAMETER, SPEED, Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
 
 
-def recorded(expressions: Iterable[Any]) -> tuple[list[Any], dict[Node, sp.Expr]]:
+def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) -> tuple[list[Any], dict[Node, sp.Expr]]:
     """Entries (nodes and numbers) of the expressions, and what each leaf stands for.
 
+    same   symbol -> the one that it is taken for
     Functions without a value, such as q(t), and their derivatives are leaves. Raises UnsupportedExpression for functions that no
     code can be generated for, ZeroDivisionError for a division by zero, ArgumentError for text, which is never evaluated, and
     anything else that is no expression.
     """
     expressions = [_taken(e) for e in expressions]
+    same = same or {}
     found: set[Any] = set()
     for e in expressions:
-        found |= symbols_of(e) | e.atoms(AppliedUndef, sp.Derivative, sp.Integral)
+        parts = parts_of(e)
+        found |= symbols_of(e) | {part for part in parts if isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral))}
     recorder = Recorder()
     leaves: dict[sp.Basic, Any] = {}
     symbols: dict[Node, sp.Expr] = {}
-    for k, symbol in enumerate(sorted(found, key=sp.default_sort_key)):
+    for k, symbol in enumerate(sorted({same.get(symbol, symbol) for symbol in found}, key=sp.default_sort_key)):
         leaf = recorder.leaf(f"x{k}", _kind(symbol))
         leaves[symbol], symbols[leaf] = leaf, symbol
+    leaves |= {symbol: leaves[same[symbol]] for symbol in found if symbol in same}
     memory: dict[sp.Basic, Any] = {}
     return [record_expression(recorder, e, leaves, memory) for e in expressions], symbols
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -218,6 +219,10 @@ def motions(names: str, **assumptions: Any) -> Any:
 
 def symbols_of(expression: Any) -> set[Any]:
     """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
+    if isinstance(expression, sp.Expr):
+        parts = parts_of(expression)
+        if all(map(_free_of_its_own, {type(part) for part in parts})):
+            return {part for part in parts if isinstance(part, sp.Symbol)}
     free: set[Any] = expression.free_symbols
     return free - {time} if time in free and not expression.has(time) else free
 
@@ -273,22 +278,43 @@ def _taken(value: Any, what: str) -> sp.Expr:
             value = None
     if not isinstance(value, sp.Basic):
         raise ModelError([f"{what} is {shown(value)}; pass a number or an expression of SymPy symbols"])
-    if value.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
+    parts = parts_of(value)
+    if not parts.isdisjoint((sp.nan, sp.oo, -sp.oo, sp.zoo)):
         raise ModelError([f"{what} is {value}; pass a finite number or expression"])
-    beyond = [n for n in value.atoms(sp.Number) if not _is_double(n)]
+    beyond = [n for n in parts if isinstance(n, sp.Number) and not _is_double(n)]
     if beyond:
         raise ModelError([f"{what} holds {shown(int(beyond[0]))}, which is beyond the range of double precision, 1.8e308; pass "
                           "smaller numbers, in other units if need be"])
     if not isinstance(value, sp.Expr) or value.is_Matrix:
         raise ModelError([f"{what} is {value} of type {type(value).__name__}; pass a scalar expression"])
-    if value.has(sp.I):
+    if sp.I in parts:
         raise ModelError([f"{what} is {value}, a complex number; pass a real number or expression"])
+    if not any(isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral)) for part in parts):
+        return value
     taken = take_over(value)
     unknown = sorted(map(str, taken.atoms(AppliedUndef, sp.Derivative, sp.Integral)))
     if unknown:
         raise ModelError([f"{what} uses {', '.join(unknown)}, which has no value; write it out, "
                           "use a coordinate and its .dot, an input, or a function of your own, sd.External"])
     return taken
+
+
+def parts_of(value: sp.Basic) -> set[sp.Basic]:
+    """The expression and all that it is made of, each once."""
+    found: set[sp.Basic] = set()
+    left = [value]
+    while left:
+        part = left.pop()
+        if part not in found:
+            found.add(part)
+            left.extend(part.args)
+    return found
+
+
+@cache
+def _free_of_its_own(kind: type) -> bool:
+    """Whether the free symbols of an expression of this kind are those of its parts; not of sums and integrals."""
+    return kind.free_symbols is sp.Basic.free_symbols or issubclass(kind, sp.Symbol)  # type: ignore[attr-defined]
 
 
 def _is_double(value: sp.Number) -> bool:
