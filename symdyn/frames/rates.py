@@ -54,12 +54,14 @@ def taken(what: str, value: Any) -> sp.Expr:
 def differentiated(expressions: Iterable[sp.Expr]) -> list[sp.Expr]:
     """The rates of expressions that were taken over. Raises ModelError naming all symbols without a rate."""
     entries = list(expressions)
-    symbols = sorted({s for e in entries for s in symbols_of(e)}, key=lambda s: (s.name, str(type(s))))
+    own = [symbols_of(e) for e in entries]
+    symbols = sorted(set().union(*own), key=lambda s: (s.name, str(type(s))))
     faults = [fault for s in symbols for fault in _faults(s)]
     if faults:
         raise ModelError(faults)
     moving = [s for s in symbols if isinstance(s, (Coordinate, Rate, GivenMotion, GivenRate))]
-    return [sp.Add(partial_rate(e), *[e.diff(s) * s.dot for s in moving if e.has(s)]) for e in entries]
+    return [sp.Add(partial_rate(e) if time in there else 0, *[e.diff(s) * s.dot for s in moving if s in there])
+            for e, there in zip(entries, own)]
 
 
 def moves(symbol: sp.Symbol) -> bool:

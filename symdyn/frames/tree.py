@@ -17,6 +17,7 @@ import sympy as sp
 from symdyn.errors import ArgumentError
 from symdyn.frames.checks import FrameFaults
 from symdyn.frames.euler_parameters import spin_by_parameters
+from symdyn.frames.product import times
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tidy import tidy
 from symdyn.shown import shown
@@ -56,14 +57,14 @@ class Axes:
         """Angular velocity in the parent, its components: R_dot R^T = [omega x], or 2 E p_dot by Euler parameters."""
         if self._by_parameters is not None:
             return self._by_parameters[0]
-        return _axial(sp.Matrix(3, 3, differentiated(self.turn)) * self.turn.T)
+        return _axial(times(sp.Matrix(3, 3, differentiated(self.turn)), self.turn.T))
 
     @cached_property
     def omega_in_itself(self) -> sp.ImmutableMatrix:
         """Angular velocity in the parent, components along these axes: R^T R_dot = [omega x]."""
         if self._by_parameters is not None:
             return self._by_parameters[1]
-        return _axial(self.turn.T * sp.Matrix(3, 3, differentiated(self.turn)))
+        return _axial(times(self.turn.T, sp.Matrix(3, 3, differentiated(self.turn))))
 
     @cached_property
     def alpha_in_parent(self) -> sp.ImmutableMatrix:
@@ -109,7 +110,7 @@ def rotation_between(of: Axes, to: Axes) -> sp.ImmutableMatrix:
     demand_frames(of=of, to=to)
     R = sp.ImmutableMatrix(sp.eye(3))
     for child, sign, _ in links(of, to):
-        R = (child.turn.T if sign > 0 else child.turn) * R
+        R = times(child.turn.T if sign > 0 else child.turn, R)
     return R
 
 
@@ -119,7 +120,7 @@ def along(vector: sp.MatrixBase, given_in: Axes, components: Axes) -> sp.Immutab
         return ZERO
     result = sp.ImmutableMatrix(vector)
     for child, sign, _ in links(given_in, components):
-        result = (child.turn.T if sign > 0 else child.turn) * result
+        result = times(child.turn.T if sign > 0 else child.turn, result)
     return result
 
 

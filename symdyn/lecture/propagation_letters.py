@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from symdyn.frames.product import times
 from symdyn.spatial.sixvectors import force_cross, motion_cross
 from symdyn.spatial.vectors import vector
 
@@ -79,7 +80,9 @@ def _sum(tokens: list[str], letter: Callable[[str], Any]) -> Any:
 def _product(tokens: list[str], letter: Callable[[str], Any]) -> Any:
     value = _factor(tokens, letter)
     while tokens and tokens[0] not in ("+", "-", ")", "]", ")^-1"):
-        value = value * _factor(tokens, letter)
+        factor = _factor(tokens, letter)
+        both = isinstance(value, sp.MatrixBase) and isinstance(factor, sp.MatrixBase)
+        value = times(value, factor) if both else value * factor
     return value
 
 

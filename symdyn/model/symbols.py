@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cache
+from inspect import getattr_static
 from typing import Any
 
 import numpy as np
@@ -219,8 +220,9 @@ def motions(names: str, **assumptions: Any) -> Any:
 
 def symbols_of(expression: Any) -> set[Any]:
     """The free symbols of an expression or matrix; t only where it stands there itself (see Timed)."""
-    if isinstance(expression, sp.Expr):
-        parts = parts_of(expression)
+    entries = list(expression) if isinstance(expression, sp.MatrixBase) else [expression]
+    if all(isinstance(e, sp.Expr) for e in entries):
+        parts = parts_of(*entries)
         if all(map(_free_of_its_own, {type(part) for part in parts})):
             return {part for part in parts if isinstance(part, sp.Symbol)}
     free: set[Any] = expression.free_symbols
@@ -299,10 +301,10 @@ def _taken(value: Any, what: str) -> sp.Expr:
     return taken
 
 
-def parts_of(value: sp.Basic) -> set[sp.Basic]:
-    """The expression and all that it is made of, each once."""
+def parts_of(*expressions: sp.Basic) -> set[sp.Basic]:
+    """The expressions and all that they are made of, each once."""
     found: set[sp.Basic] = set()
-    left = [value]
+    left = list(expressions)
     while left:
         part = left.pop()
         if part not in found:
@@ -314,7 +316,7 @@ def parts_of(value: sp.Basic) -> set[sp.Basic]:
 @cache
 def _free_of_its_own(kind: type) -> bool:
     """Whether the free symbols of an expression of this kind are those of its parts; not of sums and integrals."""
-    return kind.free_symbols is sp.Basic.free_symbols or issubclass(kind, sp.Symbol)  # type: ignore[attr-defined]
+    return issubclass(kind, sp.Symbol) or getattr_static(kind, "free_symbols", None) is sp.Basic.__dict__["free_symbols"]
 
 
 def _is_double(value: sp.Number) -> bool:
