@@ -34,7 +34,7 @@ _HOME = {
     "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
     "symdyn.urdf.read": ("read_urdf",),
-    "symdyn.comparison": ("Case", "Erratum", "Formula", "Slide", "compare"),
+    "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
     "symdyn.runtime.tables": ("Table",),
     "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",

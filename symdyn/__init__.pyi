@@ -11,6 +11,7 @@ from symdyn import systems as systems
 from symdyn.comparison import Case as Case
 from symdyn.comparison import Erratum as Erratum
 from symdyn.comparison import Formula as Formula
+from symdyn.comparison import Remark as Remark
 from symdyn.comparison import Slide as Slide
 from symdyn.comparison import compare as compare
 from symdyn.comparison import conventions as conventions

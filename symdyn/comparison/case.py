@@ -39,11 +39,13 @@ class Erratum:
     why       one sentence
     proof     something independent of the formula that the right one fulfils and the printed one does not; see symdyn.proofs
     entries   their indices, [(i, j), ...] or [(i,), ...] of a vector; None: all that differ
+    slip      one sentence, the same for all errata that repeat one slip: they are listed once, with all places; default: `why`
     """
 
     why: str
     proof: Proof
     entries: Sequence[tuple[int, ...]] | None = None
+    slip: str = ""
 
     def __post_init__(self) -> None:
         entries = as_tuple(self.entries)
@@ -51,7 +53,7 @@ class Erratum:
 
     def faults(self, what: str) -> list[str]:
         """What is missing; what: which erratum it is."""
-        faults = text(self.why, f"`why` of {what}")
+        faults = text(self.why, f"`why` of {what}") + text(self.slip, f"`slip` of {what}", empty=True)
         if not isinstance(self.proof, Proof):
             faults.append(f"`proof` of {what} is {told(self.proof)}; pass one of symdyn.proofs")
         if self.entries is None:
@@ -60,6 +62,29 @@ class Erratum:
             faults.append(f"`entries` of {what} is {told(self.entries)}; pass a list of index {INDEX}{_meant(self.entries)}")
         elif not self.entries:
             faults.append(f"`entries` of {what} is empty; name entries, or leave it out for all that differ")
+        return faults
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What is wrong on a slide without a formula to compare: a label, a word, an index that changes no value.
+
+    why          one sentence
+    line, also   where it is printed, and where it is printed again
+    """
+
+    why: str
+    line: int | None = None
+    also: Sequence[int] = ()
+
+    def __post_init__(self) -> None:
+        _set(self, also=as_tuple(self.also, Integral))
+
+    def faults(self) -> list[str]:
+        """Everything of a wrong type."""
+        faults = text(self.why, "`why` of a remark") + _line(self.line, "the line of a remark")
+        if not isinstance(self.also, tuple) or not all(map(is_count, self.also)):
+            faults.append(f"`also` of a remark is {told(self.also)}; pass numbers of lines, [3, 7]")
         return faults
 
 
@@ -143,6 +168,7 @@ class Case:
                compared)
     printed    the short form: {name: what the slide prints}, compared with `derived`
     derived    equations of symdyn, whose attributes have those names, or a dict
+    remarks    labels and words of the slides that are wrong
 
     A pendulum of your own slides, derived and compared in a few lines:
 
@@ -155,9 +181,10 @@ class Case:
     formulas: Sequence[Formula] | Callable[[], Sequence[Formula]] = ()
     printed: Mapping[str, Any] = field(default_factory=dict)
     derived: Any = None
+    remarks: Sequence[Remark] = ()
 
     def __post_init__(self) -> None:
-        _set(self, slide=_as_slide(self.slide), formulas=as_tuple(self.formulas, Formula))
+        _set(self, slide=_as_slide(self.slide), formulas=as_tuple(self.formulas, Formula), remarks=as_tuple(self.remarks, Remark))
 
     def taken(self) -> list[Formula]:
         """All formulas, with their slides.
@@ -166,6 +193,8 @@ class Case:
         What the functions of a formula raise later is a CaseError too.
         """
         faults = text(self.name, "the name of a case") + text(self.title, "`title`", empty=True) + _slide(self.slide, "`slide`")
+        faults += members(self.remarks, "`remarks`", Remark, "symdyn.Remark(why, line)")
+        faults += [fault for remark in _those(self.remarks, Remark) for fault in remark.faults()]
         formulas = self._listed(faults) + self._short(faults)
         if not formulas and not faults:
             faults.append("it has no formulas; pass formulas=[...], or printed={...} and derived=...")

@@ -2,8 +2,8 @@
 
 Exact algebra proves that expressions are equal. A point where values differ refutes it. Where neither is found, which decimal
 numbers and functions without relations make possible, values are sampled: points lie at ordinary sizes, at tiny, huge and mixed
-ones, near special values, and in every branch of a Piecewise that a search reaches; the words of a decision name what was covered,
-and why there is no proof.
+ones, near special values, and in every branch of a Piecewise that a search reaches; the words of a decision name what was
+covered, and why there is no proof.
 """
 
 from __future__ import annotations

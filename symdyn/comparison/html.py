@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from symdyn.comparison.result import COLUMNS, Comparison, Comparisons
+from symdyn.comparison.result import COLUMNS, Comparison, Comparisons, worded
 from symdyn.comparison.typeset import formula_latex, marked
 from symdyn.comparison.verdict import Verdict
 
@@ -32,7 +32,7 @@ def comparison_html(comparison: Comparison) -> str:
     rows = []
     for f in comparison.formulas:
         notes = dict.fromkeys([*(e.note for e in f.entries if e.note), *(str(e.evidence) for e in f.errata)])
-        told = "<br>".join(f'<span style="color:{STYLE[v]}">{n} {v.value}</span>' for v in Verdict if (n := f.counts[v]))
+        told = "<br>".join(f'<span style="color:{STYLE[v]}">{words}</span>' for v, words in worded(f.entries))
         printed = f"${formula_latex(f.printed, marked(f), 'red')}$" if f.printed is not None else ""
         derived = f"${formula_latex(f.derived)}$" if f.derived is not None else ""
         line = f"<br>line {f.slide.line}" if f.slide.line is not None else ""

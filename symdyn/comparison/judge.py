@@ -135,7 +135,7 @@ class _Errata:
         self.places = set(claimed)
         named = [p for p in claimed if p] if decisions[0].how != SHAPE else None
         evidence = erratum.proof.check(taken.printed.as_sympy(), derived.as_sympy(), taken.where, named or None)
-        self.result = ErratumResult(tuple(claimed), erratum.why, evidence)
+        self.result = ErratumResult(tuple(claimed), erratum.why, evidence, erratum.slip or erratum.why)
 
 
 def _places(printed: Value, decisions: Sequence[Decision]) -> list[tuple[int, ...]]:

@@ -12,7 +12,8 @@ from typing import Any
 import jinja2
 
 from symdyn.backend.source import template_folders
-from symdyn.comparison.result import COLUMNS, Comparison, Comparisons, counted
+from symdyn.comparison.case import Remark
+from symdyn.comparison.result import COLUMNS, PROVABLE, Comparison, Comparisons, counted, worded
 from symdyn.comparison.typeset import (
     SHOWN,
     Lines,
@@ -31,6 +32,9 @@ from symdyn.errors import ArgumentError
 from symdyn.report.latex import letters
 
 FILES = ("comparison.html", "comparison.tex", "errata.html", "errata.md")
+# What the pages say of their first column.
+PRINTED = ("\u201cPrinted\u201d is what the transcription of the slides as text holds, with what it may have lost or changed. "
+           "What it visibly lost is unreadable, and no error of a slide.")
 # Letters in a line of a column, and of a page.
 COLUMN, PAGE = 50, 106
 # The same of the list of errata.
@@ -67,10 +71,13 @@ def report(comparisons: Comparisons, name: str) -> str:
     pages = Pages(*((cache(lambda latex: _safe(mathml(latex))), "#b00020") if ending == "html" else (str, "wrong")))
     of_errata = name.startswith("errata")
     cases = [] if of_errata else [_case(c, pages) for c in comparisons]
-    errata = [e for c in comparisons for e in (_errata(c, pages, ending == "html") if of_errata else c.errata)]
     return environment.get_template(f"report/{name}.jinja").render(
-        cases=cases, errata=errata, columns=[(v.name.lower(), text) for v, text in COLUMNS.items()],
-        counts={v.name.lower(): comparisons.counts[v] for v in Verdict}, total=sum(comparisons.counts.values()))
+        cases=cases, slips=_slips(comparisons, pages, ending == "html") if of_errata else [],
+        n_errata=sum(len(c.errata) for c in comparisons), n_slips=len({e.slip for c in comparisons for _, e in c.errata}),
+        remarks=[_remark(c, remark) for c in comparisons for remark in c.remarks], printed=PRINTED,
+        columns=[(v.name.lower(), text) for v, text in COLUMNS.items()],
+        counts={v.name.lower(): comparisons.counts[v] for v in Verdict}, total=sum(comparisons.counts.values()),
+        proved=comparisons.proved, decided=sum(comparisons.counts[v] for v in PROVABLE))
 
 
 @dataclass(frozen=True)
@@ -108,14 +115,28 @@ def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
     ways = list(dict.fromkeys(e.how for e in formula.entries if e.how))
     return {"name": formula.name, "slide": str(formula.slide), "also": ", ".join(map(str, formula.also)), "wide": wide,
             "verdict": formula.verdict.name.lower(),
-            "told": ", ".join(f"{n} {v.value}" if len(formula.entries) > 1 else v.value
-                              for v in Verdict if (n := formula.counts[v])),
+            "told": "; ".join(words if len(formula.entries) > 1 else words.removeprefix("1 ")
+                              for _, words in worded(formula.entries)),
             "printed": pages.lines(room, formula.printed, marked(formula), name) if formula.printed is not None
             else [pages.typeset(name)] if name else [],
             "derived": pages.lines(room, formula.derived) if formula.derived is not None else [],
             "where": [pages.typeset(line) for line in where_lines(formula, room)], "notes": notes,
             "ways": ", ".join([*ways, "on the states told"] if formula.where and ways else ways),
             "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
+
+
+def _slips(comparisons: Comparisons, pages: Pages, broken: bool) -> list[dict[str, Any]]:
+    """The errata of all cases, those that repeat one slip together, at the place of the first."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for case in comparisons:
+        for erratum in _errata(case, pages, broken):
+            found.setdefault(erratum["slip"], []).append(erratum)
+    return [{"sentence": slip, "errata": errata} for slip, errata in found.items()]
+
+
+def _remark(case: Comparison, remark: Remark) -> dict[str, Any]:
+    return {"why": remark.why, "line": remark.line, "also": ", ".join(map(str, remark.also)), "case": case.name,
+            "section": case.slide.section if case.slide else ""}
 
 
 def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]]:
@@ -129,7 +150,7 @@ def _errata(case: Comparison, pages: Pages, broken: bool) -> list[dict[str, Any]
         letters = formula.latex or ""
         rows.append({"case": case.name, "formula": formula.name,
                      "latex": [pages.typeset(letters)] if broken and letters else letters,
-                     "slide": slide or case.title or case.name, "why": erratum.why,
+                     "slide": slide or case.title or case.name, "why": erratum.why, "slip": erratum.slip,
                      "line": formula.slide.line, "also": ", ".join(map(str, formula.also)), "wide": wide,
                      "kind": evidence.kind, "sentence": evidence.sentence.rstrip(".") + ".",
                      "printed_residual": f"{evidence.printed:.2g}", "right_residual": _rounding(evidence.right),

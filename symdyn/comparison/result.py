@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import sympy as sp
 
-from symdyn.comparison.case import Slide
-from symdyn.comparison.verdict import ErratumResult, FormulaResult, Verdict
+from symdyn.comparison.case import Remark, Slide
+from symdyn.comparison.verdict import EntryResult, ErratumResult, FormulaResult, Verdict
 from symdyn.counting import counted
 
 COLUMNS = {Verdict.EQUAL: "equal", Verdict.CONVENTION: "convention", Verdict.WRONG: "wrong", Verdict.UNREADABLE: "unreadable",
            Verdict.DIFFERENT: "different", Verdict.UNDECIDED: "not decided"}
+# Verdicts that a proof or a refutation may stand behind.
+PROVABLE = (Verdict.EQUAL, Verdict.CONVENTION, Verdict.WRONG, Verdict.DIFFERENT)
 
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """A case beside what symdyn derives: `formulas` with their entries, `counts` of verdicts; prints as a table."""
+    """A case beside what symdyn derives: `formulas` with their entries, `counts` of verdicts, `remarks`; prints as a table."""
 
     name: str
     title: str
     slide: Slide | None
     formulas: tuple[FormulaResult, ...]
     seconds: float = 0.0
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def counts(self) -> Counter[Verdict]:
@@ -39,6 +42,16 @@ class Comparison:
         return [(f, e) for f in self.formulas for e in f.errata if e.evidence.holds]
 
     @property
+    def proved(self) -> int:
+        """Number of entries whose equality is proved by algebra, or refuted at a state."""
+        return sum(e.proved for f in self.formulas for e in f.entries if e.verdict in PROVABLE)
+
+    @property
+    def sampled(self) -> list[tuple[FormulaResult, EntryResult]]:
+        """Entries that are decided by random points alone, with the formulas they are in; `how` of each says why."""
+        return [(f, e) for f in self.formulas for e in f.entries if e.verdict in PROVABLE and not e.proved]
+
+    @property
     def decided(self) -> bool:
         """Whether every entry has a verdict that stands: none different without proof, none undecided."""
         return not self.counts[Verdict.DIFFERENT] and not self.counts[Verdict.UNDECIDED]
@@ -49,9 +62,10 @@ class Comparison:
         lines = [head]
         for f in self.formulas:
             line = f"{f.slide.line:>6}  " if f.slide.line is not None else ""
-            lines.append(f"  {f.name:{width}}  {line}{_told(f.counts)}{', on the states told' if f.where else ''}")
+            lines.append(f"  {f.name:{width}}  {line}{_told(f.entries)}{', on the states told' if f.where else ''}")
             lines += [f"    {text}" for text in _remarks(f)]
-        lines.append(f"  {_total(self.counts)}")
+        lines += [f"  {'' if r.line is None else f'line {r.line}: '}{r.why}" for r in self.remarks]
+        lines.append(f"  {_entries(self.counts)}: {_told(e for f in self.formulas for e in f.entries)}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -80,6 +94,11 @@ class Comparisons:
         return sum((c.counts for c in self.cases), Counter())
 
     @property
+    def proved(self) -> int:
+        """Number of entries whose equality is proved by algebra, or refuted at a state."""
+        return sum(c.proved for c in self.cases)
+
+    @property
     def decided(self) -> bool:
         """Whether every entry has a verdict that stands."""
         return all(c.decided for c in self.cases)
@@ -94,10 +113,10 @@ class Comparisons:
         return write_reports(self, Path(folder))
 
     def rows(self) -> list[tuple[str, ...]]:
-        """The table: a head, then case, section, formulas and number of entries of each verdict."""
-        head = ("case", "section", "formulas", *COLUMNS.values())
-        return [head, *((c.name, c.slide.section if c.slide else "", str(len(c.formulas)), *(str(c.counts[v]) for v in COLUMNS))
-                        for c in self.cases)]
+        """The table: a head, then case, section, formulas, number of entries of each verdict and of those proved."""
+        head = ("case", "section", "formulas", *COLUMNS.values(), "proved")
+        return [head, *((c.name, c.slide.section if c.slide else "", str(len(c.formulas)), *(str(c.counts[v]) for v in COLUMNS),
+                         str(c.proved)) for c in self.cases)]
 
     def __iter__(self) -> Iterator[Comparison]:
         return iter(self.cases)
@@ -109,12 +128,18 @@ class Comparisons:
         head, *rows = self.rows()
         formulas = sum(len(c.formulas) for c in self.cases)
         rows = [tuple("." if text == "0" else text for text in row) for row in rows]
-        rows.append(("all", "", str(formulas), *(str(self.counts[v]) for v in COLUMNS)))
+        rows.append(("all", "", str(formulas), *(str(self.counts[v]) for v in COLUMNS), str(self.proved)))
         width = max(len(row[0]) for row in rows)
         lines = [f"{row[0]:{width}}{row[1]:>8}{row[2]:>9}" + "".join(f"{text:>12}" for text in row[3:]) for row in (head, *rows)]
+        slips = {e.slip for c in self.cases for _, e in c.errata}
         errors = sum(len(c.errata) for c in self.cases)
         lines.append(f"{counted(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
-                     f"{counted(errors, 'erratum', 'errata')}")
+                     f"{counted(len(slips), 'slip', 'slips')} in {counted(errors, 'formula', 'formulas')}")
+        decided = sum(self.counts[v] for v in PROVABLE)
+        lines.append(f"{self.proved} of {counted(decided, 'entry that is', 'entries that are')} decided are proved equal, or "
+                     "different at a state" + (", the others sampled:" if self.proved < decided else ""))
+        lines += [f"  {c.name}, {f.name}{_place(e.index).rstrip() and ' ' + _place(e.index).rstrip()}: {e.how}"
+                  for c in self.cases for f, e in c.sampled]
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -157,9 +182,22 @@ def _entries(counts: Counter[Verdict]) -> str:
     return counted(sum(counts.values()), "entry", "entries")
 
 
-def _total(counts: Counter[Verdict]) -> str:
-    return f"{_entries(counts)}: {_told(counts)}"
+def worded(entries: Iterable[EntryResult]) -> list[tuple[Verdict, str]]:
+    """Each verdict with its number in words, and whether it is proved or sampled: (Verdict.EQUAL, "12 equal, proved")."""
+    counts = Counter((e.verdict, _certainty(e)) for e in entries)
+    return [(verdict, f"{counts[verdict, certainty]} {verdict.value}{certainty}")
+            for verdict in Verdict for certainty in CERTAINTIES if counts[verdict, certainty]]
 
 
-def _told(counts: Counter[Verdict]) -> str:
-    return ", ".join(f"{counts[v]} {v.value}" for v in Verdict if counts[v])
+PROVED, SAMPLED, REFUTED = ", proved", ", sampled", ", refuted at a state"
+CERTAINTIES = ("", PROVED, SAMPLED, REFUTED)
+
+
+def _certainty(entry: EntryResult) -> str:
+    if entry.verdict in (Verdict.EQUAL, Verdict.CONVENTION):
+        return PROVED if entry.proved else SAMPLED
+    return REFUTED if entry.verdict is Verdict.DIFFERENT and entry.proved else ""
+
+
+def _told(entries: Iterable[EntryResult]) -> str:
+    return "; ".join(words for _, words in worded(entries))

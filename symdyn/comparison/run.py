@@ -107,4 +107,5 @@ def _compared(case: Case) -> Comparison:
         if error.name:
             raise
         raise CaseError(error.faults, case.name) from error.__cause__
-    return Comparison(case.name, case.title, case.slide or formulas[0].slide, formulas, clock.monotonic() - start)
+    return Comparison(case.name, case.title, case.slide or formulas[0].slide, formulas, clock.monotonic() - start,
+                      tuple(case.remarks))

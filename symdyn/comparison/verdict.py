@@ -45,11 +45,12 @@ class EntryResult:
 
 @dataclass(frozen=True)
 class ErratumResult:
-    """An error of a slide: entries, one sentence, the evidence."""
+    """An error of a slide: entries, one sentence, the evidence; slip: the sentence of all errata that repeat one slip."""
 
     entries: tuple[tuple[int, ...], ...]
     why: str
     evidence: Evidence
+    slip: str
 
 
 @dataclass(frozen=True)

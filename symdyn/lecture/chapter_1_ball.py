@@ -14,6 +14,7 @@ v, omega = sp.symbols("v omega", positive=True)
 w = sp.Matrix([0, 0, omega])
 # One line for each of the eight slides, which draw the ball at later and later times.
 OF_B, OF_E = range(1974, 2073, 14), range(1978, 2077, 14)
+BOTH = "What B and E describe is exchanged."
 
 
 def _straight(path: Any) -> Any:
@@ -37,8 +38,10 @@ def _slot() -> list[Formula]:
                     _straight)
     composed = Proof("another formulation", "Seen from the ground, v along the slot and omega v t across it make up the speed.",
                      _speed)
-    of_B = Erratum("B stands on the disk and describes the ball in the b-frame; these are components in the n-frame.", uniform)
-    of_E = Erratum("E stands on the ground and describes the ball in the n-frame; these are components in the b-frame.", composed)
+    of_B = Erratum("B stands on the disk and describes the ball in the b-frame; these are components in the n-frame.", uniform,
+                   slip=BOTH)
+    of_E = Erratum("E stands on the ground and describes the ball in the n-frame; these are components in the b-frame.", composed,
+                   slip=BOTH)
     return [
         Formula("v_A", v_B + v_rel + w.cross(r_AB), A.velocity(seen_from=n), line=1942, also=(1961,)),
         Formula("position of A described by B, in words", in_n, A.position(of=B, components=b), line=OF_B[0], also=OF_B[1:],

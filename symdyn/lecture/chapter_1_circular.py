@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import sympy as sp
 
 import symdyn as sd
-from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
+from symdyn.comparison import Case, Erratum, Formula, Slide, conventions, proofs
 from symdyn.frames.tidy import tidy
 
 i, j, k = (sp.eye(3).col(axis) for axis in range(3))
@@ -71,11 +73,9 @@ def _curve() -> list[Formula]:
     a_tan = (along * along.T) * acceleration
     steady = proofs.limit("With constant speed the size is v^2 / r, r being the radius of curvature R / cos(beta)^2.",
                           at={s.ddot: 0}, value=s.dot**2 * sp.cos(beta)**2 / R)
-    braking = proofs.limit("A body on a straight line that brakes with 3 m/s^2 has a tangential acceleration of that size.",
-                           at={x.dot: 5, y.dot: 0, z.dot: 0, x.ddot: -3, y.ddot: 0, z.ddot: 0}, value=3)
     only_tangential = Erratum("d^2 s / dt^2 is the tangential part alone; the normal part is missing.", steady)
-    negative = Erratum("A size is never negative, but this projection is while the body brakes; the absolute value is missing.",
-                       braking)
+    signed = conventions.other_point(acceleration.dot(along), "the size counts along the velocity: it is negative while the body "
+                                     "brakes, as its product with v / |v| on the next line needs it")
     return [
         Formula("path length, differentiated", path.diff(sd.t), length(on_circle.velocity(seen_from=n)), line=727, also=(744,),
                 latex="ds/dt"),
@@ -91,7 +91,7 @@ def _curve() -> list[Formula]:
         Formula("a_norm as a difference", a_printed - a_printed.dot(v_printed) / v_printed.dot(v_printed) * v_printed,
                 acceleration - a_tan, line=772, latex=r"a_{\text{norm}}"),
         Formula("size of a_tan", a_printed.dot(v_printed / length(v_printed)), sp.Abs(acceleration.dot(along)), line=776,
-                errata=[negative], latex=r"|a_{\text{tan}}|"),
+                conventions=[replace(signed, name="signed size")], latex=r"|a_{\text{tan}}|"),
         Formula("a_tan by projection", a_printed.dot(v_printed / length(v_printed)) * v_printed / length(v_printed), a_tan,
                 line=778),
         Formula("a_tan by scalar products", a_printed.dot(v_printed) / v_printed.dot(v_printed) * v_printed, a_tan, line=778),

@@ -6,8 +6,7 @@ import sympy as sp
 from sympy import cos, sin
 
 import symdyn as sd
-from symdyn.comparison import Case, Erratum, Formula, Slide
-from symdyn.comparison.proofs import Proof
+from symdyn.comparison import Case, Formula, Slide
 from symdyn.lecture.letters import constant, ddot, dot, moving, skew, stands_for
 
 theta = sd.coordinates("theta")
@@ -52,10 +51,6 @@ def turned_axes() -> list[Formula]:
     letters = {nx: n_P[0], ny: n_P[1]}
     in_plane = sp.Matrix(n_P[:2])
     basis = sp.Matrix([sp.symbols("i_n j_n")])
-    one_vector = Proof("another formulation", "P is one vector, so that a product that gives P has one row.",
-                       lambda product: sp.Matrix([product]).rows - 1)
-    row_first = Erratum("A column times a row is a 2 x 2 array, not the vector of the line before; the row of axes comes first.",
-                        one_vector)
     return [
         Formula("P along n", nx * i_n + ny * j_n, n_P, line=3076, also=(3092, 3116), latex="P", renamed=letters),
         Formula("P along b", bx * i_b + by * j_b, n_P, line=3078, also=(3080, 3094, 3096, 3118, 3120), latex="P"),
@@ -70,8 +65,6 @@ def turned_axes() -> list[Formula]:
         Formula("with the axes", (sp.Matrix([nx, ny]) * basis, TURN * sp.Matrix([bx, by]) * basis),
                 (in_plane * basis, in_plane * basis),
                 line=3124, renamed=letters),
-        Formula("P with the axes", sp.Matrix([nx, ny]) * basis, basis * in_plane, line=3124, renamed=letters, errata=[row_first],
-                latex="P"),
         Formula("components", TURN * sp.Matrix([bx, by]), in_plane, line=3126, latex="{}^nP"),
         Formula("nRb", TURN, b.rotation(n)[:2, :2], line=3126, latex="{}^nR_b"),
     ]

@@ -50,7 +50,9 @@ def _multiplier() -> list[Formula]:
                 renamed=motion, slide=Slide("3.5", PENDULUM)),
         Formula("work by components", (change * newton)[0], work, line=5274, also=(5290, 5342), renamed=motion),
         Formula("constraint", x**2 + y**2 - length**2, eq.C[0], line=5260, also=(5276, 5280, 5333, 5344, 5346, 5356)),
-        Formula("constraint with l", x**2 + y**2 - sp.Symbol("l")**2, eq.C[0], line=5292, renamed={sp.Symbol("l"): length}),
+        Formula("constraint with l", x**2 + y**2 - sp.Symbol("l")**2, eq.C[0], line=5292, latex="C", errata=[Erratum(
+            "The wire has the length l_1, as on the slides before and after; its index is missing.",
+            proofs.limit("It must vanish on the circle of radius l_1.", at=dict(zip((x, y), place)), value=0))]),
         Formula("parts of the work", None, newton, line=5294,
                 unreadable="which of the three lines are sums, and which of them vanish, is lost with their layout"),
         Formula("variation of C", C.diff(x) * dx + C.diff(y) * dy, (eq.C_r * change.T)[0], line=5301),
@@ -168,15 +170,18 @@ def _pendulum() -> list[Formula]:
                 latex=r"\mathbf{C}_r\dot{\mathbf{r}}"),
         Formula("(C_r r_dot)_r", [[0, 0]], by_r, line=5566, latex=r"(\mathbf{C}_r\dot{\mathbf{r}})_r", errata=[Erratum(
             early + ": it is [2 x_dot, 2 y_dot].", proofs.Proof(
-                centripetal.kind, centripetal.sentence, lambda row: centripetal.residual(row * r_dot)))]),
+                centripetal.kind, centripetal.sentence, lambda row: centripetal.residual(row * r_dot)), slip=early + ".")]),
         Formula("(C_r r_dot)_r r_dot", [0], by_r * r_dot, line=5566, latex=r"(\mathbf{C}_r\dot{\mathbf{r}})_r\dot{\mathbf{r}}",
-                errata=[Erratum(early + ": it is 2 x_dot^2 + 2 y_dot^2.", centripetal)]),
+                errata=[Erratum(early + ": it is 2 x_dot^2 + 2 y_dot^2.", centripetal,
+                                                                slip=early + ".")]),
         Formula("matrix", matrix, eq.matrix, line=5570),
         Formula("right side", [0, -m * g, 0], eq.rhs, line=5570, errata=[Erratum(
             "F_d is -2 (x_dot^2 + y_dot^2): without it the mass leaves the circle as soon as it moves.",
-            proofs.Proof(curved.kind, curved.sentence, lambda rhs: curved.residual(_on(rhs, on_circle))), entries=[(2,)])]),
+            proofs.Proof(curved.kind, curved.sentence, lambda rhs: curved.residual(_on(rhs, on_circle))), entries=[(2,)],
+            slip=early + ".")]),
         Formula("equations of motion", (matrix * unknowns, Matrix([0, -m * g, 0])), derived, line=5570, errata=[Erratum(
-            "The last row lacks the centripetal acceleration, so that the constraint is not kept.", kept, entries=[(2,)])]),
+            "The last row lacks the centripetal acceleration, so that the constraint is not kept.", kept, entries=[(2,)],
+            slip=early + ".")]),
     ]
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
-from sympy import Matrix, cos, diag, simplify, sin
+from sympy import Matrix, cos, simplify, sin
 
 import symdyn as sd
-from symdyn.comparison import proofs
-from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.comparison.case import Case, Formula, Slide
 from symdyn.formulation.embedding import EmbeddedEquations
 from symdyn.lecture.chapter_3_straight_track import place_on_track
 
@@ -119,10 +118,8 @@ def _velocity_terms() -> list[Formula]:
     before = (eq.J.T * M * eq.Jdot).applyfunc(simplify)
     latex = r"\mathbf{J}^T\mathbf{M}\dot{\mathbf{J}}"
     cut = "the entry is cut off after its first product"
-    # Of J^T M J_dot the symmetric part is known without J: half the rate of the mass matrix.
-    symmetric = proofs.Proof(
-        "another formulation", "With its transpose it must add up to the rate of the mass matrix diag(m, m q1^2).",
-        lambda formula: formula + formula.T - sd.rate(diag(m, m * q1**2)))
+    second = "of the sum of two products the transcription has the first one alone; two lines on, the sum is complete"
+    squares = "the products with cos^2 are lost; on the next line they are there"
     return [
         Formula("k_tilde 1", J.T * M * J_dot * q_dot, k, line=3921, also=(3917, 3943), latex=r"\tilde{\mathbf{k}}"),
         Formula("k_tilde 2", J_T * M * J_dot * q_dot, k, line=3923, latex=r"\tilde{\mathbf{k}}"),
@@ -130,15 +127,11 @@ def _velocity_terms() -> list[Formula]:
         Formula("products of k_tilde 1", None, before, line=3927, latex=latex, unreadable=cut),
         Formula("products of k_tilde 2",
                 [[-m * c * s * q1d * q2d, -m * c * s * q1d * q2d], [-m * q1 * s * (-s * q2d), -m * q1 * s * (-s * q2d)]],
-                before, line=3947, latex=latex, errata=[Erratum(
-                    "Of every sum only the first product is left, with a rate too many in row 1; the second product, with cos^2 "
-                    "in row 2, is missing in each; two lines on, the matrix is right.", symmetric)]),
+                before, line=3947, latex=latex, unreadable={(i, j): second for i in range(2) for j in range(2)}),
         Formula("products of k_tilde 3",
                 [[0, -m * c * s * q1d - m * c**2 * q1 * q2d + m * s * c * q1d - m * s**2 * q1 * q2d],
                  [m * q1 * s**2 * q2d, m * q1 * s**2 * q2d]],
-                before, line=3949, latex=latex, errata=[Erratum(
-                    "In row 2 the products with cos^2 are missing, and the last entry has the rate of q2 for that of q1; on the "
-                    "next line the matrix is right.", symmetric)]),
+                before, line=3949, latex=latex, unreadable={(1, 0): squares, (1, 1): squares}),
         Formula("products of k_tilde 4",
                 [[0, -m * c * s * q1d + m * s * c * q1d - m * (s**2 + c**2) * q1 * q2d],
                  [m * q1 * (s**2 + c**2) * q2d,

@@ -19,7 +19,8 @@ from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
 # C_3 differentiated by x_v: the slides' sign, which everything after it inherits.
-SIGN = "The derivative of -(x_c - x_v) tan(theta) by x_v is +tan(theta), not -tan(theta)"
+SIGN = "The derivative of -(x_c - x_v) tan(theta) by x_v is +tan(theta), not -tan(theta)."
+TOTAL = "The total derivative of C_r r_dot stands where its derivative by r, times r_dot, belongs."
 
 
 class _System:
@@ -95,8 +96,9 @@ def _system() -> list[Formula]:
                 (rows[0][2:4, :], rows[1][2:4, :]), line=4820),
         Formula("moment, track", (Matrix([I_t * theta.ddot]), Matrix([s.F[4] + force[4]])), (rows[0][4:, :], rows[1][4:, :]),
                 line=4822),
-        # The print has an empty sixth row and column.
-        Formula("M", printed_M, eq.M_tilde, line=5006, latex=r"\mathbf{M}"),
+        Formula("M, first five rows and columns", printed_M, eq.M_tilde, line=5006, latex=r"\mathbf{M}"),
+        Formula("M, sixth row and column", None, None, line=5006, latex=r"\mathbf{M}",
+                unreadable="the transcription has an empty sixth row and column, to which no acceleration belongs"),
         Formula("F_e", s.F, eq.rhs[:5, :], line=5006, latex=r"\mathbf{F}^e"),
     ]
 
@@ -132,12 +134,12 @@ def _constraints() -> list[Formula]:
                 conventions=[factor]),
         Formula("C_r by derivatives", [[c.diff(q) for q in s.r] for c in printed_C], eq.C_r, line=4939, latex=r"\mathbf{C}_r"),
         Formula("C_r", printed_C_r, eq.C_r, line=4941, also=(5008,), latex=r"\mathbf{C}_r",
-                errata=[Erratum(SIGN + ".", s.no_motion_off_the_track(), entries=[(2, 0)])]),
+                errata=[Erratum(SIGN, s.no_motion_off_the_track(), entries=[(2, 0)])]),
         Formula("C_r r_dot by the matrix", printed_C_r * s.rates, sd.rate(eq.C), line=4956, latex=r"\mathbf{C}_r\dot{\mathbf{r}}",
-                errata=[Erratum(inherited, _rate_of(s), entries=[(2,)])]),
+                errata=[Erratum(inherited, _rate_of(s), entries=[(2,)], slip=SIGN)]),
         Formula("C_r r_dot", [xt.dot, yt.dot, -tan(theta) * xv.dot - yv.dot - (x_c - xv) * sec(theta)**2 * theta.dot],
                 sd.rate(eq.C), line=4958, also=(4979,), latex=r"\mathbf{C}_r\dot{\mathbf{r}}",
-                errata=[Erratum(inherited, _rate_of(s), entries=[(2,)])]),
+                errata=[Erratum(inherited, _rate_of(s), entries=[(2,)], slip=SIGN)]),
     ]
 
 
@@ -181,14 +183,14 @@ def _accelerations() -> list[Formula]:
                 latex=latex, unreadable={(2, k): "there are dots in its place" for k in range(1, 5)}),
         Formula("(C_r r_dot)_r", printed, by_r, line=4985, also=(5010,), latex=latex, errata=[Erratum(
             "The sign of sec^2(theta) x_v_dot is inherited from the derivative of C_3 by x_v, which is +tan(theta).",
-            s.acceleration_on_the_track(), entries=[(2, 4)])]),
+            s.acceleration_on_the_track(), entries=[(2, 4)], slip=SIGN)]),
         Formula("constraint differentiated twice", eq.C_r * s.accelerations + total, eq.C_r * s.accelerations - eq.F_d, line=4766,
                 also=(5000,), errata=[Erratum(
                     "The total derivative of C_r r_dot holds C_r r_ddot already; only (C_r r_dot)_r r_dot is added to it.",
-                    second)]),
+                    second, slip=TOTAL)]),
         Formula("F_d as a total derivative", -total, eq.F_d, line=4767, latex=r"\mathbf{F}^d", errata=[Erratum(
             "The known part of the accelerations is -(C_r r_dot)_r r_dot; the total derivative has the unknown r_ddot in it.",
-            at_rest)]),
+            at_rest, slip=TOTAL)]),
         Formula("d(C_r r_dot)/dt", printed, total, line=5010, latex=r"d(\mathbf{C}_r\dot{\mathbf{r}})/dt", errata=[Erratum(
             "A matrix of 3 x 5 stands for a vector: the factor r_dot and the term C_r r_ddot are missing, and the sign of "
             "sec^2(theta) x_v_dot is wrong.", _shape_of(total))]),

@@ -81,8 +81,6 @@ def _augmented() -> list[Formula]:
     times = (shift.T * (rows[:2, :]))[0]
     on_constraint = (J.T * eq.C_r.T)[0] * q1
     place = {x: x0 + q1 * J[0], y: y0 + q1 * J[1]}
-    kept = proofs.other("The constraint must not change along the track; its derivative by the displacement is this product.",
-                        lambda: eq.C[0].subs(place).diff(q1) * q1)
     matrix = Matrix([[m, 0, tangent], [0, m, 1], [tangent, 1, 0]])
     unknowns = Matrix([x.ddot, y.ddot, multiplier])
     lam = eq.lam[0]
@@ -112,8 +110,8 @@ def _augmented() -> list[Formula]:
         Formula("displacement and gradient", (Matrix([[xr, yr]]) * Matrix([tangent, 1]))[0], on_constraint, line=4662,
                 also=(4656, 4668, 4692), renamed=along),
         Formula("displacement and gradient, label", (Matrix([[x, y]]) * gradient.T)[0], on_constraint, line=4664,
-                renamed={x: place[x], y: place[y]}, errata=[Erratum(
-                    "The factor is the displacement from O_0, not the position from E; with that the product is -A.", kept)]),
+                renamed={x: place[x], y: place[y]}, unreadable={(): "the line breaks off before its right side; on the slide's "
+                                                                "next line it is complete, with the displacement from O_0"}),
         Formula("(1) + lambda (2), vectors", (shift.T * (M * r_ddot - F) + shift.T * gradient.T * multiplier)[0], times,
                 line=4704),
         Formula("(1) + lambda (2), factored", (shift.T * (M * r_ddot - F + gradient.T * multiplier))[0], times, line=4706),

@@ -16,6 +16,8 @@ from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"
+# Of two formulas of one slide.
+ALONE = "The vehicle alone stands where J has five rows, those of vehicle and track."
 
 
 @cache
@@ -113,11 +115,11 @@ def _equations() -> list[Formula]:
     return [
         Formula("M on the slide of the general equations", [[m, 0], [0, m]], M, line=4167, latex=r"\mathbf{M}",
                 errata=[Erratum("The mass matrix of the vehicle alone stands where J has five rows, those of vehicle and track.",
-                                rows_of_J("J^T M is defined only if M has as many rows as J, five."))]),
+                                rows_of_J("J^T M is defined only if M has as many rows as J, five."), slip=ALONE)]),
         Formula("F on the slide of the general equations", [0, -m * g], absolute.F_tilde, line=4167,
                 latex=r"\mathbf{F}_O^e",
                 errata=[Erratum("The weight of the vehicle alone stands where J has five rows, those of vehicle and track.",
-                                rows_of_J("J^T F is defined only if F has as many rows as J, five."))]),
+                                rows_of_J("J^T F is defined only if F has as many rows as J, five."), slip=ALONE)]),
         Formula("projected Newton", (J.T * M * r_ddot, J.T * F), equation, line=4171),
         Formula("embedded", (J.T * M * J * q_ddot + J.T * M * J_dot * q_dot, J.T * F), equation, line=4183),
         # k_tilde and q_dot are columns: their product can only be meant entry by entry.

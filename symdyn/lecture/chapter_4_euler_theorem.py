@@ -27,6 +27,8 @@ R = sp.Matrix([
      (1 - cos(phi)) * a_y * a_z - a_x * sin(phi)],
     [(1 - cos(phi)) * a_z * a_x - a_y * sin(phi), (1 - cos(phi)) * a_y * a_z + a_x * sin(phi),
      (1 - cos(phi)) * a_z**2 + cos(phi)]])
+NO_INDEX = "The superscripts b of the second and third factor have lost their index."
+ALL_N = "The superscript of the second and third factor is n, which is that of the first."
 
 
 def _product_of_rotations() -> list[Formula]:
@@ -44,15 +46,17 @@ def _product_of_rotations() -> list[Formula]:
     second, third = r"{}^{b_1}R_{b_2}", r"{}^{b_2}R_{b_3}"
     return [
         Formula("second factor, with superscript b", R_23.T, turn_y, line=6597, also=(6611,), latex=second, errata=[Erratum(
-            "The index 1 is missing: b, which is b_3, does not follow b_1; the matrix beside it is that of b1R_b2.", about_y)]),
+            "The index 1 is missing: b, which is b_3, does not follow b_1; the matrix beside it is that of b1R_b2.", about_y,
+            slip=NO_INDEX)]),
         Formula("third factor, with superscript b", sp.eye(3), turn_x, line=6597, latex=third, errata=[Erratum(
             "The index 2 is missing: from b_3 to b, which is b_3, nothing turns; the matrix beside it is that of b2R_b3.",
-            whole)]),
+            whole, slip=NO_INDEX)]),
         Formula("second factor, with superscript n", R_1 * R_12, turn_y, line=6631, latex=second, errata=[Erratum(
-            "The superscript is b_1, not n: R_b1 would be counted twice; the matrix beside it is that of b1R_b2.", about_y)]),
+            "The superscript is b_1, not n: R_b1 would be counted twice; the matrix beside it is that of b1R_b2.", about_y,
+            slip=ALL_N)]),
         Formula("third factor, with superscript n", R_1 * R_12 * R_23, turn_x, line=6631, latex=third, errata=[Erratum(
             "The superscript is b_2, not n: nR_b3 is the whole product already; the matrix beside it is that of b2R_b3.",
-            whole)]),
+            whole, slip=ALL_N)]),
         Formula("R of b", R_1 * R_12 * R_23, right, line=6597, also=(6611, 6631, 6653), latex=r"{}^nR_b"),
     ]
 

@@ -48,10 +48,11 @@ def _columns() -> list[Formula]:
         Formula("i of b3", of_i, i, line=6467, latex=r"{}^ni_{b_3}"),
         Formula("j of b3, product", R_3 * in_y, j, line=6481, also=(6479,), latex=r"{}^nj_{b_3}"),
         Formula("j of b3", of_j, j, line=6483, latex=r"{}^nj_{b_3}"),
-        # The notes break the second column of this matrix in two.
-        Formula("k of b3, product", R_3 * in_z, k, line=6497, also=(6495,), latex=r"{}^nk_{b_3}"),
+        Formula("k of b3, product", R_3 * in_z, k, line=6495, latex=r"{}^nk_{b_3}"),
+        Formula("k of b3, product written out", None, k, line=6497, latex=r"{}^nk_{b_3}",
+                unreadable="the transcription breaks the second column of R in two; there are four columns and an empty entry"),
         Formula("k of b3", of_k, k, line=6499, latex=r"{}^nk_{b_3}"),
-        Formula("R of b3", R_3, R, line=6505, also=(6465, 6481, 6497, 6547), latex=r"{}^nR_{b_3}"),
+        Formula("R of b3", R_3, R, line=6505, also=(6465, 6481, 6547), latex=r"{}^nR_{b_3}"),
     ]
 
 

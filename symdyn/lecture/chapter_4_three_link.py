@@ -33,6 +33,7 @@ of_phi = sp.Matrix([cos(psi) * cos(theta), sin(psi) * cos(theta), -sin(theta)])
 G = sp.Matrix([[cos(psi) * cos(theta), -sin(psi), 0], [sin(psi) * cos(theta), cos(psi), 0], [-sin(theta), 0, 1]])
 
 GAMMA = conventions.reordered(columns=[2, 1, 0], sentence="The slide's gamma is (phi, theta, psi), the last angle first.")
+TOO_FAR = "What three links reach is the end effector O_4, not O_3."
 
 
 def arm() -> tuple[sd.Frame, sd.Frame, sd.Frame, sd.Frame]:
@@ -66,7 +67,7 @@ def _position() -> list[Formula]:
     O_4 = b3.point("O_4", r_3).position(of=n, components=n)
     of_links = R_1 * r_1 + (R_1 * R_12) * r_2 + R_3 * r_3
     stretched = proofs.limit("With all angles zero O_3 is reached by two links.", at={psi: 0, theta: 0, phi: 0}, value=r_1 + r_2)
-    index = Erratum("The sum over three links reaches the end effector O_4, not O_3.", stretched)
+    index = Erratum("The sum over three links reaches the end effector O_4, not O_3.", stretched, slip=TOO_FAR)
     return [
         Formula("O3 as the sum over three links", of_links, O_3, line=6011, also=(6013, 6015, 6034, 6059), errata=[index],
                 latex=r"{}^nr_{O_3/E}"),
@@ -97,8 +98,9 @@ def _velocity() -> list[Formula]:
     spread = (rate(R_1) * r_1 + R_1 * rate(r_1) + rate(R_2) * r_2 + R_2 * rate(r_2) + rate(R_3) * r_3 + R_3 * rate(r_3))
     omega_1, omega_2, omega_3 = of_psi * psi.dot, of_psi * psi.dot + of_theta * theta.dot, G * gamma_dot
     printed = omega_1.cross(R_1 * r_1) + omega_2.cross(R_2 * r_2) + omega_3.cross(R_3 * r_3)
-    index = Erratum("The terms of three links are the velocity of the end effector O_4, not of O_3.", proofs.numeric_derivative(
-        "It must be the derivative of the position of O_3, which two links reach.", of=R_1 * r_1 + R_1 * R_12 * r_2))
+    two_links = proofs.numeric_derivative("It must be the derivative of the position of O_3, which two links reach.",
+                                          of=R_1 * r_1 + R_1 * R_12 * r_2)
+    index = Erratum("The terms of three links are the velocity of the end effector O_4, not of O_3.", two_links, slip=TOO_FAR)
     motion, names = _of_system()
     along = dict(zip((r_1[0], r_2[0], r_3[0]), sd.parameters("l1:4"))) | dict.fromkeys([*r_1[1:], *r_2[1:], *r_3[1:]], sp.S.Zero)
     return [

@@ -8,8 +8,8 @@ from typing import Any
 import sympy as sp
 
 import symdyn as sd
-from symdyn.comparison.case import Case, Erratum, Formula, Slide
-from symdyn.comparison.proofs import Proof, dimensions, numeric_derivative, other
+from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
+from symdyn.comparison.proofs import Proof, numeric_derivative, other
 from symdyn.lecture.arm_in_space import cross
 from symdyn.report.simplify import simplified
 from symdyn.spatial.sixvectors import force_transform
@@ -17,9 +17,6 @@ from symdyn.spatial.vectors import identity
 
 APPLICATION = "Application of Recursive Newton-Euler Equation"
 FORCES = "Force and moment exerted on a rigid body"
-
-UNITS = {"q1_ddot": (0, 0, -2), "q2_ddot": (0, 0, -2), "q1_dddot": (0, 0, -3), "q2_dddot": (0, 0, -3), "I1": (1, 2, 0),
-         "I2": (1, 2, 0)}
 
 
 class PlanarArm:
@@ -83,10 +80,11 @@ def accelerations() -> list[Formula]:
     relative = Erratum(
         "Link 2 turns with omega_b2/n, and the slide lets it turn with omega_b2/b1, so that the turning of link 1 is missing.",
         numeric_derivative("it must be the second derivative of the position of G_2", of=a.G2.position(a.n), order=2))
-    one_dot = Erratum(
-        "The next step needs angular accelerations, the first derivatives of omega; the slide puts two dots on every omega.",
-        dimensions("an angular acceleration has the unit 1/s^2", UNITS, (0, 0, -2)))
-    third = sp.symbols("q1_dddot") + sp.symbols("q2_dddot")
+    # Second derivatives of omega have no symbols; of angles c t^3 they are 6 c.
+    third_1, third_2 = sp.symbols("q1_dddot q2_dddot")
+    c_1, c_2 = sp.symbols("c1 c2")
+    cubic_1 = a.n.frame("cubic_1", rotation=sd.rotation.about("Z", c_1 * sd.t**3))
+    cubic_2 = cubic_1.frame("cubic_2", rotation=sd.rotation.about("Z", c_2 * sd.t**3))
     return [
         Formula("acceleration of G1", a_O1 + cross(alpha_1, a.r_G1) + w_1.cross(w_1.cross(a.r_G1)), a.G1.acceleration(a.n),
                 line=7701, also=(8044,), latex=r"\ddot{\mathbf r}_{G_1/E}"),
@@ -96,8 +94,8 @@ def accelerations() -> list[Formula]:
                 also=(8052,), latex=r"\ddot{\mathbf r}_{G_2/E}", errata=[relative]),
         Formula("omega of b1", along_z(a.q1.dot), w_1, line=7704, also=(7709,), latex=r"\boldsymbol\omega_{b_1/n}"),
         Formula("omega of b2 against b1", along_z(a.q2.dot), w_21, line=7714, latex=r"\boldsymbol\omega_{b_2/b_1}"),
-        Formula("angular acceleration of b2", along_z(third), a.b2.angular_acceleration(a.n), line=7716, also=(8056,),
-                latex=r"\dot{\boldsymbol\omega}_{b_2/n}", errata=[one_dot]),
+        Formula("second rate of omega of b2", along_z(third_1) + along_z(third_2),
+                sd.rate(sd.rate(cubic_2.angular_velocity(a.n))), line=7716, also=(8056,), latex=r"\ddot{\boldsymbol\omega}_{b_2/n}", renamed={third_1: 6 * c_1, third_2: 6 * c_2}),
         Formula("omega of b1, summary", along_z(a.q1), w_1, line=8046, also=(8050, 8061), latex=r"\boldsymbol\omega_{b_1/n}",
                 errata=[dot_left_out(a.q1, "7704")]),
         Formula("omega of b2 against b1, summary", along_z(a.q2), w_21, line=8054, latex=r"\boldsymbol\omega_{b_2/b_1}",
@@ -112,10 +110,8 @@ def resultants() -> list[Formula]:
     a = PlanarArm()
     (M_1, F_1), (M_2, F_2) = a.force(1, "f_G"), a.force(2, "f_G")
     alpha_1, alpha_2 = a.b1.angular_acceleration(a.n), a.b2.angular_acceleration(a.n)
-    third_1, third_2 = sp.symbols("q1_dddot q2_dddot")
-    two_dots = Erratum("A moment is I times the first derivative of omega; two dots are right only on an angle, which the line "
-                       "prints for omega besides.",
-                       dimensions("a moment has the unit kg m^2/s^2", UNITS, (1, 2, -2)))
+    # What these two lines call omega is the angle along z, whose second derivative they take.
+    angle_1, angle_2 = along_z(a.q1), along_z(a.q1 + a.q2)
     newton = r"\mathbf F_{{G_{0}}}", r"\mathbf M_{{G_{0}}}"
     given = sp.Matrix([a.equations.symbols.coordinates[1]])
     turned = Erratum(
@@ -128,12 +124,8 @@ def resultants() -> list[Formula]:
                 errata=[turned]),
         Formula("F_G1", a.m1 * a.G1.acceleration(a.n), F_1, line=7772, also=(8061,), latex=newton[0].format(1)),
         Formula("F_G2", a.m2 * a.G2.acceleration(a.n), F_2, line=7774, also=(8063,), latex=newton[0].format(2)),
-        Formula("M_G1", a.I1 * along_z(third_1), M_1, line=7772, latex=newton[1].format(1), errata=[two_dots]),
-        Formula("M_G2", a.I2 * along_z(third_1 + third_2), M_2, line=7774, latex=newton[1].format(2), errata=[two_dots]),
-        Formula("omega of b1", along_z(a.q1), a.omega_1, line=7772, latex=r"\boldsymbol\omega_{b_1/n}",
-                errata=[dot_left_out(a.q1, "7704")]),
-        Formula("omega of b2", along_z(a.q1 + a.q2), a.omega_2, line=7774, latex=r"\boldsymbol\omega_{b_2/n}",
-                errata=[dot_left_out(a.q1 + a.q2, "7714")]),
+        Formula("M_G1", a.I1 * sd.rate(sd.rate(angle_1)), M_1, line=7772, latex=newton[1].format(1)),
+        Formula("M_G2", a.I2 * sd.rate(sd.rate(angle_2)), M_2, line=7774, latex=newton[1].format(2)),
         Formula("M_G1, summary", a.I1 * alpha_1, M_1, line=8061, latex=newton[1].format(1)),
         Formula("M_G2, summary", a.I2 * alpha_2, M_2, line=8063, latex=newton[1].format(2)),
     ]
@@ -190,10 +182,16 @@ def torques() -> list[Formula]:
 
 CASES = (
     Case("two-link-arm-accelerations", "Accelerations of the centres of mass of two links", Slide("5.5", APPLICATION, 7667),
-         accelerations),
+         accelerations, remarks=[
+             Remark("The components beside the acceleration of O_2 are those of r_O2/E; r_G1/E is printed.", 7708, (8048,)),
+             Remark("The equation holds, but the next step needs angular accelerations: one dot on every omega, not two.", 7716,
+                    (8056,))]),
     Case("two-link-arm-resultants", "Resultant force and moment at the centre of mass of each link",
-         Slide("5.5", APPLICATION, 7718), resultants),
+         Slide("5.5", APPLICATION, 7718), resultants, remarks=[Remark(
+             "omega is the name of an angle here, [0 0 theta], with two dots in the moment; everywhere else it is the angular "
+             "velocity. The moment is right with the one as with the other.", 7772, (7774,))]),
     Case("force-moved-to-the-center-of-mass", "A force and a couple at P, moved to G", Slide("5.5", FORCES, 7839),
          equivalent_forces),
-    Case("two-link-arm-torques", "The torques in the joints, link by link", Slide("5.5", FORCES, 7899), torques),
+    Case("two-link-arm-torques", "The torques in the joints, link by link", Slide("5.5", FORCES, 7899), torques, remarks=[
+        Remark("The forces and moments of the slide act on link 1; its title says link 3, and the arm has two.", 7938)]),
 )

@@ -5,14 +5,16 @@ from __future__ import annotations
 import sympy as sp
 
 import symdyn as sd
-from symdyn.comparison.case import Case, Formula, Slide
+from symdyn.comparison.case import Case, Formula, Remark, Slide
+from symdyn.lecture.letters import stands_for
 
 TITLE = "Equations of Motion for Multibody that has two Prismatic Joints"
 
 q1, q2, q3 = q = sd.coordinates("q1:4")
 u1, u2, u3 = (e.dot for e in q)
 a1, a2, a3 = (e.ddot for e in q)
-x0_ddot, x1_ddot, x2_ddot, x3_ddot = (x.ddot for x in sd.coordinates("x0:4"))
+x0, *_ = BASES = sd.coordinates("x0:4")
+x0_ddot, x1_ddot, x2_ddot, x3_ddot = (x.ddot for x in BASES)
 m1, m2, m3 = sp.symbols("m1:4")
 l1, l2, l3 = sp.symbols("l1:4")
 F1, F2, F3, F4 = sp.symbols("F1:5")
@@ -147,7 +149,8 @@ def forward() -> list[Formula]:
     """5.4: the same two recursions solved for the accelerations."""
     c = Chain(3)
     x_ddot = c.J * c.q_ddot
-    in_F = c.named(x_ddot) | {"x0_ddot": 0}  # "x_0 = 0" of the slide: the base stands still
+    # "x_0 = 0" of the slide, and with it the second derivative.
+    in_F = c.named(x_ddot) | stands_for([x0], [0], dots=2)
     no_fourth = {"F4": 0}
     return [
         Formula("Newton's law", (column(F3, F2 - F3, F1 - F2), column(m3 * x3_ddot, m2 * x2_ddot, m1 * x1_ddot)),
@@ -164,5 +167,7 @@ CASES = (
     Case("prismatic-newton", "Two bodies that slide on each other, by Newton's law", Slide("5.1", TITLE, 7364), newton),
     Case("prismatic-embedding", "The same by the embedding technique, and three bodies", Slide("5.2", TITLE, 7408), embedding),
     Case("prismatic-inverse", "Inverse dynamics by recursion", Slide("5.3", TITLE, 7478), inverse),
-    Case("prismatic-forward", "Forward dynamics by recursion", Slide("5.4", TITLE, 7555), forward),
+    Case("prismatic-forward", "Forward dynamics by recursion", Slide("5.4", TITLE, 7555), forward, remarks=[Remark(
+        "What the recursion starts from is that the acceleration of the base is zero; x_0 = 0 is printed, without the two "
+        "dots. It follows from that where x_0 = 0 at all times.", 7593, (7627,))]),
 )

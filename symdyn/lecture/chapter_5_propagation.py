@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import sympy as sp
 
-from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import Proof, other
 from symdyn.frames.rates import rate
+from symdyn.lecture.chapter_5_spatial_joint import STAR
 from symdyn.lecture.propagation_arms import Arm, row
 from symdyn.lecture.propagation_letters import typeset
 from symdyn.lecture.propagation_newton import Newton
 from symdyn.model.joints import Revolute, Universal
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
+from symdyn.spatial.sixvectors import motion_transform
+from symdyn.spatial.vectors import identity, vector
 
 TITLE = "Forward Dynamics - Propagation Methods"
 WHY_STAR = "The velocity product of a force is v x* I v, as lines 8859 and 9568 have it; here the star is missing."
@@ -27,7 +30,7 @@ NEWTON = "Moment and force by Newton and Euler in 3-vectors, from differentiatin
 def _inverse_dynamics() -> list[Formula]:
     arm = Arm(3)
     newton, of = Newton(arm), arm.letter
-    star = Erratum(WHY_STAR, other(NEWTON, newton.at_center(2)))
+    star = Erratum(WHY_STAR, other(NEWTON, newton.at_center(2)), slip=STAR)
     return [
         row(of, "velocity of b2", 9100, "v_2 = X v_1 + S q2'", arm.v_2,
             (9122, 9146, 9168, 9190, 9212, 9284, 9306, 9330, 9354, 9380, 9410, 9432, 9454, 9476, 9498, 9522, 9546, 9564, 9596,
@@ -77,7 +80,7 @@ def _simplification() -> list[Formula]:
     by_joint, by_body = other(NEWTON, newton.through_joint(2)), other(NEWTON, newton.on_body(2))
     no_work = Proof("energy balance", "With I constant dT/dt = v^T f, so the force that the velocity alone needs does no work: "
                     "v^T p = 0", lambda p: arm.v_2.T * p)
-    star = [Erratum(WHY_STAR, by_joint)]
+    star = [Erratum(WHY_STAR, by_joint, slip=STAR)]
     bracket = ("The bracket multiplies the velocity product, which is a force already, by the inertia; line 9248 has it outside, "
                "and with x*.")
     both = ("The superscript B_2 and the star are missing, and the bracket multiplies the velocity product, a force already, by "
@@ -88,7 +91,7 @@ def _simplification() -> list[Formula]:
              other("The rates of change of the velocity of link 2, from differentiating positions", newton.acceleration(2)))
     return [
         row(of, "f_G2 with the velocity put in", 9176, "f_G = I_G a_G + (X_G v_2) x I_G (X_G v_2)", arm.f_G_2, (9198, 9220),
-            [Erratum(WHY_STAR, other(NEWTON, newton.at_center(2)))]),
+            [Erratum(WHY_STAR, other(NEWTON, newton.at_center(2)), slip=STAR)]),
         row(of, "f_O2 with f_G2 put in", 9222, "f_2 = X_G* (I_G a_G + (X_G v_2) x I_G (X_G v_2)) + X_3* f_3", f_2,
             (9258, 9294, 9316), star),
         row(of, "f_O2 with f_G2 put in, x*", 9234, "f_2 = X_G* (I_G a_G + (X_G v_2) x* I_G (X_G v_2)) + X_3* f_3", f_2),
@@ -99,14 +102,14 @@ def _simplification() -> list[Formula]:
         row(of, "f_O2 with the velocity product at O_2", 9248, "f_2 = X_G* I_G a_G + (v_2 x* I_2 v_2) + X_3* f_3", f_2),
         row(of, "f_O2 with a bracket", 9262, "f_2 = X_G* I_G [a_G + (v_2 x I_2 v_2)] + X_3* f_3", f_2,
             errata=[Erratum(bracket, by_joint)]),
-        # The right side is printed as b2_X_b2; it is bG2_X_bG2, which is the same unit matrix.
-        row(of, "transforms there and back", 9266, "X_G X_back", sp.eye(6)),
+        Formula("transforms there and back", (of("X_G") * of("X_back"), sp.Matrix(motion_transform(identity(), vector(0, 0, 0)))),
+                (sp.eye(6), sp.eye(6)), line=9266, latex=typeset("X_G X_back")),
         row(of, "f_O2 with transforms there and back", 9268, "f_2 = X_G* I_G X_G X_back a_G + (v_2 x I_2 v_2) + X_3* f_3", f_2,
             errata=star),
         row(of, "inertia about O_2", 9272, "I_2 = X_G* I_G X_G", arm.I_2),
         row(of, "f_O2 at O_2", 9274, "f_2 = I_2 a_2 + v_2 x I_2 v_2 + X_3* f_3", f_2, (9320, 9342, 9368, 9394), star),
         row(of, "f_O2^B2", 9364, "f_B = I_2 a_2 + v_2 x I_2 v_2", f_B,
-            (9368, 9390, 9418, 9440, 9462, 9550, 9600, 9632, 9664, 9761, 9777, 9798, 9821), [Erratum(WHY_STAR, by_body)]),
+            (9368, 9390, 9418, 9440, 9462, 9550, 9600, 9632, 9664, 9761, 9777, 9798, 9821), [Erratum(WHY_STAR, by_body, slip=STAR)]),
         row(of, "f_O2^B2 with x*", 9568, "f_B = I_2 a_2 + v_2 x* I_2 v_2", f_B),
         row(of, "f_O2 from f_O2^B2", 9398, "f_2 = f_B + X_3* f_3", f_2,
             (9420, 9442, 9464, 9486, 9510, 9534, 9552, 9570, 9602, 9634, 9666, 9763, 9779, 9800, 9825)),
@@ -114,7 +117,7 @@ def _simplification() -> list[Formula]:
         row(of, "f_O2 without superscript, with a bracket", 9508, "f_2 = I_2 [a_2 + (v_2 x I_2 v_2)]", f_2, (9532,),
             [Erratum(both, by_joint)]),
         row(of, "c_2", 9759, "c2 = S_ring q2' + v_2 x S q2'", arm.c_2, (9793, 9814)),
-        row(of, "p_2", 9761, "p2 = v_2 x I_2 v_2", arm.p_2, (9793, 9814), [Erratum(WHY_STAR, no_work)]),
+        row(of, "p_2", 9761, "p2 = v_2 x I_2 v_2", arm.p_2, (9793, 9814), [Erratum(WHY_STAR, no_work, slip=STAR)]),
         row(of, "a_i for i = 2", 9792, "a_i = a1", arm.a_2, (9813,), [Erratum(*first)]),
     ]
 
@@ -138,7 +141,9 @@ CASES = (
     Case("propagation-inverse-dynamics", "Equations from inverse dynamics, on link 2 of the three-link arm",
          Slide("5.7", f"{TITLE} - Equations from Inverse Dynamics", 9100), _inverse_dynamics),
     Case("propagation-simplification", "Simplifying them, on link 2 of the three-link arm in exact numbers",
-         Slide("5.7", f"{TITLE} - Simplification of Equations from Inverse Dynamics", 9176), _simplification),
+         Slide("5.7", f"{TITLE} - Simplification of Equations from Inverse Dynamics", 9176), _simplification,
+         remarks=[Remark("There and back, from b_G2 to b_G2, is the unit matrix bG2_X_bG2; it is printed as b2_X_b2, which has "
+                         "the same value.", 9266)]),
     Case("propagation-short-letters", "The simplified equations, on the three-link arm",
          Slide("5.7", f"{TITLE} - Simplified version of Equations from Inverse Dynamics", 9819), _letters),
 )

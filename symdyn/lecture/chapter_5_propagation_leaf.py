@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import other
 from symdyn.lecture.propagation_arms import Arm, row
 from symdyn.lecture.propagation_newton import Newton
@@ -72,5 +72,6 @@ CASES = (
     Case("propagation-one-link", "Forward dynamics of the one-link arm",
          Slide("5.7", f"{TITLE} - Examples of 1 link arm", 9871), _one_link),
     Case("propagation-last-link", "Forward dynamics of the two-link arm: equations for link 2",
-         Slide("5.7", f"{TITLE} - Examples of 2 link arm", 10311), _link_2),
+         Slide("5.7", f"{TITLE} - Examples of 2 link arm", 10311), _link_2,
+         remarks=[Remark("Link 2 is the leaf of the arm, as line 10340 has it; link 1 is printed.", 10411)]),
 )

@@ -12,6 +12,7 @@ from symdyn.lecture.chapter_5_spatial_velocity import ARM, Named, transform_to_c
 
 OMEGA_DOT, V_DOT = r"{}^{b_2}\dot{\boldsymbol\omega}_{b_2/n}", r"{}^{b_2}\dot{\mathbf v}_{O_2/E}"
 ZERO = sp.zeros(3, 1)
+INDEX = "omega_b1/b2 keeps its index where it is replaced by -omega_b2/b1."
 
 
 class Accelerated(Named):
@@ -76,8 +77,10 @@ def linear() -> list[Formula]:
     tail = R * w_1_dot.cross(r) + R * v_1_dot
     carried = cross(R * w_1, R * r, turn)
     rates = numeric_derivative("it must be the rate of the components of v_O2/E in b2", of=s.v_O2_of_t)
-    not_turned = Erratum("The minus of omega_b1/b2 = -omega_b2/b1 is put in, but the index stays, and the sign is wrong.", rates)
-    not_turned_2 = Erratum("Exchanging the factors of -omega_b2/b1 x a gives a x omega_b2/b1; the slide has omega_b1/b2.", rates)
+    not_turned = Erratum("The minus of omega_b1/b2 = -omega_b2/b1 is put in, but the index stays, and the sign is wrong.", rates,
+                         slip=INDEX)
+    not_turned_2 = Erratum("Exchanging the factors of -omega_b2/b1 x a gives a x omega_b2/b1; the slide has omega_b1/b2.", rates,
+                           slip=INDEX)
     return [
         s.formula("R (omega x r)", (R * w_1.cross(r), (R * w_1).cross(R * r)), ZERO, 8486),
         s.formula("product rule", s.R_dot * w_1.cross(r) + R * product + s.R_dot * v_1 + R * v_1_dot, derived, 8496, also=(8513,),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 import symdyn as sd
-from symdyn.comparison.case import Case, Erratum, Formula, Slide
+from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import numeric_derivative
 from symdyn.lecture.arm_in_space import ArmInSpace
 from symdyn.lecture.chapter_5_spatial_velocity import ARM, Named
@@ -87,6 +87,8 @@ def moment() -> list[Formula]:
 
 
 CASES = (
-    Case("spatial-force", "Newton's law in the components of bG2", Slide("5.6", ARM, 8744), force),
+    Case("spatial-force", "Newton's law in the components of bG2", Slide("5.6", ARM, 8744), force, remarks=[Remark(
+        "E and G are points and have no axes: the components of omega are those in n and those of v in b_G, as the next line has "
+        "them.", 8774)]),
     Case("spatial-moment", "Euler's equation in the components of bG2", Slide("5.6", ARM, 8780), moment),
 )
