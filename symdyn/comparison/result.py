@@ -136,10 +136,9 @@ class Comparisons:
         lines.append(f"{counted(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
                      f"{counted(len(slips), 'slip', 'slips')} in {counted(errors, 'formula', 'formulas')}")
         decided = sum(self.counts[v] for v in PROVABLE)
-        lines.append(f"{self.proved} of {counted(decided, 'entry that is', 'entries that are')} decided are proved equal, or "
-                     "different at a state" + (", the others sampled:" if self.proved < decided else ""))
-        lines += [f"  {c.name}, {f.name}{_place(e.index).rstrip() and ' ' + _place(e.index).rstrip()}: {e.how}"
-                  for c in self.cases for f, e in c.sampled]
+        lines.append(f"{self.proved} of {counted(decided, 'decided entry is', 'decided entries are')} proved equal, or refuted at a "
+                     "state" + ("; sampled:" if self.proved < decided else ""))
+        lines += [f"  {c.name}, {f.name}: {_place(e.index)}{e.how}" for c in self.cases for f, e in c.sampled]
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -161,7 +160,8 @@ def _remarks(formula: FormulaResult) -> list[str]:
             lines.append(f"  {_place(entry.index)}printed {_text(printed)}, right {_text(right)}")
         elif entry.verdict is Verdict.DIFFERENT:
             where = ", ".join(f"{name} = {value:.3g}" for name, value in (entry.point or {}).items())
-            there = "" if entry.values is None else f"; printed {entry.values[0]:.6g}, derived {entry.values[1]:.6g} at {where}"
+            there = "" if entry.values is None else \
+                f"; refuted at this state: printed {entry.values[0]:.6g}, derived {entry.values[1]:.6g} at {where}"
             lines.append(f"  {_place(entry.index)}{entry.verdict.value}{there}{'; ' + entry.note if entry.note else ''}")
         elif entry.note:
             said[entry.note] = None
@@ -189,14 +189,11 @@ def worded(entries: Iterable[EntryResult]) -> list[tuple[Verdict, str]]:
             for verdict in Verdict for certainty in CERTAINTIES if counts[verdict, certainty]]
 
 
-PROVED, SAMPLED, REFUTED = ", proved", ", sampled", ", refuted at a state"
-CERTAINTIES = ("", PROVED, SAMPLED, REFUTED)
+CERTAINTIES = ("", ", proved", ", sampled")
 
 
 def _certainty(entry: EntryResult) -> str:
-    if entry.verdict in (Verdict.EQUAL, Verdict.CONVENTION):
-        return PROVED if entry.proved else SAMPLED
-    return REFUTED if entry.verdict is Verdict.DIFFERENT and entry.proved else ""
+    return CERTAINTIES[1 if entry.proved else 2] if entry.verdict in (Verdict.EQUAL, Verdict.CONVENTION) else ""
 
 
 def _told(entries: Iterable[EntryResult]) -> str:

@@ -31,6 +31,7 @@ from symdyn.tape.tape import Tape, reachable
 # States that are tried to refute a claim, digits of the evaluation; relative differences up to SAME are none, and up to ROUNDED
 # of the largest entry they may come from decimal numbers, which are rounded to doubles.
 STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
+DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
 # A difference with more terms than this is not written out in a reason.
 WRITTEN = 60
 
@@ -127,7 +128,8 @@ def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same:
     except (UnsupportedExpression, ZeroDivisionError, TooLarge) as error:
         return [str(error)] if len(pairs) == 1 else [unproved([pair], bound, same)[0] for pair in pairs]
     without = _without_relations(exact)
-    return ["" if not len(value.num) else f"the normal forms differ{without}" for value in exact.values]
+    return ["" if not len(value.num) else DECIMAL if any(e.has(sp.Float) for e in pair) else f"the normal forms differ{without}"
+            for value, pair in zip(exact.values, pairs)]
 
 
 def _recorder(nodes: Sequence[Any]) -> Recorder:

@@ -40,8 +40,10 @@ def _stays(axis: str, column: int) -> proofs.Proof:
 
 def _finite() -> list[Formula]:
     about = sd.rotation.about
-    of_z = Erratum("This is the matrix of a rotation about x; those of R_z and R_x are exchanged.", _stays("z", 2), slip=EXCHANGED)
-    of_x = Erratum("This is the matrix of a rotation about z; those of R_z and R_x are exchanged.", _stays("x", 0), slip=EXCHANGED)
+    of_z = Erratum("This is the matrix of a rotation about x; those of R_z and R_x are exchanged.",
+                   _stays("z", 2), slip=EXCHANGED)
+    of_x = Erratum("This is the matrix of a rotation about z; those of R_z and R_x are exchanged.",
+                   _stays("x", 0), slip=EXCHANGED)
     seen = sp.Matrix([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
     first = Erratum("Rotations that take components in n to those in b follow from right to left: R_x R_y R_z; the order "
                     "printed is that of rotations from b to n.", proofs.Proof(
@@ -69,8 +71,10 @@ def _infinitesimal() -> list[Formula]:
     product = sp.Matrix([[1, psi_ + theta_ * phi_, -theta_ + psi_ * phi_],
                          [-psi_, 1 - psi_ * theta_ * phi_, phi_ + psi_ * theta_], [theta, -phi_, 1]])
     first_order = sp.Matrix([[1, psi_, -theta_], [-psi_, 1, phi_], [theta, -phi_, 1]])
-    of_z = Erratum("This is the matrix of a small rotation about x; those of R_z and R_x are exchanged.", _stays("z", 2), slip=EXCHANGED)
-    of_x = Erratum("This is the matrix of a small rotation about z; those of R_z and R_x are exchanged.", _stays("x", 0), slip=EXCHANGED)
+    of_z = Erratum("This is the matrix of a small rotation about x; those of R_z and R_x are exchanged.",
+                   _stays("z", 2), slip=EXCHANGED)
+    of_x = Erratum("This is the matrix of a small rotation about z; those of R_z and R_x are exchanged.",
+                   _stays("x", 0), slip=EXCHANGED)
     prime = Erratum("The prime is missing: the entry is the small angle theta', not the Euler angle theta.", proofs.limit(
         "Without small angles there is no rotation.", at=dict.fromkeys(small, 0), value=sp.eye(3)), entries=[(2, 0)])
     turns = small_turn([0, 0, psi_]).T * small_turn([0, theta_, 0]).T * small_turn([phi_, 0, 0]).T

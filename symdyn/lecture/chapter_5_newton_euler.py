@@ -95,7 +95,8 @@ def accelerations() -> list[Formula]:
         Formula("omega of b1", along_z(a.q1.dot), w_1, line=7704, also=(7709,), latex=r"\boldsymbol\omega_{b_1/n}"),
         Formula("omega of b2 against b1", along_z(a.q2.dot), w_21, line=7714, latex=r"\boldsymbol\omega_{b_2/b_1}"),
         Formula("second rate of omega of b2", along_z(third_1) + along_z(third_2),
-                sd.rate(sd.rate(cubic_2.angular_velocity(a.n))), line=7716, also=(8056,), latex=r"\ddot{\boldsymbol\omega}_{b_2/n}", renamed={third_1: 6 * c_1, third_2: 6 * c_2}),
+                sd.rate(sd.rate(cubic_2.angular_velocity(a.n))), line=7716, also=(8056,),
+                latex=r"\ddot{\boldsymbol\omega}_{b_2/n}", renamed={third_1: 6 * c_1, third_2: 6 * c_2}),
         Formula("omega of b1, summary", along_z(a.q1), w_1, line=8046, also=(8050, 8061), latex=r"\boldsymbol\omega_{b_1/n}",
                 errata=[dot_left_out(a.q1, "7704")]),
         Formula("omega of b2 against b1, summary", along_z(a.q2), w_21, line=8054, latex=r"\boldsymbol\omega_{b_2/b_1}",
@@ -189,7 +190,7 @@ CASES = (
     Case("two-link-arm-resultants", "Resultant force and moment at the centre of mass of each link",
          Slide("5.5", APPLICATION, 7718), resultants, remarks=[Remark(
              "omega is the name of an angle here, [0 0 theta], with two dots in the moment; everywhere else it is the angular "
-             "velocity. The moment is right with the one as with the other.", 7772, (7774,))]),
+             "velocity. Two dots on the angle are one on that, and the moment is right.", 7772, (7774,))]),
     Case("force-moved-to-the-center-of-mass", "A force and a couple at P, moved to G", Slide("5.5", FORCES, 7839),
          equivalent_forces),
     Case("two-link-arm-torques", "The torques in the joints, link by link", Slide("5.5", FORCES, 7899), torques, remarks=[

@@ -81,7 +81,8 @@ def at_center() -> list[Formula]:
     motion_for_force = Erratum(
         "I v is a momentum, which turns like a force, with v x*; here the star of line 8859 is missing, and v x is for motions.",
         Proof("limit", "with m2 = 0 the lower half must vanish, since without mass no force is needed",
-              lambda f: sp.Matrix(f)[3:, :].applyfunc(lambda e: e.subs({s: 0 for s in symbols_of(e) if s.name == "m2"}))), slip=STAR)
+              lambda f: sp.Matrix(f)[3:, :].applyfunc(lambda e: e.subs({s: 0 for s in symbols_of(e) if s.name == "m2"}))),
+        slip=STAR)
     latex = r"{}^{b_{G2}}\hat{\mathbf f}^B_{G_2}"
     return [
         s.formula("M_G2", s.I_G * s.omega_dot + s.omega.cross(s.I_G * s.omega), f[:3, :], 8846, also=(8852,), latex=M_G),

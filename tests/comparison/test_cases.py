@@ -114,8 +114,8 @@ def test_unreadable_formulas_and_entries_keep_what_is_derived():
 
 def test_text_of_a_comparison_tells_places_counts_and_points():
     text = str(compare(sd.Formula("v", [VELOCITY[0], -VELOCITY[1]], VELOCITY, line=17)))
-    assert "17" in text and "1 equal, 1 different, not proven wrong" in text
-    assert re.search(r"\[1\] different, not proven wrong; printed -?[\d.]+, derived -?[\d.]+ at l = ", text)
+    assert "17" in text and "1 equal, proved; 1 different, not proven wrong" in text
+    assert re.search(r"\[1\] different, not proven wrong; refuted at this state: printed -?[\d.]+, derived -?[\d.]+ at l = ", text)
 
 
 @pytest.mark.parametrize("make, message", [
@@ -374,3 +374,26 @@ def test_sections_without_cases():
     for name in ("9", "3.55", "0.1"):
         with pytest.raises(sd.UnknownCase, match=f"there is no case of section {name}; sections with cases are 1.1, 1.2, .*6.4"):
             sd.compare(name)
+
+
+def test_remarks_are_checked():
+    case = sd.Case("remarks", formulas=[sd.Formula("m", 1, 1)], remarks=[sd.Remark("", -1, "3"), "a word"])
+    with pytest.raises(sd.CaseError) as error:
+        sd.compare(case)
+    said = str(error.value)
+    assert "`why` of a remark is empty" in said and "the line of a remark is -1" in said
+    assert "`also` of a remark is '3' of type str" in said and "`remarks`[1] is 'a word'" in said
+
+
+def test_the_slip_of_an_erratum_is_text():
+    case = sd.Case("slip", formulas=[sd.Formula("m", 1, 2, errata=[sd.Erratum("No.", sd.proofs.other("So.", 2), slip=3)])])
+    with pytest.raises(sd.CaseError, match="`slip` of an erratum of m is 3 of type int; pass text"):
+        sd.compare(case)
+
+
+def test_entries_that_are_sampled_are_named_with_the_reason():
+    found = sd.compare([sd.Case("gravity", formulas=[sd.Formula("g", [9.81 * l, m], [sp.Rational(981, 100) * l, m])])])
+    assert found.proved == 1 and len(found.cases[0].sampled) == 1
+    assert "1 equal, proved; 1 equal, sampled" in str(found.cases[0])
+    assert "1 of 2 decided entries are proved equal, or refuted at a state; sampled:" in str(found)
+    assert "\n  gravity, g: [0] equal at 24 random points" in str(found) and "not proved: decimal numbers" in str(found)

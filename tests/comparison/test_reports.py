@@ -100,7 +100,7 @@ def test_results_write_themselves(bare, comparisons, tmp_path):
 
 def test_a_case_without_slide_and_an_entry_without_neighbours(bare):
     text = report(Comparisons((bare,)), "errata.md")
-    assert "\n## bare: M\n" in text and "Case `bare`. l is squared." in text and "row 1" not in text
+    assert "\n## l is squared.\n\n### bare: M\n" in text and "Case `bare`.\n" in text and "row 1" not in text
     assert "- printed $l\\,m$, right $l^{2}\\,m$" in text
 
 
@@ -108,9 +108,9 @@ def test_one_is_no_plural(comparisons, bare):
     assert "\n1 formula that is wrong as printed" in report(comparisons, "errata.md")
     assert "1 formula that is wrong as printed" in report(comparisons, "errata.html")
     assert "2 cases, 8 entries:" in report(comparisons, "comparison.tex")
-    assert "1 erratum." in report(comparisons, "comparison.html") and str(comparisons).endswith("1 erratum")
+    assert "1 slip in 1 formula." in report(comparisons, "comparison.html") and "; 1 slip in 1 formula\n" in str(comparisons)
     one = sd.compare(sd.Case("one", formulas=[sd.Formula("m", m, m)]))
-    assert str(one).endswith("1 entry: 1 equal") and "1 case, 1 entry:" in report(Comparisons((one,)), "comparison.tex")
+    assert str(one).endswith("1 entry: 1 equal, proved") and "1 case, 1 entry:" in report(Comparisons((one,)), "comparison.tex")
 
 
 def test_formulas_of_other_shape_are_printed_whole(bare):
@@ -118,7 +118,7 @@ def test_formulas_of_other_shape_are_printed_whole(bare):
 
 
 def test_what_holds_on_some_states_only_is_said(bare):
-    assert "1 equal, on the states told" in str(bare)
+    assert "1 equal, proved, on the states told" in str(bare)
     assert "on the states told" in report(Comparisons((bare,)), "comparison.html")
 
 
@@ -206,3 +206,40 @@ def test_pages_open_in_a_browser_without_network_or_errors(page, comparisons, ba
     assert page.evaluate("document.querySelectorAll('merror').length") == 0
     assert page.evaluate("[...document.querySelectorAll('.math')].every(e => e.scrollWidth <= 1.02 * e.clientWidth)")
     assert "A sign & more." in page.inner_text("body")
+
+
+@pytest.fixture(scope="module")
+def repeated():
+    """One slip in two formulas of two cases, another in a third, and a label that is wrong."""
+    def wrong(name, slip, **options):
+        proof = sd.proofs.other("So.", m * l)
+        return sd.Formula(name, -m * l, m * l, errata=[sd.Erratum(f"The sign of {name}.", proof, slip=slip)], **options)
+
+    first = sd.Case("first", slide=SLIDE, formulas=[wrong("a", "A sign is lost."), wrong("b", "", line=13)],
+                    remarks=[sd.Remark("Link 3 <is> printed for link 1.", 14, [15])])
+    second = sd.Case("second", formulas=[wrong("c", "A sign is lost.")], remarks=sd.Remark("Another word."))
+    return sd.compare([first, second])
+
+
+def test_errata_that_repeat_one_slip_are_listed_once_with_all_places(repeated):
+    text = report(repeated, "errata.md")
+    assert "3 formulas that are wrong as printed, 2 slips in all" in text
+    assert text.index("## A sign is lost.") < text.index(": a\n") < text.index("### second: c") < text.index("## The sign of b.")
+    assert text.count("## A sign is lost.") == 1 and "`first`. The sign of a." in text
+    page = report(repeated, "errata.html")
+    assert page.count('<tbody class="slip">') == 2 and "1. A sign is lost." in page and "2 formulas" in page
+    assert "; 2 slips in 3 formulas" in str(repeated)
+
+
+def test_labels_and_words_stand_on_the_page_without_a_formula(repeated, bare):
+    text, page = report(repeated, "errata.md"), report(repeated, "errata.html")
+    assert "- Line 14, also 15, case `first`: Link 3 <is> printed for link 1." in text and "- Case `second`: Another word." in text
+    assert "Link 3 &lt;is&gt; printed for link 1." in page and "line 14: Link 3 <is> printed" in str(repeated.cases[0])
+    assert "Labels and words" not in report(Comparisons((bare,)), "errata.md") + report(Comparisons((bare,)), "errata.html")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_pages_say_at_their_top_what_printed_means(repeated, name):
+    text = report(repeated, name)
+    assert "what the transcription of the slides as text holds" in text
+    assert text.index("what the transcription") < text.index("The sign of a")

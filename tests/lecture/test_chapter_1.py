@@ -29,7 +29,7 @@ CASES = {case.name: case for module in MODULES for case in module.CASES}
 
 def test_errors_that_were_found() -> None:
     found = {f.slide.line for case in CASES.values() for f, _ in compared(case.name).errata}
-    assert found == {398, 521, 758, 776, 1123, 1557, 1563, 1974, 1978}
+    assert found == {398, 521, 758, 1123, 1557, 1563, 1974, 1978}
 
 
 def mended() -> dict:

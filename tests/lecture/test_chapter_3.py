@@ -43,10 +43,10 @@ def test_the_printed_last_row_lets_the_mass_leave_the_circle() -> None:
 
 # Every line with something wrong, repetitions too.
 WRONG = {
-    "introduction": [], "straight_track": [], "rotating_track": [3947, 3949], "vehicle_and_track": [4167, 4190, 4192, 4197],
-    "straight_track_augmented": [4664, 4672],
+    "introduction": [], "straight_track": [], "rotating_track": [], "vehicle_and_track": [4167, 4190, 4192, 4197],
+    "straight_track_augmented": [4672],
     "rotating_track_augmented": [4766, 4767, 4783, 4842, 4941, 4956, 4958, 4979, 4985, 5000, 5008, 5010],
-    "pendulum_relative": [5115], "pendulum_augmented": [5352, 5396, 5410, 5444, 5446, 5476, 5566, 5570],
+    "pendulum_relative": [5115], "pendulum_augmented": [5292, 5352, 5396, 5410, 5444, 5446, 5476, 5566, 5570],
     "virtual_displacement": [],
 }
 

@@ -16,7 +16,7 @@ from symdyn.model.symbols import symbols_of
 # Every line with something wrong, repetitions too.
 WRONG = {
     "prismatic": [],
-    "newton_euler": [7711, 7716, 7756, 7772, 7774, 7815, 7887, 8022, 8046, 8050, 8052, 8054, 8056, 8061, 8063, 8069],
+    "newton_euler": [7711, 7756, 7815, 7887, 8022, 8046, 8050, 8052, 8054, 8061, 8063, 8069],
     "spatial_velocity": [8273],
     "spatial_acceleration": [8439, 8548, 8552, 8682, 8690],
     "spatial_force": [8818],
