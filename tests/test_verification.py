@@ -6,8 +6,9 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn import verification
 from symdyn.lab import wrong_equations
-from symdyn.verification import checks_of, judged
+from symdyn.verification import checks_of, identities, judged
 from symdyn.verification.states import samples
 
 PRINTED = {
@@ -305,3 +306,41 @@ def test_reactions_of_joints_that_drive_others():
     wrong[2, 5] = wrong[2, 5] * (1 + 1e-9)
     spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, "reactions": wrong}, _printed={})
     assert check[1](samples(spoilt, 1, 30, None, 1)[0]) > 1e-13
+
+
+# -- proved and sampled
+
+
+def test_the_report_says_which_lines_are_proved_and_which_are_sampled(equations):
+    result = equations.verify(states=1)
+    proved = {check.name for check in result.checks if check.proved}
+    assert proved == {"M_tilde is symmetric", "kinetic energy is quadratic in u with M_tilde",
+                      "J u is the rate of the positions and rotations", "Coriolis matrix times u is k_tilde",
+                      "rate of M_tilde less twice the Coriolis matrix is skew"}
+    text = str(result)
+    assert text.startswith("two_link_arm (recursive): 5 identities proved by exact algebra, ")
+    assert f", {sum(not check.proved for check in result.checks)} verified at 1 random state\n" in text
+    assert "  proved M_tilde is symmetric\n" in text and "  ok     M_tilde u_dot + k_tilde = F_tilde" in text
+
+
+def test_proofs_that_would_take_long_are_sampled_instead(equations, monkeypatch):
+    monkeypatch.setattr("symdyn.exact.mechanism.QUICK", 1)
+    result = equations.verify(states=1)
+    assert result.passed and sum(check.proved for check in result.checks) <= 1
+    assert not next(check for check in result.checks if "J u is" in check.name).proved
+
+
+def test_constraints_are_proved_too():
+    result = sd.systems.get("four_bar").augmented().verify(states=1)
+    proved = {check.name for check in result.checks if check.proved}
+    assert {"C_dot = C_r u + C_t", "C_dot is the rate of C"} <= proved and result.passed
+
+
+def test_a_mass_matrix_with_speeds_leaves_the_kinetic_energy_to_states(equations):
+    """T = u^3 / 6 has the second derivative u; T(u) + T(-u) - 2 T(0) is not u^2 u."""
+    u = equations.leaves[equations.symbols.speeds[0]]
+    M, energy = equations.quantity("M_tilde") * 0, equations.quantity("energy") * 0
+    M[0, 0], energy.ravel()[0] = u, u * u * u / 6
+    spoilt = dataclasses.replace(equations, _recorded={**equations._recorded, "M_tilde": M, "energy": energy}, _printed={})
+    proved = verification._proved(spoilt)
+    assert identities.symmetric in proved and identities.kinetic_energy_quadratic not in proved

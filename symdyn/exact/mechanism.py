@@ -7,13 +7,15 @@ the claims hold for every motion, not only for the one that the forces make.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from symdyn.exact.prove import Proof, decide
+from symdyn.errors import UnsupportedExpression
+from symdyn.exact.prove import Proof, decide, zero
+from symdyn.exact.shortest import not_negative
 from symdyn.formulation.algebra import given_by_time
 from symdyn.formulation.equations import Equations
 from symdyn.spatial.vectors import inner
@@ -22,6 +24,9 @@ from symdyn.tape.node import ACCELERATION, is_zero
 
 # Terms that a product may have in a proof: what is larger is left to verify().
 BOUND = 100_000
+
+# The same in proofs that verify() tries before it evaluates states.
+QUICK = 10_000
 
 # Pairs that are equal, and the columns of the matrix that they are the entries of (0: scalars, 1: a vector).
 Pairs = tuple[list[tuple[Any, Any]], int]
@@ -219,11 +224,33 @@ def _constraint_jacobian(s: _Subject) -> Pairs | None:
     return [(columns[j][i], s["C_r"][i, j]) for i in range(len(s["C_dot"])) for j in range(len(s.u))], len(s.u)
 
 
+def _constraint_parts(s: _Subject) -> Pairs | None:
+    if not s.has("C_dot", "C_r", "C_t") or not s.equations.constraints:
+        return None
+    return list(zip(s["C_dot"], s["C_r"] @ np.array(s.u, dtype=object) + s["C_t"])), 1
+
+
 def _constraint_accelerations(s: _Subject) -> Pairs | None:
     """d C_dot / dt = C_r u_dot - F_d for any accelerations."""
     if not s.has("C_dot", "C_r", "F_d") or not s.equations.constraints:
         return None
     return list(zip(s.rate(s["C_dot"]), s["C_r"] @ s.ud - s["F_d"])), 1
+
+
+def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
+    """Which of the claims exact algebra proves with products of up to QUICK terms, whatever machine it runs on."""
+    subject = _Subject(equations)
+    units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
+    positive = not_negative(equations.printed_leaves())
+    proved = set()
+    for name, pairs_of in CLAIMS:
+        try:
+            found = pairs_of(subject) if name in names else None
+            if found is not None and zero(equations.recorder, found[0], QUICK, units, positive):
+                proved.add(name)
+        except UnsupportedExpression:  # such as the derivative of a function of the user without one
+            continue
+    return proved
 
 
 CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
@@ -237,6 +264,7 @@ CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
     ("Coriolis matrix times u is k_tilde", _coriolis),
     ("rate of M_tilde less twice the Coriolis matrix is skew", _skew),
     ("C_dot is the rate of C", _constraint_rates),
+    ("C_dot is C_r u + C_t", _constraint_parts),
     ("C_r is the derivative of C_dot by the speeds", _constraint_jacobian),
     ("C_r u_dot - F_d is the rate of C_dot", _constraint_accelerations),
 )

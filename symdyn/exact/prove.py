@@ -8,7 +8,7 @@ the claim. Where none does, which roots and functions without relations make pos
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -31,6 +31,8 @@ from symdyn.tape.tape import Tape, reachable
 # States that are tried to refute a claim, digits of the evaluation; relative differences up to SAME are none, and up to ROUNDED
 # of the largest entry they may come from decimal numbers, which are rounded to doubles.
 STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
+# Of a difference that is rounding no more than this part remains with twice the digits.
+REMAINDER = 1e-10
 DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
 # A difference with more terms than this is not written out in a reason.
 WRITTEN = 60
@@ -132,6 +134,16 @@ def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same:
             for value, pair in zip(exact.values, pairs)]
 
 
+def zero(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], bound: int, unit_vectors: Sequence[Sequence[Node]] = (),
+         positive: Collection[Node] = ()) -> bool:
+    """Whether exact algebra proves both nodes of every pair equal; no is no refutation. Parameters as in `decide` and Exact."""
+    try:
+        values = Exact([recorder.sub(x, y) for x, y in pairs], bound, unit_vectors, positive).values
+    except (TooLarge, ZeroDivisionError):
+        return False
+    return not any(len(value.num) for value in values)
+
+
 def _recorder(nodes: Sequence[Any]) -> Recorder:
     """The recorder of the nodes; of numbers alone a new one."""
     return next((node.recorder for node in nodes if isinstance(node, Node)), None) or Recorder()
@@ -199,9 +211,13 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
         largest = max((abs(x) + abs(y) for _, x, y in rows), default=0)
-        for place, x, y in rows:
-            if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest):
-                return taken[place], values
+        apart = [(place, abs(x - y)) for place, x, y in rows if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest)]
+        if apart:
+            # Sides that vanish by cancellation differ by rounding, of which nothing remains with twice the digits.
+            again = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, 2 * DIGITS)
+            for place, difference in apart:
+                if abs(again["left"][place] - again["right"][place]) > REMAINDER * difference:
+                    return taken[place], values
     return None, {}
 
 
@@ -221,7 +237,7 @@ def _normalize(values: dict[Node, Any], unit_vectors: Sequence[Sequence[Node]]) 
 
     for group in unit_vectors:
         if all(leaf in values for leaf in group):
-            with mpmath.workdps(DIGITS + 10):
+            with mpmath.workdps(2 * DIGITS + 10):
                 numbers = [mpmath.mpf(values[leaf]) for leaf in group]
                 size = mpmath.sqrt(sum(x * x for x in numbers))
                 values.update({leaf: x / size for leaf, x in zip(group, numbers)})

@@ -286,8 +286,17 @@ class Equations:
 
         return verify(self, states, digits, params)
 
-    def prove(self) -> Any:
-        """Decide identities of the equations by exact algebra, for every state; see symdyn.exact.mechanism."""
+    def prove(self, other: Equations | None = None) -> Any:
+        """Decide identities of the equations by exact algebra, for every state; see symdyn.exact.mechanism.
+
+        other   equations of the same mechanism that were derived separately, in the same coordinates: whether both are the same;
+                see symdyn.exact.across
+        Returns the claims, each with its Proof. Raises ArgumentError for equations in other coordinates, speeds or constraints.
+        """
+        if other is not None:
+            from symdyn.exact.across import prove_equal
+
+            return prove_equal(self, other)
         from symdyn.exact.mechanism import prove_equations
 
         return prove_equations(self)
