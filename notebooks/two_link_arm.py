@@ -106,8 +106,9 @@ display(Math(rf"\tilde{{\mathbf F}} = {latex(equations.F_tilde)}"))
 # %% [markdown]
 # ## 3. Verification
 #
-# No reference solution is needed: the equations are checked by identities that hold for every sound mechanism. They are
-# evaluated at random states with 30 digits. The compiled code is checked against the same numbers.
+# No reference solution is needed: the equations are checked by identities that hold for every sound mechanism. Those that exact
+# algebra proves hold at every state; the others are evaluated at random states with 30 digits. The compiled code is checked
+# against the same numbers.
 
 # %%
 verification = equations.verify()

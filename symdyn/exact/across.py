@@ -8,6 +8,7 @@ equations must solve the first ones, which is the same where the mass matrix is 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ def prove_equal(first: Equations, second: Any, bound: int = BOUND) -> Proofs:
         names = [[str(getattr(s, "name", s)) for s in group] for group in (own, others)]
         if names[0] != names[1]:
             told = ["; ".join(group) or "none" for group in names]
-            raise ArgumentError(f"equations are compared in the same {what}, in the same order; the {first.formulation} ones have "
-                                f"{told[0]}, the {second.formulation} ones {told[1]}")
+            raise ArgumentError(f"equations are compared in the same {what}, in the same order; the {first.formulation} ones "
+                                f"have {told[0]}, the {second.formulation} ones {told[1]}")
     taken = _Taken(first, second)
     symbols = first.printed_leaves()
     units = [[first.leaves[p] for p in group] for group in first.unit_groups]
@@ -88,7 +89,7 @@ class _Taken:
 def _claims(taken: _Taken) -> list[tuple[str, Callable[[], Pairs]]]:
     first, second = taken.first.formulation, taken.second.formulation
     found: list[tuple[str, Callable[[], Pairs]]] = [
-        (f"{name} is the same", lambda name=name: taken.both(name)) for name in COMPARED if taken.has(name)]
+        (f"{name} is the same", partial(taken.both, name)) for name in COMPARED if taken.has(name)]
     if not taken.first.constraints and taken.has("M_tilde", "k_tilde", "F_tilde") and taken.has("accelerations"):
         found.append((f"accelerations of the {second} equations solve the {first} ones", taken.solved))
     return found

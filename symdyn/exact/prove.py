@@ -211,7 +211,8 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
         largest = max((abs(x) + abs(y) for _, x, y in rows), default=0)
-        apart = [(place, abs(x - y)) for place, x, y in rows if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest)]
+        apart = [(place, abs(x - y)) for place, x, y in rows
+                 if abs(x - y) > same * (abs(x) + abs(y) if same == SAME else largest)]
         if apart:
             # Sides that vanish by cancellation differ by rounding, of which nothing remains with twice the digits.
             again = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, 2 * DIGITS)

@@ -314,7 +314,7 @@ def parts_of(*expressions: sp.Basic) -> set[sp.Basic]:
 
 
 @cache
-def _free_of_its_own(kind: type) -> bool:
+def _free_of_its_own(kind: Any) -> bool:
     """Whether the free symbols of an expression of this kind are those of its parts; not of sums and integrals."""
     return issubclass(kind, sp.Symbol) or getattr_static(kind, "free_symbols", None) is sp.Basic.__dict__["free_symbols"]
 

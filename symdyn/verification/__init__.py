@@ -1,7 +1,7 @@
 """Proves equations of motion sound without a reference: identities that must hold at any state, at 30 digits.
 
-Identities that exact algebra proves with products of few terms are proved, for every state, and are not evaluated. Which these are
-depends on the equations alone, not on time or the machine. The others are checked at random states:
+Identities that exact algebra proves with products of few terms are proved, for every state, and are not evaluated. Which these
+are depends on the equations alone, not on time or the machine. The others are checked at random states:
 
 A check is a function of a Sample that returns its residual, or None where it does not apply; a new formulation joins by
 naming its quantities alike, a new check by one line in CHECKS, or in CONSTRAINED.

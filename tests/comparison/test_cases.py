@@ -115,7 +115,7 @@ def test_unreadable_formulas_and_entries_keep_what_is_derived():
 def test_text_of_a_comparison_tells_places_counts_and_points():
     text = str(compare(sd.Formula("v", [VELOCITY[0], -VELOCITY[1]], VELOCITY, line=17)))
     assert "17" in text and "1 equal, proved; 1 different, not proven wrong" in text
-    assert re.search(r"\[1\] different, not proven wrong; refuted at this state: printed -?[\d.]+, derived -?[\d.]+ at l = ", text)
+    assert re.search(r"\[1\] different, not proven wrong; refuted at this state: printed -?[\d.]+, derived -?[\d.]+ at l =", text)
 
 
 @pytest.mark.parametrize("make, message", [

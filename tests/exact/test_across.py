@@ -17,8 +17,8 @@ def derived(name, *formulations):
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
-@pytest.mark.parametrize("name", ["pendulum", "double_pendulum", "cart_pole", "two_link_arm", "three_link_arm", "flyball_governor",
-                                  "vehicle_on_rotating_track", "prismatic_chain"])
+@pytest.mark.parametrize("name", ["pendulum", "double_pendulum", "cart_pole", "two_link_arm", "three_link_arm",
+                                  "flyball_governor", "vehicle_on_rotating_track", "prismatic_chain"])
 def test_formulations_of_the_catalogue_are_the_same(name, pair):
     first, second = derived(name, *pair)
     found = first.prove(second)
