@@ -41,10 +41,10 @@ sd.compare(sd.Case("pendulum", printed={
 }, derived=eq))
 
 # %% [markdown]
-# An entry is equal if it is the same after renaming, or if exact algebra shows that the difference is zero: that is a proof. One
-# state where the values differ refutes it; the text form reports the state. Where there is neither, because numbers are decimals or
-# functions have relations that are not known, values are sampled at random points of many sizes with 50 digits: the verdict is then
-# "equal, sampled", with the reason.
+# An entry is equal if it is the same after renaming, or if exact algebra shows that the difference is zero: that is a proof.
+# One state where the values differ refutes it; the text form reports the state. Where there is neither, because numbers are
+# decimals or functions have relations that are not known, values are sampled at random points of many sizes with 50 digits: the
+# verdict is then "equal, sampled", with the reason.
 
 # %% [markdown]
 # ## 2. Places, other letters, states

@@ -136,8 +136,9 @@ class Comparisons:
         lines.append(f"{counted(len(self.cases), 'case', 'cases')}, {_entries(self.counts)} in {self.seconds:.0f} s; "
                      f"{counted(len(slips), 'slip', 'slips')} in {counted(errors, 'formula', 'formulas')}")
         decided = sum(self.counts[v] for v in PROVABLE)
-        lines.append(f"{self.proved} of {counted(decided, 'decided entry is', 'decided entries are')} proved equal, or refuted at "
-                     "a state" + ("; sampled:" if self.proved < decided else ""))
+        all_decided = counted(decided, "decided entry is", "decided entries are")
+        lines.append(f"{self.proved} of {all_decided} proved equal, or refuted at a state"
+                     + ("; sampled:" if self.proved < decided else ""))
         lines += [f"  {c.name}, {f.name}: {_place(e.index)}{e.how}" for c in self.cases for f, e in c.sampled]
         return "\n".join(lines)
 

@@ -223,7 +223,7 @@ def symbols_of(expression: Any) -> set[Any]:
     entries = list(expression) if isinstance(expression, sp.MatrixBase) else [expression]
     if all(isinstance(e, sp.Expr) for e in entries):
         parts = parts_of(*entries)
-        if all(_free_of_its_own(kind) for kind in {type(part) for part in parts}):
+        if all(_free_of_its_own(kind) for kind in {type(part) for part in parts}):  # type: ignore[arg-type]
             return {part for part in parts if isinstance(part, sp.Symbol)}
     free: set[Any] = expression.free_symbols
     return free - {time} if time in free and not expression.has(time) else free
