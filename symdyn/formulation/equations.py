@@ -111,10 +111,18 @@ class Equations:
     _printed: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def quantity(self, name: str) -> np.ndarray:
-        """A quantity, or a named output, as an array of nodes and numbers; recorded on first use."""
+        """A quantity, or a named output, as an array of nodes and numbers; recorded on first use.
+
+        Besides `quantities` there are those of symdyn.analytic.lagrange.QUANTITIES, such as "T", "V", "momenta".
+        """
         text(name, "the name of a quantity", "M_tilde")
         if name not in self.quantities and f"output_{name}" in self.quantities:
             name = f"output_{name}"
+        if name not in self._recorded and name not in self.quantities:
+            from symdyn.analytic.lagrange import QUANTITIES, recorded
+
+            if name in QUANTITIES:
+                self._recorded[name] = np.asarray(recorded(self, name), dtype=object)
         if name not in self._recorded:
             if name not in self.quantities:
                 reason = "".join(f": {note}" for note in self.notes
@@ -214,13 +222,15 @@ class Equations:
 
         A speed u with a name of its own is the derivative of its coordinate, too, and is printed as u.
         """
+        from symdyn.analytic.lagrange import momentum_leaves
+
         printed: dict[Node, sp.Basic] = {}
         for symbol, leaf in self.leaves.items():
             if isinstance(leaf, Node) and leaf.op == "leaf" and (leaf not in printed or symbol.name == leaf.args[1]):
                 printed[leaf] = symbol
         for u in self.symbols.speeds:
             printed.setdefault(self.recorder.leaf(f"{u.name}_dot", ACCELERATION), u.dot)
-        return printed
+        return {**printed, **momentum_leaves(self)}
 
     @property
     def accelerations(self) -> sp.Matrix:

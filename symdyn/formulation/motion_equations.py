@@ -51,6 +51,77 @@ class MotionEquations(Equations):
         left = self.M_tilde * self.accelerations + self.k_tilde
         return tuple(sp.Eq(a, b, evaluate=False) for a, b in zip(left, self.F_tilde, strict=True))
 
+    # -- the names of analytical mechanics, and of SymPy's; see symdyn.analytic
+
+    @property
+    def mass_matrix(self) -> sp.Matrix:
+        """(n_u, n_u) M_tilde under the name that SymPy's mechanics uses: mass_matrix u_dot = forcing."""
+        return self.M_tilde
+
+    @property
+    def forcing(self) -> sp.Matrix:
+        """(n_u, 1) F_tilde - k_tilde under the name that SymPy's mechanics uses; under constraints without their forces."""
+        return self.explicit("forcing")
+
+    @property
+    def rhs(self) -> sp.Matrix:
+        """(n_q + n_u + n_z, 1) x_dot of x = [q; u; z], explicit: accelerations by Cramer's rule, as rhs() of SymPy's
+        KanesMethod gives it. Augmented equations have the right side of their matrix under this name, and x_dot in a
+        module only."""
+        return self.explicit("state_rates")
+
+    @property
+    def T(self) -> sp.Expr:
+        """Kinetic energy, J."""
+        return self.explicit("T")
+
+    @property
+    def V(self) -> sp.Expr:
+        """Potential energy of gravity, springs and load elements, J; other loads are in `power`, whether or not they have a
+        potential. Raises SymdynError for equations by hand."""
+        return self.explicit("V")
+
+    @property
+    def lagrangian(self) -> sp.Expr:
+        """T - V, J, in q, u and t."""
+        return self.explicit("lagrangian")
+
+    @property
+    def momenta(self) -> sp.Matrix:
+        """(n_u, 1) dT/du; conjugate to the coordinates where u = q_dot."""
+        return self.explicit("momenta")
+
+    @property
+    def momentum_symbols(self) -> sp.Matrix:
+        """(n_q, 1) symbols of the momenta, p_q1 of q1, in `hamiltonian` and `hamilton_equations`."""
+        from symdyn.analytic.lagrange import momentum_leaves
+
+        return sp.Matrix(list(momentum_leaves(self).values()))
+
+    @property
+    def hamiltonian(self) -> sp.Expr:
+        """Hamilton's function p . q_dot - L in coordinates, momenta and t, J. Raises SymdynError for quasi-velocities, and
+        where the mass matrix couples more than three speeds."""
+        return self.explicit("hamiltonian")
+
+    @property
+    def hamilton_equations(self) -> tuple[sp.Eq, ...]:
+        """q_dot = dH/dp, then p_dot = -dH/dq + loads without potential; under constraints less C_r^T lam, and the constraints.
+
+        Where the mass matrix couples more than two speeds, p_dot is in q and q_dot; where more than three, p = dT/dq_dot stands
+        in place of q_dot = dH/dp. Raises SymdynError for quasi-velocities."""
+        from symdyn.analytic.hamilton import equations_of
+
+        return equations_of(self)
+
+    @property
+    def christoffel(self) -> sp.ImmutableDenseNDimArray:
+        """(n, n, n) Christoffel symbols of the first kind: k_tilde_i = sum of c[i, j, k] u_j u_k where nothing is prescribed.
+
+        Raises SymdynError for quasi-velocities."""
+        n = len(self.symbols.speeds)
+        return sp.ImmutableDenseNDimArray(list(self.explicit("christoffel")), (n, n, n))
+
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
         """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
 
