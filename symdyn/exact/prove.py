@@ -205,8 +205,7 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
     for attempt in range(STATES):
         # Positive numbers first: roots and logarithms of them are real.
         least = 0.2 if attempt % 2 == 0 else -2.0
-        values = {leaf: _drawn(draw, least, symbols.get(leaf)) for leaf in tape.inputs}
-        _normalize(values, unit_vectors)
+        values = drawn_state(draw, tape.inputs, least, symbols, unit_vectors)
         found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
@@ -220,6 +219,14 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
                 if abs(again["left"][place] - again["right"][place]) > REMAINDER * difference:
                     return taken[place], values
     return None, {}
+
+
+def drawn_state(draw: random.Random, leaves: Sequence[Node], least: float, symbols: Mapping[Node, sp.Expr],
+                unit_vectors: Sequence[Sequence[Node]] = ()) -> dict[Node, Any]:
+    """Random numbers between `least` and 2 for leaves, as their symbols and unit vectors demand."""
+    values: dict[Node, Any] = {leaf: _drawn(draw, least, symbols.get(leaf)) for leaf in leaves}
+    _normalize(values, unit_vectors)
+    return values
 
 
 def _drawn(draw: random.Random, least: float, symbol: sp.Expr | None) -> float:

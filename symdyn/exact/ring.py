@@ -145,6 +145,7 @@ class Ring:
             powers: dict[int, int] = {}
         else:
             unit, parts = a.num.factor() if len(a.num) <= FACTORED else (fmpq(1), [(a.num, 1)])
+            unit, parts = self._with_sines(unit, [(factor, int(n)) for factor, n in parts])
             num = self.context.constant(1 / unit)
             powers = {}
             for factor, n in parts:
@@ -179,6 +180,19 @@ class Ring:
             for _ in range(n - own.get(k, 0)):
                 num = self.product(num, self.factors[k])
         return num
+
+    def _with_sines(self, unit: fmpq, parts: list[tuple[Any, int]]) -> tuple[fmpq, list[tuple[Any, int]]]:
+        """Factors (c - 1) (c + 1) as -s^2."""
+        for s, c in self.sines:
+            less, more = self.generators[c] - 1, self.generators[c] + 1
+            powers = [next((n for factor, n in parts if factor == end), 0) for end in (less, more)]
+            both = min(powers)
+            if both:
+                unit = unit * fmpq(-1) ** both
+                ends = [(less, powers[0] - both), (more, powers[1] - both)]
+                parts = [(f, n) for f, n in parts if f not in (less, more)] + [(f, n) for f, n in ends if n]
+                parts.append((self.generators[s], 2 * both))
+        return unit, parts
 
     def _factor(self, factor: Any) -> tuple[int, fmpq]:
         """Number of a factor, whose leading coefficient is made one, and that coefficient."""

@@ -293,14 +293,14 @@ def _times(coefficient: Any, parts: list[sp.Expr]) -> sp.Expr:
 
 
 def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str = "shortest", bound: int | None = None,
-            ) -> list[sp.Expr]:
-    """Entries (nodes and numbers) in SymPy, each in the form asked for.
+            unit_vectors: Sequence[Sequence[Node]] = ()) -> list[sp.Expr]:
+    """Entries (nodes and numbers) in SymPy, each in the form asked for; unit_vectors: leaves whose squares add up to one.
 
     Raises SymdynError for an unknown form, TooLarge beyond the bound on terms, UnsupportedExpression for what has no explicit
     form."""
     if form not in FORMS:
         raise SymdynError(f"the form {shown(form)} was asked for; there are {', '.join(FORMS)}")
-    exact = Exact(entries, BOUND if bound is None else bound, positive=not_negative(symbols))
+    exact = Exact(entries, BOUND if bound is None else bound, unit_vectors, positive=not_negative(symbols))
     writer = Writer(exact, symbols, form)
     sizes = _sizes(entries) if form == "shortest" else {}
     known: dict[str, sp.Expr] = {}

@@ -9,6 +9,7 @@ import sympy as sp
 from symdyn.formulation.equations import Equations
 
 if TYPE_CHECKING:
+    from symdyn.analytic.conserved import ConservedQuantities
     from symdyn.formulation.provenance import Explanation
 
 
@@ -121,6 +122,14 @@ class MotionEquations(Equations):
         Raises SymdynError for quasi-velocities."""
         n = len(self.symbols.speeds)
         return sp.ImmutableDenseNDimArray(list(self.explicit("christoffel")), (n, n, n))
+
+    def conserved(self, undriven: bool = False) -> ConservedQuantities:
+        """Momenta and energy, or Jacobi's integral, that every motion keeps, each with its proof; undriven: with inputs zero.
+
+        See symdyn.analytic.conserved. Raises SymdynError where loads depend on accelerations or reactions."""
+        from symdyn.analytic.conserved import conserved
+
+        return conserved(self, undriven)
 
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
         """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
