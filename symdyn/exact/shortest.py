@@ -274,7 +274,7 @@ class _Lookup(dict[int, Letter]):
     def __missing__(self, k: int) -> Letter:
         e = self.writer.expression(k)
         multiples = 0
-        if k in self.writer.letters.turns:
+        if k in self.writer.letters.turns and e.args:  # the sine of a decimal number is one
             multiples = sum(MULTIPLE for a in sp.Add.make_args(e.args[0]) if a.as_coeff_Mul()[0] not in (1, -1))
         length = 1 if e.is_Symbol else len(str(e))
         self[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k), k in self.writer.letters.below)

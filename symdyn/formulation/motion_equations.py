@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
 from symdyn.formulation.equations import Equations
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from symdyn.analytic.conserved import ConservedQuantities
+    from symdyn.analytic.linear import Linearized
     from symdyn.formulation.provenance import Explanation
 
 
@@ -130,6 +133,16 @@ class MotionEquations(Equations):
         from symdyn.analytic.conserved import conserved
 
         return conserved(self, undriven)
+
+    def linearized(self, about: Mapping[Any, Any] | None = None, hold: Any = ()) -> Linearized:
+        """M, C, K, A, B about a state of rest or a steady motion, explicit in the parameters, with its conditions.
+
+        about   coordinates, speeds, states, inputs by symbol or name -> numbers or expressions in parameters; left out: zero
+        hold    coordinates or speeds that are held
+        See symdyn.analytic.linear. Raises ArgumentError, and SymdynError for what has no constant linear equations."""
+        from symdyn.analytic.linear import linearized
+
+        return linearized(self, about, hold)
 
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
         """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
