@@ -211,11 +211,19 @@ def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hol
     Raises ArgumentError for unknown names and values that move, SymdynError for what has no constant linear equations: where
     time appears, where what drifts appears, velocity constraints, steady motion under constraints or in quasi-velocities.
     """
-    return _Linearization(equations, about, hold).result()
+    return _Linearization(State(equations, about, hold)).result()
 
 
-class _Linearization:
-    def __init__(self, equations: Equations, about: Any, hold: Any) -> None:
+class State:
+    """What is inserted for coordinates, speeds, extra states and inputs of equations, on their tape.
+
+    about      symbol -> value; values: leaf -> node, of what is given; symbols: leaf -> symbol of a parameter
+    drifting   coordinates whose speed is not zero; held: indices of speeds that are held; multipliers: leaves of them
+    """
+
+    def __init__(self, equations: Equations, about: Any, hold: Any, parameters: Mapping[Any, Any] | None = None) -> None:
+        """parameters: values for them, by symbol or name. Raises ArgumentError, and SymdynError for a steady motion under
+        constraints or in quasi-velocities."""
         self.equations, self.m = equations, Mechanics(equations)
         self.symbols: dict[Node, Any] = {leaf: s for leaf, s in equations.printed_leaves().items() if leaf.mask == PARAMETER}
         self.about = self._taken(about)
@@ -223,18 +231,23 @@ class _Linearization:
         m, s = self.m, equations.symbols
         taken = _Values(equations.name, m.recorder, self.symbols)
         self.values = {equations.leaves[key]: taken.node(f"about: {key}", value) for key, value in self.about.items()}
+        known = {p.name: equations.leaves[p] for p in s.parameters}
+        wrong = [name_of(key) for key in parameters or {} if name_of(key) not in known]
+        if wrong:
+            raise ArgumentError(f"{equations.name}: values has {', '.join(wrong)}; its parameters are {', '.join(known)}")
+        self.parameters = {known[name_of(key)]: taken.node(name_of(key), value) for key, value in (parameters or {}).items()}
+        self.multipliers = [m.recorder.leaf(name, ACCELERATION) for name in multiplier_names(len(equations.constraints))]
         moving = [k for k, u in enumerate(m.u) if not is_zero(self.values.get(u, 0))]
         if moving and (equations.constraints or not m.plain):
             why = "its constraints" if equations.constraints else "its quasi-velocities"
-            raise SymdynError(f"{equations.name}: linear equations about a steady motion were requested, but {why} take part in "
-                              "it; use module.linearize(at), or coordinates that need none")
+            raise SymdynError(f"{equations.name}: a steady motion was requested in symbols, but {why} take part in it; use "
+                              "module.linearize(at), or coordinates that need none")
         self.drifting = [s.coordinates[k] for k in moving]
-        still = [q for q, symbol in zip(m.q, s.coordinates, strict=True) if symbol not in self.drifting]
-        for group in equations.unit_groups:  # Euler parameters: what is left out is upright
-            if not any(p in self.about for p in group):
-                self.values.update({equations.leaves[p]: exact(s.initial.get(p, 0)) for p in group})
-        for leaf in (*still, *m.u, *m.z, *m.inputs, *m.ud):
-            self.values.setdefault(leaf, 0)
+
+    def put(self) -> dict[Node, Any]:
+        """Values of what is given, with speeds, accelerations and inputs that are left out at zero."""
+        m = self.m
+        return {**dict.fromkeys((*m.u, *m.ud, *m.inputs), 0), **self.values, **self.parameters}
 
     def _taken(self, about: Any) -> dict[sp.Symbol, Any]:
         """Symbol -> value."""
@@ -259,10 +272,25 @@ class _Linearization:
             raise ArgumentError(f"{self.equations.name}: hold is {', '.join(wrong)}; it takes {', '.join(known)}")
         return sorted({known[n] for n in names})
 
+
+class _Linearization:
+    dependent: Sequence[int] = ()
+
+    def __init__(self, state: State) -> None:
+        self.state, self.equations, self.m = state, state.equations, state.m
+        self.symbols, self.about, self.held, self.drifting = state.symbols, state.about, state.held, state.drifting
+        s, leaves = self.equations.symbols, self.equations.leaves
+        self.values = state.put()
+        for group in self.equations.unit_groups:  # Euler parameters: what is left out is upright
+            if not any(p in self.about for p in group):
+                self.values.update({leaves[p]: exact(s.initial.get(p, 0)) for p in group})
+        still = [q for q, symbol in zip(self.m.q, s.coordinates, strict=True) if symbol not in self.drifting]
+        self.values = {**dict.fromkeys((*still, *self.m.z), 0), **self.values}
+
     def result(self) -> Linearized:
         m, equations = self.m, self.equations
         r, C, z_dot = m.statics()
-        lam = [m.recorder.leaf(name, ACCELERATION) for name in multiplier_names(len(equations.constraints))]
+        lam = self.state.multipliers
         free = [k for k in range(len(m.u)) if k not in self.held]
         Z, conditions = self._unconstrained(free) if not lam else self._constrained(r, C, lam, free)
         conditions = [*conditions, *z_dot]
@@ -284,8 +312,6 @@ class _Linearization:
         independent = [k for k in free if k not in self.dependent]
         about = {key: sp.sympify(value) for key, value in self.about.items()}
         return Linearized(equations.name, tuple(names[k] for k in independent), s.inputs, s.states, about, nodes, self.symbols)
-
-    dependent: Sequence[int] = ()
 
     def _by(self, entries: Any, leaves: Sequence[Node]) -> np.ndarray:
         columns = [self.m.by(entries, leaf) for leaf in leaves]

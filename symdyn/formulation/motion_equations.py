@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from symdyn.analytic.conserved import ConservedQuantities
+    from symdyn.analytic.equilibria import EquilibriumPoints
     from symdyn.analytic.linear import Linearized
     from symdyn.formulation.provenance import Explanation
 
@@ -143,6 +144,16 @@ class MotionEquations(Equations):
         from symdyn.analytic.linear import linearized
 
         return linearized(self, about, hold)
+
+    def equilibria(self, fixed: Mapping[Any, Any] | None = None, values: Mapping[Any, Any] | None = None) -> EquilibriumPoints:
+        """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
+
+        fixed    coordinates that are held, inputs, speeds of a steady motion -> numbers or expressions in parameters
+        values   numbers for parameters
+        See symdyn.analytic.equilibria. Raises SymdynError with the reason where there is no closed form."""
+        from symdyn.analytic.equilibria import equilibria
+
+        return equilibria(self, fixed, values)
 
     def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
         """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.

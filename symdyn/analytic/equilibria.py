@@ -1,0 +1,478 @@
+"""States of rest, or of steady motion, in closed form, where their conditions are polynomials that can be solved in turn.
+
+Conditions are polynomials in coordinates outside of angles and in sine and cosine of base angles, with s^2 + c^2 = 1. They are
+split into factors, each of which is a case; equations for a single unknown are solved: a s + b c + d = 0 by
+q = atan2(a, b) +- acos(-d / r) with r^2 = a^2 + b^2, those in one cosine by their roots, with numbers of any degree by
+resultants; what stands linearly is eliminated. Equations with numbers that stay coupled become triangular by a Groebner basis.
+What none of this solves is an error: a result holds all equilibria for parameters at which what it assumes not to be zero is not.
+Source: Cox, Little, O'Shea, Ideals, Varieties, and Algorithms, chapters 3 and 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.analytic.linear import State
+from symdyn.errors import SymdynError
+from symdyn.exact.prove import prove
+from symdyn.exact.represent import plain
+from symdyn.exact.shortest import Writer, not_negative, written
+from symdyn.exact.taken import recorded
+from symdyn.exact.walk import Exact
+from symdyn.report.limit import TimeUp, within
+from symdyn.shown import shown
+from symdyn.tape.node import Node, is_zero
+from symdyn.tape.sympy_bridge import number
+
+if TYPE_CHECKING:
+    from symdyn.formulation.equations import Equations
+
+# Cases that are followed; a mechanism of n links has 2^n positions of rest.
+CASES = 4096
+# Numbers of 30 digits below this are zero.
+ZERO = 1e-20
+
+
+@dataclass(frozen=True)
+class EquilibriumPoint:
+    """A state of rest in closed form.
+
+    values       coordinate (or extra state, or multiplier) -> expression in parameters
+    free         coordinates that may have any value
+    conditions   inequalities between parameters that make the values real
+    proved       whether the equations are zero there by exact algebra; where not, by numbers of 30 digits
+    """
+
+    values: Mapping[sp.Symbol, sp.Expr]
+    free: tuple[sp.Symbol, ...] = ()
+    conditions: tuple[sp.Basic, ...] = ()
+    proved: bool = True
+
+    def __str__(self) -> str:
+        told = ", ".join(f"{q} = {value}" for q, value in self.values.items())
+        told += f"{', ' if told and self.free else ''}{', '.join(f'{q} free' for q in self.free)}"
+        return told + (f"   where {' and '.join(map(str, self.conditions))}" if self.conditions else "")
+
+
+@dataclass(frozen=True, repr=False)
+class EquilibriumPoints:
+    """All equilibria, a sequence that prints as a list; angles are between -pi and pi where they are multiples of pi.
+
+    assumed   expressions in parameters that are taken not to be zero: other equilibria may exist where one of them is
+    needed    what would have to be zero, where there is no equilibrium
+    """
+
+    name: str
+    points: tuple[EquilibriumPoint, ...]
+    assumed: tuple[sp.Expr, ...] = ()
+    needed: tuple[sp.Expr, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __iter__(self) -> Iterator[EquilibriumPoint]:
+        return iter(self.points)
+
+    def __getitem__(self, k: int) -> EquilibriumPoint:
+        return self.points[k]
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: {len(self)} equilibri{'um' if len(self) == 1 else 'a'}"]
+        lines += [f"  {point}" for point in self.points]
+        lines += [f"  taken not to be zero: {', '.join(map(str, self.assumed))}"] if self.assumed else []
+        lines += [f"  would have to be zero: {', '.join(map(str, self.needed))}"] if self.needed else []
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_latex_(self) -> str:
+        rows = []
+        for point in self.points:
+            told = [f"{sp.latex(q)} = {sp.latex(value)}" for q, value in point.values.items()]
+            told += [rf"{sp.latex(q)} \text{{ free}}" for q in point.free]
+            told += [rf"\text{{where }} {sp.latex(c)}" for c in point.conditions]
+            rows.append("&" + r",\enspace ".join(told))
+        rows = rows or [r"&\text{no equilibrium}"]
+        return "$\\displaystyle \\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}$"
+
+
+def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, values: Mapping[Any, Any] | None = None,
+               ) -> EquilibriumPoints:
+    """All states of rest.
+
+    fixed    coordinates, which are held there; inputs and extra states; or speeds, of a steady motion: by symbol or name, numbers
+             or expressions in parameters. Speeds and inputs that are left out are zero
+    values   numbers for parameters, by symbol or name
+    Raises SymdynError where the conditions are no polynomials, or not solved in closed form or in time: with the reason.
+    """
+    state = State(equations, fixed, (), values)
+    search = _Search(state)
+    seconds = max(equations.simplify_seconds, 1.0)
+    try:
+        return within(seconds, search.result)
+    except TimeUp:
+        raise SymdynError(f"{equations.name}: equilibria in closed form were not found within {seconds:g} s; pass numbers for "
+                          "parameters with values=..., fix coordinates, or use module.equilibria()") from None
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What is still to be zero, and what is found: unknown -> value, with sines and cosines, angles, conditions."""
+
+    left: tuple[sp.Expr, ...]
+    found: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
+    angles: tuple[tuple[int, sp.Expr], ...] = ()
+    conditions: tuple[sp.Basic, ...] = ()
+
+    def put(self, values: Mapping[sp.Symbol, sp.Expr], angles: Mapping[int, sp.Expr] | None = None,
+            conditions: Sequence[sp.Basic] = ()) -> _Case:
+        """With values for unknowns."""
+        real = [c for c in conditions if c != True]  # noqa: E712
+        return _Case(tuple(e.subs(values) for e in self.left),
+                     (*[(x, e.subs(values)) for x, e in self.found], *values.items()),
+                     (*self.angles, *(angles or {}).items()), (*self.conditions, *real))
+
+
+class _Search:
+    def __init__(self, state: State) -> None:
+        self.state, self.equations = state, state.equations
+        m = state.m
+        if self.equations.unit_groups:
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested of Euler parameters; describe "
+                              "the orientation by Euler angles, or use module.equilibria()")
+        s = self.equations.symbols
+        r, C, z_dot = m.statics()
+        fixed = {leaf for leaf in state.values if leaf in m.q}
+        rows = [e for e, q in zip(r, m.q, strict=True) if q not in fixed] if m.plain else list(r)
+        entries = [e for e in m.at([*rows, *C, *z_dot], state.put()) if not is_zero(e)]
+        multipliers = {leaf: sp.Symbol(f"lambda{k + 1}") for k, leaf in enumerate(state.multipliers)}
+        self.coordinates = [symbol for q, symbol in zip(m.q, s.coordinates, strict=True)
+                            if q not in state.values and symbol not in state.drifting]
+        states = [symbol for z, symbol in zip(m.z, s.states, strict=True) if z not in state.values]
+        self.unknown: list[sp.Symbol] = [*self.coordinates, *states, *multipliers.values()]
+        # In their shortest form sums of angles stand as such, so that they become base angles.
+        self.entries = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
+        nodes, symbols = recorded(self.entries)
+        self.leaves = {symbol: leaf for leaf, symbol in symbols.items()}
+        self.unknown_leaves = {leaf for leaf, symbol in symbols.items() if symbol in self.unknown}
+        self.exact = exact = Exact(nodes, positive=not_negative(symbols))
+        self.writer = Writer(exact, symbols)
+        self.assumed: dict[sp.Expr, None] = {}
+        self.needed: dict[sp.Expr, None] = {}
+        self.pairs: dict[int, tuple[sp.Symbol, sp.Symbol]] = {}
+        self.letters: dict[int, sp.Expr] = {}
+        self._name_letters()
+        polynomials = []
+        for value in exact.values:
+            for k, _ in value.under:
+                self._assume(self._polynomial(exact.ring.factors[k]))
+            polynomials.append(self._polynomial(value.num))
+        self.start = _Case(tuple(polynomials))
+
+    def _name_letters(self) -> None:
+        """What generators of the ring are in the polynomials. Raises SymdynError where unknowns stand elsewhere."""
+        exact, name = self.exact, self.equations.name
+        used = {k for v in exact.values for p in (v.num, *[exact.ring.factors[f] for f, _ in v.under])
+                for k, degree in enumerate(p.degrees()) if degree}
+        turning: set[Node] = set()
+        unknown = self.unknown_leaves
+        for k, (sine, cosine) in enumerate(exact.sines):
+            nodes = {node for term in exact.bases[k] for node in term}
+            own = nodes & unknown
+            if not own and all(n.op == "leaf" or n.op == "pi" for n in nodes):
+                continue
+            if any(len(term) > 1 and set(term) & own for term in exact.bases[k]) or not own:
+                if used & {sine, cosine}:
+                    raise SymdynError(f"{name}: equilibria in closed form were requested, but {self.writer.expression(sine)} is "
+                                      "no sine of a sum of coordinates; use module.equilibria()")
+                continue
+            self.pairs[k] = (sp.Dummy(f"s{k}", real=True), sp.Dummy(f"c{k}", real=True))
+            self.letters[sine], self.letters[cosine] = self.pairs[k]
+            turning |= own
+        for k in used:
+            if k in self.letters:
+                continue
+            leaf = exact.leaves.get(k)
+            if leaf is not None and leaf in unknown:
+                if leaf in turning:
+                    raise SymdynError(f"{name}: equilibria in closed form were requested, but {self.writer.expression(k)} stands "
+                                      "within angles and outside of them, so that the conditions are no polynomials; use "
+                                      "module.equilibria()")
+                self.letters[k] = self.writer.expression(k)
+                continue
+            e = self.writer.expression(k)
+            if leaf is None and e.free_symbols & set(self.unknown):
+                raise SymdynError(f"{name}: equilibria in closed form were requested, but the conditions hold {shown(e)}, which "
+                                  "is no polynomial; use module.equilibria()")
+            self.letters[k] = e
+        angles = [q for q in self.coordinates if self.leaves.get(q) in turning]
+        if len(self.pairs) != len(angles):
+            raise SymdynError(f"{name}: equilibria in closed form were requested, but {len(self.pairs)} angles that are no sums "
+                              f"of each other depend on {len(angles)} coordinates; put numbers in place of parameters, or use "
+                              "module.equilibria()")
+        self.turning = angles
+
+    def _polynomial(self, num: Any) -> sp.Expr:
+        return sp.Add(*[sp.Mul(number(c), *[self.letters[k] ** n for k, n in m]) for m, c in plain(num).items()])
+
+    # -- the search
+
+    def result(self) -> EquilibriumPoints:
+        cases, done = [self.start], []
+        for _ in range(CASES):
+            if not cases:
+                break
+            case = cases.pop(0)
+            following = self._next(case)
+            if following is None:
+                done.append(case)
+            else:
+                cases = [*following, *cases]
+        else:
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form have more than {CASES} cases; fix coordinates")
+        points: dict[Any, EquilibriumPoint] = {}
+        for case in done:
+            point = self._point(case)
+            if point is not None:
+                points.setdefault((tuple(point.values.items()), point.conditions), point)
+        assumed = tuple(e for e in self.assumed if not e.is_nonzero and not e.is_number)
+        return EquilibriumPoints(self.equations.name, tuple(points.values()), assumed, () if points else tuple(self.needed))
+
+    @property
+    def _names(self) -> set[sp.Symbol]:
+        return {s for pair in self.pairs.values() for s in pair} | set(self.unknown)
+
+    def _reduced(self, e: sp.Expr) -> sp.Expr:
+        """Without s^2, multiplied out."""
+        e = sp.expand(e)
+        for s, c in self.pairs.values():
+            if e.has(s):
+                p = sp.Poly(e, s)
+                e = sp.expand(sum(a * (1 - c**2) ** (k // 2) * s ** (k % 2) for (k,), a in p.terms()))
+        return e
+
+    def _next(self, case: _Case) -> list[_Case] | None:
+        """The cases that a case falls into; None where nothing is left to be zero."""
+        left: list[sp.Expr] = []
+        for e in case.left:
+            e = self._reduced(e)
+            if e == 0 or (not e.free_symbols & self._names and (_proved(e) or _vanishes(e))):
+                continue
+            if not e.free_symbols & self._names:
+                self.needed.setdefault(sp.factor(e))
+                return []
+            factors = self._factors(e)
+            if len(factors) > 1:
+                others = tuple(o for o in case.left if o is not e)
+                rest = [o for o in others if self._reduced(o) != e]
+                return [_Case((f, *rest), case.found, case.angles, case.conditions) for f in factors]
+            left += factors
+        if not left:
+            return None
+        left = list(dict.fromkeys(left))
+        case = _Case(tuple(left), case.found, case.angles, case.conditions)
+        for e in sorted(left, key=lambda e: (len(self._unknowns(e)), sp.count_ops(e))):
+            unknowns = self._unknowns(e)
+            if len(unknowns) == 1:
+                found = self._single(case, e, unknowns[0])
+                if found is not None:
+                    return found
+            linear = self._linear(case, e)
+            if linear is not None:
+                return [linear]
+        return self._by_basis(case)
+
+    def _factors(self, e: sp.Expr) -> list[sp.Expr]:
+        """Factors that hold unknowns, each once; those in parameters are taken not to be zero."""
+        _, found = sp.factor_list(e)
+        own = []
+        for f, _ in found:
+            if f.free_symbols & self._names:
+                own.append(f)
+            else:
+                self._assume(f)
+        return own
+
+    def _assume(self, e: sp.Expr) -> None:
+        """Take an expression in parameters not to be zero."""
+        self.assumed.update((f, None) for f, _ in sp.factor_list(e)[1])
+
+    def _unknowns(self, e: sp.Expr) -> list[Any]:
+        """Numbers of base angles, and symbols of other unknowns."""
+        free = e.free_symbols
+        return [*[k for k, pair in self.pairs.items() if free & set(pair)], *[x for x in self.unknown if x in free]]
+
+    def _linear(self, case: _Case, e: sp.Expr) -> _Case | None:
+        """An unknown outside of angles eliminated that stands linearly, with a factor in parameters."""
+        for x in self._unknowns(e):
+            if isinstance(x, sp.Symbol):
+                p = sp.Poly(e, x)
+                if p.degree() == 1 and not p.coeff_monomial(x).free_symbols & self._names:
+                    self._assume(p.coeff_monomial(x))
+                    return case.put({x: -p.coeff_monomial(1) / p.coeff_monomial(x)})
+        return None
+
+    def _single(self, case: _Case, e: sp.Expr, unknown: Any) -> list[_Case] | None:
+        """An equation in one unknown solved; None where it has no closed form."""
+        if isinstance(unknown, sp.Symbol):
+            roots = self._roots(e, unknown)
+            return None if roots is None else [case.put({unknown: x}, None, conditions) for x, conditions in roots]
+        s, c = self.pairs[unknown]
+        p = sp.Poly(e, s, c)
+        if p.total_degree() == 1:
+            return [case.put({s: sine, c: cosine}, {unknown: angle}, conditions)
+                    for sine, cosine, angle, conditions in self._circle(*[p.coeff_monomial(k) for k in (s, c, 1)])]
+        if p.degree(s) == 0:
+            roots = self._roots(e, c)
+            if roots is None:
+                return None
+            return [case.put({s: sine, c: x}, {unknown: angle}, [*conditions, *more]) for x, conditions in roots
+                    for sine, _, angle, more in self._circle(sp.S.Zero, sp.S.One, -x)]
+        if p.free_symbols_in_domain or not p.domain.is_Numerical:
+            return None
+        # a(c) + s b(c) = 0: a^2 = (1 - c^2) b^2.
+        q = sp.Poly(e, s)
+        a, b = q.coeff_monomial(1), q.coeff_monomial(s)
+        found = []
+        for x in sp.Poly(sp.expand(a**2 - (1 - c**2) * b**2), c).real_roots():
+            if sp.Abs(x) > 1:
+                continue
+            slope = b.subs(c, x)
+            sines = [-a.subs(c, x) / slope] if slope != 0 else [sp.sqrt(1 - x**2), -sp.sqrt(1 - x**2)]
+            found += [case.put({s: y, c: x}, {unknown: sp.atan2(y, x)}) for y in dict.fromkeys(sines)]
+        return found
+
+    def _roots(self, e: sp.Expr, x: sp.Symbol) -> list[tuple[sp.Expr, list[sp.Basic]]] | None:
+        """Real roots with the conditions for them; None where they have no closed form."""
+        p = sp.Poly(e, x)
+        if not p.free_symbols_in_domain and p.domain.is_Numerical:
+            return [(root, []) for root in dict.fromkeys(sp.Poly(sp.nsimplify(p.as_expr(), rational=True), x).real_roots())]
+        coefficients = p.all_coeffs()
+        self._assume(coefficients[0])
+        if len(coefficients) == 2:
+            return [(-coefficients[1] / coefficients[0], [])]
+        if len(coefficients) == 3:
+            a, b, d = coefficients
+            inside = sp.factor(b**2 - 4 * a * d)
+            if inside.is_negative:
+                return []
+            real = [] if inside.is_nonnegative else [sp.GreaterThan(inside, 0)]
+            return [((-b + sign * sp.sqrt(inside)) / (2 * a), real) for sign in (1, -1)]
+        return None
+
+    def _circle(self, a: sp.Expr, b: sp.Expr, d: sp.Expr) -> list[tuple[sp.Expr, sp.Expr, sp.Expr, list[sp.Basic]]]:
+        """Sine, cosine, angle and conditions with a s + b c + d = 0."""
+        if d == 0:
+            if b == 0:
+                return [(sp.S.Zero, sp.S.One, sp.S.Zero, []), (sp.S.Zero, sp.S.NegativeOne, sp.pi, [])]
+            if a == 0:
+                return [(sp.S.One, sp.S.Zero, sp.pi / 2, []), (sp.S.NegativeOne, sp.S.Zero, -sp.pi / 2, [])]
+        size = sp.factor(a**2 + b**2)
+        self._assume(size)
+        root = sp.sqrt(size)
+        if d == 0:
+            return [(sign * b / root, -sign * a / root, sp.atan2(sign * b, -sign * a), []) for sign in (1, -1)]
+        if a == 0 or b == 0:
+            v = -d / (a + b)
+            if v in (1, -1):  # the circle is touched once
+                return [(v, sp.S.Zero, v * sp.pi / 2, []) if b == 0 else (sp.S.Zero, v, sp.acos(v), [])]
+            inside = sp.Abs(v) <= 1
+            if inside == False:  # noqa: E712
+                return []
+            other = sp.sqrt(1 - v**2)
+            if b == 0:
+                return [(v, other, sp.asin(v), [inside]), (v, -other, sp.pi - sp.asin(v), [inside])]
+            return [(other, v, sp.acos(v), [inside]), (-other, v, -sp.acos(v), [inside])]
+        inside = d**2 <= size
+        if inside == False:  # noqa: E712
+            return []
+        w, middle = sp.sqrt(size - d**2), sp.atan2(a, b)
+        return [((-a * d + sign * b * w) / size, (-b * d - sign * a * w) / size, middle + sign * sp.acos(-d / root), [inside])
+                for sign in (1, -1)]
+
+    def _by_basis(self, case: _Case) -> list[_Case]:
+        """Coupled equations with numbers made triangular. Raises SymdynError for others."""
+        names = [x for x in (*[s for pair in self.pairs.values() for s in pair], *self.unknown)
+                 if any(e.has(x) for e in case.left)]
+        coupled = sorted({str(self._angle(x)) for e in case.left for x in self._unknowns(e)})
+        told = (f"{self.equations.name}: the conditions of equilibrium stay coupled in {', '.join(coupled)} and are not "
+                "solved in closed form")
+        if any(e.atoms(sp.Symbol) - set(names) for e in case.left):
+            raise SymdynError(f"{told}; pass numbers for all parameters with values=..., fix some coordinates, or use "
+                              "module.equilibria()")
+        circles = [s**2 + c**2 - 1 for s, c in self.pairs.values() if s in names or c in names]
+        basis = sp.groebner([*case.left, *circles], *names, order="lex")
+        if basis.exprs == [1]:
+            return []
+        polynomials = [e for e in basis.exprs if self._reduced(e) != 0]
+        if not any(len(self._unknowns(e)) == 1 for e in polynomials) or set(polynomials) == set(case.left):
+            raise SymdynError(f"{told}: they do not hold at single states; fix some coordinates, or use module.equilibria()")
+        return [_Case(tuple(polynomials), case.found, case.angles, case.conditions)]
+
+    def _angle(self, unknown: Any) -> sp.Expr:
+        if isinstance(unknown, sp.Symbol):
+            return unknown
+        return self.writer.expression(self.exact.sines[unknown][0]).args[0]
+
+    # -- what is found
+
+    def _point(self, case: _Case) -> EquilibriumPoint | None:
+        """Coordinates of a case; None where it contradicts itself."""
+        angles = dict(case.angles)
+        values = {x: e for x, e in case.found if x in self.unknown}
+        free = [q for q in self.coordinates if q not in self.turning and q not in values]
+        for k in self.pairs:
+            if k not in angles:
+                angles[k] = sp.Dummy("free")
+        if self.pairs:
+            rows, right = [], []
+            for k in self.pairs:
+                base = self.exact.bases[k]
+                rows.append([sp.Rational(str(base.get((self.leaves[q],), 0))) for q in self.turning])
+                constant = sp.Add(*[number(f) * sp.Mul(*[self.writer._node(n) for n in term]) for term, f in base.items()
+                                    if not set(term) & self.unknown_leaves])
+                right.append(angles[k] - constant)
+            matrix = sp.Matrix(rows)
+            for q, value in zip(self.turning, matrix.LUsolve(sp.Matrix(right)), strict=True):
+                value = sp.expand(value) if value.has(sp.pi) else value
+                values[q] = _within_turn(value)
+        loose = {s for e in values.values() for s in e.atoms(sp.Dummy)}
+        if loose:
+            free += [q for q, e in values.items() if e.atoms(sp.Dummy)]
+            values = {q: e for q, e in values.items() if not e.atoms(sp.Dummy)}
+        if any(c == False for c in case.conditions):  # noqa: E712
+            return None
+        ordered = {x: values[x] for x in self.unknown if x in values}
+        residuals = [e.subs(ordered) for e in self.entries]
+        proved = all(e == 0 or _proved(e) for e in residuals)
+        if not proved and any(not e.free_symbols and not _vanishes(e) for e in residuals):
+            return None
+        return EquilibriumPoint(ordered, tuple(free), tuple(dict.fromkeys(case.conditions)), proved)
+
+
+def _proved(e: sp.Expr) -> bool:
+    return not e.has(sp.CRootOf, sp.atan2) and prove(_plain(e)).proved
+
+
+def _vanishes(e: sp.Expr) -> bool:
+    """Whether a number is zero to 30 digits."""
+    return not e.free_symbols and bool(abs(e.evalf(30)) < ZERO)
+
+
+def _plain(e: sp.Expr) -> sp.Expr:
+    """Sines and cosines of arc functions and sums of these written by roots."""
+    return sp.expand_trig(e) if e.has(sp.acos, sp.asin, sp.atan2) else e
+
+
+def _within_turn(angle: sp.Expr) -> sp.Expr:
+    """A multiple of pi between -pi (left out) and pi; anything else as it is."""
+    turns = angle / (2 * sp.pi)
+    if not turns.is_Rational:
+        return angle
+    turns -= sp.ceiling(turns - sp.Rational(1, 2))
+    return 2 * sp.pi * turns

@@ -1,0 +1,153 @@
+"""Equilibria in closed form are all that there are, and are those that are found in numbers."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError, SymdynError
+
+m, g, l, k, A, Omega, T = sd.parameters("m g l k A Omega T", positive=True)
+
+
+def told(points):
+    return [str(point) for point in points]
+
+
+def test_double_pendulum():
+    eq = sd.systems.get("double_pendulum").embedding()
+    found = eq.equilibria()
+    assert sorted(told(found)) == ["q1 = -pi/2, q2 = 0", "q1 = -pi/2, q2 = pi", "q1 = pi/2, q2 = 0", "q1 = pi/2, q2 = pi"]
+    assert all(point.proved for point in found) and len(found.assumed) == 4
+    assert str(found).startswith("double_pendulum: 4 equilibria\n  q1 = ") and "taken not to be zero: g, lc2, m2" in str(found)
+    assert found._repr_latex_().count(r"\\") == 3 and found[0].free == ()
+    assert all(not eq.linearized(point.values).conditions for point in found)
+
+
+@pytest.mark.parametrize("name", ["pendulum", "double_pendulum", "vehicle_on_rotating_track"])
+def test_as_in_numbers(name):
+    eq = sd.systems.get(name).recursive()
+    closed = {tuple(np.round(np.array([float(p.values[q]) for q in eq.symbols.coordinates]) % (2 * np.pi), 6))
+              for p in eq.equilibria(values=eq.symbols.defaults)}
+    found = eq.compile(backend="numpy").equilibria(20)
+    numeric = {tuple(np.round(np.asarray(e.q) % (2 * np.pi), 6) % round(2 * np.pi, 6)) for e in found}
+    assert numeric == closed
+
+
+def hoop():
+    theta, phi = sd.coordinates("theta phi")
+    system = sd.System("hoop", gravity=[0, 0, -g])
+    ring, bead = system.add_body("ring", inertia=[0, 0, A]), system.add_body("bead", mass=m, com=[0, 0, -l])
+    system.add_joint(sd.Revolute("drive", system.ground, ring, axis=[0, 0, 1], coordinate=phi))
+    system.add_joint(sd.Revolute("arm", ring, bead, axis=[0, 1, 0], coordinate=theta))
+    return system.embedding()
+
+
+def test_bead_on_a_turning_hoop():
+    """Strogatz, Nonlinear Dynamics and Chaos, 2nd ed., section 3.5: cos theta = g / (l Omega^2) where that is at most 1."""
+    eq = hoop()
+    found = eq.equilibria({"phi_dot": Omega})
+    theta = next(q for q in eq.symbols.coordinates if q.name == "theta")
+    angle = sp.acos(g / (l * Omega**2))
+    assert [p.values[theta] for p in found] == [0, sp.pi, angle, -angle]
+    assert [p.conditions for p in found] == [(), (), (g / (l * Omega**2) <= 1,), (g / (l * Omega**2) <= 1,)]
+    linear = eq.linearized({theta: angle, "phi_dot": Omega}, hold=["phi"])
+    assert sd.prove(linear.K[0], m * l**2 * Omega**2 - m * g**2 / Omega**2)
+
+
+def test_an_arm_that_a_torque_holds():
+    eq = sd.systems.get("two_link_arm").recursive()
+    found = eq.equilibria({"tau1": T})
+    assert len(found) == 4 and all(point.proved and point.conditions for point in found)
+    for point in found:
+        assert all(sd.prove(sp.expand_trig(e.lhs), 0) for e in eq.linearized({**point.values, "tau1": T}).conditions)
+
+
+def test_free_coordinates_and_none_at_all():
+    found = sd.systems.get("cart_pole").embedding().equilibria()
+    assert told(found) == ["q2 = 0, q1 free", "q2 = pi, q1 free"]
+    assert r"q_{1} \text{ free}" in found._repr_latex_()
+    none = sd.systems.get("vehicle_on_track").embedding().equilibria()
+    assert str(none) == "vehicle_on_track: 0 equilibria\n  would have to be zero: -g*m*sin(theta)"
+    assert "no equilibrium" in none._repr_latex_()
+    held = sd.systems.get("double_pendulum").embedding().equilibria({"q1": 0})
+    assert told(held) == ["q2 = pi/2", "q2 = -pi/2"]
+
+
+def test_multipliers_of_a_pendulum_by_hand():
+    x, y = sd.coordinates("x y")
+    eq = sd.augmented([x, y], mass=[m, m], force=[0, -m * g], constraints=[x**2 + y**2 - l**2])
+    assert told(eq.equilibria()) == ["x = 0, y = l, lambda1 = -g*m/(2*l)", "x = 0, y = -l, lambda1 = g*m/(2*l)"]
+
+
+def sliders(law_x, law_y):
+    x, y = sd.coordinates("x y")
+    system = sd.System("sliders")
+    one, two = system.add_body("one", mass=m), system.add_body("two", mass=m)
+    first = system.add_joint(sd.Prismatic("x", system.ground, one, axis=[1, 0, 0], coordinate=x))
+    second = system.add_joint(sd.Prismatic("y", one, two, axis=[0, 1, 0], coordinate=y))
+    system.add_joint_force(first, law_x(x, y))
+    system.add_joint_force(second, law_y(x, y))
+    return system.embedding()
+
+
+def test_roots_of_polynomials():
+    buckled = sliders(lambda x, y: k * x - x**3, lambda x, y: -y)
+    assert told(buckled.equilibria()) == ["x = 0, y = 0", "x = sqrt(k), y = 0", "x = -sqrt(k), y = 0"]
+    parted = sliders(lambda x, y: T - A * x - x**2, lambda x, y: -y)
+    assert len(parted.equilibria()) == 2
+    coupled = sliders(lambda x, y: x**2 + y**2 - 5, lambda x, y: x * y - 2)
+    assert sorted((float(p.values[sp_x]), float(p.values[sp_y])) for p in coupled.equilibria()
+                  for sp_x, sp_y in [coupled.symbols.coordinates]) == [(-2, -1), (-1, -2), (1, 2), (2, 1)]
+    fifth = sliders(lambda x, y: x**5 - x - 1, lambda x, y: x - y)
+    point, = fifth.equilibria()
+    assert abs(float(point.values[fifth.symbols.coordinates[1]]) - 1.1673039782614187) < 1e-14 and not point.free
+
+
+def test_coupled_angles_with_numbers():
+    """A pendulum with a torque of twice the angle: a polynomial of degree 4 in the cosine."""
+    q = sd.coordinates("q")
+    system = sd.System("rod", gravity=[0, -g])
+    rod = system.add_body("rod", mass=m, com=[l, 0])
+    joint = system.add_joint(sd.Revolute("pivot", system.ground, rod, coordinate=q))
+    system.add_joint_force(joint, 5 * sp.sin(2 * q) + 1)
+    eq = system.embedding()
+    found = [float(p.values[q]) for p in eq.equilibria(values={m: 1, g: 10, l: 1})]
+    wanted = []
+    grid = np.linspace(-np.pi, np.pi, 20001)
+    f = 5 * np.sin(2 * grid) + 1 - 10 * np.cos(grid)
+    for i in np.flatnonzero(f[1:] * f[:-1] < 0):
+        wanted.append(grid[i] - f[i] * (grid[i + 1] - grid[i]) / (f[i + 1] - f[i]))
+    assert len(wanted) >= 2 and np.allclose(sorted(found), sorted(wanted), atol=1e-6)
+    with pytest.raises(SymdynError, match="stay coupled in q and are not solved in closed form; pass numbers for all parameters"):
+        eq.equilibria()
+
+
+def test_what_has_no_closed_form():
+    transcendental = sd.systems.get("pendulum")
+    q = transcendental.embedding().symbols.coordinates[0]
+    joint = transcendental.joints[0]
+    transcendental.add_joint_force(joint, -q)
+    with pytest.raises(SymdynError, match="q1 stands within angles and outside of them, so that the conditions"):
+        transcendental.embedding().equilibria()
+    with pytest.raises(SymdynError, match=r"the conditions hold sqrt\(.*, which is no polynomial; use module\.equilibria\(\)"):
+        sd.systems.get("flyball_governor").embedding().equilibria()
+    with pytest.raises(SymdynError, match=r"sin\(k\*x\) is no sine of a sum of coordinates"):
+        sliders(lambda x, y: sp.sin(k * x), lambda x, y: -y).equilibria()
+    with pytest.raises(ArgumentError, match="values has x; its parameters are"):
+        sd.systems.get("pendulum").embedding().equilibria(values={"x": 1})
+    with pytest.raises(SymdynError, match="they do not hold at single states; fix some coordinates"):
+        sliders(lambda x, y: x**2 + y**2 - 5, lambda x, y: 0).equilibria()
+    ball = sd.System("ball")
+    body = ball.add_body("body", mass=m, inertia=[A, A, A])
+    ball.add_joint(sd.Spherical("joint", ball.ground, body, orientation=sd.EulerParameters()))
+    with pytest.raises(SymdynError, match="requested of Euler parameters; describe the orientation by Euler angles"):
+        ball.recursive().equilibria()
+
+
+def test_time_is_bounded():
+    import dataclasses
+
+    eq = sd.systems.get("four_bar").augmented()
+    with pytest.raises(SymdynError, match=r"were not found within 1 s; pass numbers for parameters with values=\.\.\."):
+        dataclasses.replace(eq, simplify_seconds=1.0).equilibria(values=eq.symbols.defaults)
