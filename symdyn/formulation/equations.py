@@ -26,6 +26,7 @@ _EXPANDED = 1.0
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from symdyn.analytic.units import UnitReport
     from symdyn.formulation.identification import BaseParameters
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
@@ -310,6 +311,13 @@ class Equations:
         from symdyn.exact.mechanism import prove_equations
 
         return prove_equations(self)
+
+    def check_units(self) -> UnitReport:
+        """Dimensional analysis of all entries by the units of the symbols (system.units): true where they agree, prints what does
+        not, such as a sum of metres and radians. See symdyn.analytic.units."""
+        from symdyn.analytic.units import check_units
+
+        return check_units(self)
 
     def __repr__(self) -> str:
         s = self.symbols
