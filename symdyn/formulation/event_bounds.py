@@ -41,7 +41,7 @@ def bound_names(leaves: Sequence[int]) -> list[str]:
 
 def event_bounds(equations: Equations, name: str) -> Tape:
     """BOUNDS of the values at events, (n_e, 6): from and to of each value, its derivative and its second derivative, or RANGES,
-    (n_e, 2), of the values alone; of those that cannot be enclosed zeros."""
+    (n_e, 2), of the values alone, with the rounding of their operations; of those that cannot be enclosed zeros."""
     recorder, can = equations.recorder, enclosed(equations)
     values = _values(equations, can)
     places = {name: k for k, name in enumerate(_leaf_names(equations))}
@@ -51,7 +51,7 @@ def event_bounds(equations: Equations, name: str) -> Tape:
         return Jet(*[Interval(*ends[k:k + 2]) for k in (0, 2, 4)])
 
     with recorder.section("bounds of the events"):
-        found = iter(enclosures(recorder, values, {leaf: jet(leaf) for leaf in _moving(values)}))
+        found = iter(enclosures(recorder, values, {leaf: jet(leaf) for leaf in _moving(values)}, rounded=name == RANGES))
         rows = np.zeros((len(can), 6), dtype=object)
         for k in np.flatnonzero(can):
             rows[k] = [end for interval in next(found) for end in interval]

@@ -15,7 +15,7 @@ from symdyn.shown import LENGTH, name_of
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-EVENTS, RESETS, BOUNDS = "events", "event_resets", "event_bounds"
+EVENTS, RESETS, BOUNDS, RANGES = "events", "event_resets", "event_bounds", "event_ranges"
 # Events closer than this part of the span of the run happen at one time.
 AT_ONCE = 1e-14
 # So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
@@ -302,7 +302,8 @@ class Locator:
         return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))
 
     def _rounding(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The same where quantities are resolved: of those that are bounded no less than they vary by within the rounding."""
+        """The same where quantities are resolved: of those that are bounded no less than they vary by within the rounding, and
+        with that of their own operations."""
         noise = self._noise(t, x)
         if not self.bounded.any():
             return noise
@@ -312,13 +313,13 @@ class Locator:
         radius = eps * np.concatenate([[2 * abs(t)], panels.DENSE * self.size[:self.n_state], panels.DENSE * np.abs(given)])
         jets = np.zeros((len(at), 6))
         jets[:, 0], jets[:, 1] = at - radius, at + radius
-        ranges = self._bounds(t, state, given, jets)
+        ranges = self._bounds(RANGES, t, state, given, jets)
         return np.where(self.bounded, np.maximum(noise, ranges[:, 1] - ranges[:, 0]), noise)
 
-    def _bounds(self, t: float, state: np.ndarray, given: np.ndarray, jets: np.ndarray) -> np.ndarray:
-        """Bounds of the quantities, (n_e, 6), from those of t, the state and the inputs, (1 + n_x + n_in, 6)."""
+    def _bounds(self, name: str, t: float, state: np.ndarray, given: np.ndarray, jets: np.ndarray) -> np.ndarray:
+        """BOUNDS or RANGES of the quantities from bounds of t, the state and the inputs, (1 + n_x + n_in, 6)."""
         leaves = self.module.metadata.event_leaves
-        return self.module.evaluate(BOUNDS, t, state, self.p, given, jets[list(leaves)].ravel())
+        return self.module.evaluate(name, t, state, self.p, given, jets[list(leaves)].ravel())
 
     def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
         """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
@@ -341,7 +342,7 @@ class Locator:
         rows = np.array([np.concatenate([x[:self.n_state], self.given(float(s), x[:self.n_state])])
                          for s, x in zip(times, states, strict=True)])
         try:
-            bounds = self._bounds(right, rows[0, :self.n_state], rows[0, self.n_state:], panels.jets(left, right, rows))
+            bounds = self._bounds(BOUNDS, right, rows[0, :self.n_state], rows[0, self.n_state:], panels.jets(left, right, rows))
             doubtful = self.bounded & panels.unproved(samples, bounds)
             most = np.abs(samples[:panels.N]).max(axis=0)
             if doubtful.any():

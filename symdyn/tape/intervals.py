@@ -2,7 +2,8 @@
 
 What depends on s, -1 <= s <= 1, is a jet: three intervals that hold the value, its derivative and its second derivative by s at
 every s. Jets of the leaves are given; those of results follow operation by operation, by the chain rule with ranges of f, f' and
-f'' over intervals. Ends of intervals are rounded to nearest, not outwards: bounds hold but for rounding.
+f'' over intervals. Ends of intervals are rounded to nearest: bounds hold but for rounding, unless values are widened by the
+rounding of every operation.
 
 Source: Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009), chapters 2, 5 and 9.
 """
@@ -21,7 +22,11 @@ from symdyn.tape.tape import reachable
 BIG, LARGEST_EXPONENT = 10**60, 138
 # Values with more operations than this that move are not enclosed: intervals grow with every one of them.
 MOST = 400
+# What an operation with rounding changes its value by, in parts of it: a unit of the last place of doubles.
+ROUNDING = Fraction(1, 2**52)
 _COMPARED = {"lt", "le", "gt", "ge", "eq", "ne"}
+# Operations without rounding.
+_EXACT = {"neg", "abs", "sign", "floor", "ceil", "min", "max", "select", "and", "or", "not", *_COMPARED}
 _HALF = Fraction(1, 2)
 
 
@@ -57,8 +62,12 @@ def encloses(recorder: Recorder, entry: Any) -> bool:
     return len(moving) <= MOST and not any(node.op in ("call", "item", "guard") or node in recorder.checks for node in moving)
 
 
-def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node, Jet]) -> list[Jet]:
-    """A jet for every entry, all of which `encloses` holds of; leaves: jets of what moves."""
+def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node, Jet], rounded: bool = False) -> list[Jet]:
+    """A jet for every entry, all of which `encloses` holds of.
+
+    leaves    jets of what moves
+    rounded   whether values are to hold what doubles give as well, with the rounding of their operations
+    """
     arithmetic = _Arithmetic(recorder)
     found: dict[Node, Any] = {}
 
@@ -71,7 +80,9 @@ def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node,
         elif not node.mask & ~PARAMETER:
             found[node] = _still(node)
         else:
-            found[node] = arithmetic.step(node, [of(a) for a in node.args])
+            found[node] = made = arithmetic.step(node, [of(a) for a in node.args])
+            if rounded and node.op not in _EXACT:
+                found[node] = made._replace(value=arithmetic.widened(made.value))
     return [of(entry) for entry in entries]
 
 
@@ -146,6 +157,11 @@ class _Arithmetic:
         known = self.above(r.mul(a.lo, a.hi), 0)
         safe = Interval(self.choose(known, a.lo, 1), self.choose(known, a.hi, 1))
         return self.where(known, Interval(r.div(1, safe.hi), r.div(1, safe.lo)), ANY)
+
+    def widened(self, a: Interval) -> Interval:
+        """With the rounding of an operation."""
+        below, above = (self.r.mul(ROUNDING, self.r.apply("abs", end)) for end in a)
+        return Interval(self.r.sub(a.lo, below), self.r.add(a.hi, above))
 
     def hull(self, a: Interval, b: Interval) -> Interval:
         return Interval(self.least(a.lo, b.lo), self.most(a.hi, b.hi))

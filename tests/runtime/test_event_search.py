@@ -161,6 +161,20 @@ def test_random_quantities_have_no_zero_missed(backend: str, method: str) -> Non
         assert of.zeros > 0 and (of.missed, of.superfluous, of.warned) == (0, 0, 0), (rtol, kind)
 
 
+@pytest.mark.parametrize(("backend", "method"), SHARED)
+def test_a_threshold_that_is_hardly_reached_is_passed_once_each_way(backend: str, method: str) -> None:
+    """By no more than some thousand units of the last place, so that rounding of the sine passes zero again and again."""
+    w, p = sd.parameters("w p")
+    module = thrown(near=(lambda y: sp.sin(w * sd.t + p) - 1 + sp.Rational(3, 10**12), {}))[backend]
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        frequency, phase = rng.uniform(1, 20), rng.uniform(0.5, 1.5)
+        run = module.simulate((0, 2 * np.pi * 10 / frequency), params={"g": 0, w: frequency, p: phase}, method=method, rtol=1e-4)
+        tops = (np.pi / 2 - phase + 2 * np.pi * np.arange(10)) / frequency
+        half = np.sqrt(6e-12) / frequency
+        np.testing.assert_allclose(run.events["near"].t, np.sort([*(tops - half), *(tops + half)]), rtol=0, atol=1e-10)
+
+
 def test_zeros_of_the_sweep_are_zeros() -> None:
     """Of the polynomials and the touching sine by their values next to the zeros."""
     for seed in range(4):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from symdyn.tape.differentiate import forward
+from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.intervals import BIG, Interval, Jet, encloses, enclosures
 from symdyn.tape.node import COORDINATE, PARAMETER, SPEED
@@ -116,3 +117,21 @@ def test_algorithms_and_long_values_are_not_enclosed() -> None:
     assert not encloses(r, long)
     assert not encloses(r, 1 / r.guard(x * x, x, "must be positive"))
     assert not encloses(r, 1 / r.positive(x * x + 1, "a pivot"))
+
+
+@pytest.mark.parametrize("name", ["sum", "product", "quotient", "power", "sine_of_much", "pulse", "erf", "sin"])
+def test_bounds_with_rounding_hold_exact_values(name: str) -> None:
+    """Bounds of points, which have no width else, in doubles, and values at 40 digits."""
+    r = Recorder()
+    x, y, p = r.leaf("x", COORDINATE), r.leaf("y", SPEED), r.leaf("p", PARAMETER)
+    entry = VALUES[name](r, x, y, p)
+    points = {leaf: Jet(Interval(leaf, leaf), Interval(0, 0), Interval(0, 0)) for leaf in (x, y)}
+    exact = Tape.of(r, value=np.array([entry], dtype=object))
+    ends = Tape.of(r, ends=np.array(enclosures(r, [entry], points, rounded=True)[0].value, dtype=object))
+    rng = np.random.default_rng(0)
+    for row in rng.uniform(0.1, 1.9, (50, 3)):
+        at = dict(zip(("x", "y", "p"), row.tolist(), strict=True))
+        value = evaluate(exact, {leaf.args[1]: at[leaf.args[1]] for leaf in exact.inputs}, 40)["value"][0]
+        low, high = evaluate_rows(ends, {leaf.args[1]: at[leaf.args[1]] for leaf in ends.inputs}, 1)["ends"][0]
+        assert low <= value <= high
+        assert high - low < 1e-12

@@ -97,7 +97,8 @@ static int symdyn_event_samples(
     return 0;
 }
 
-// The same where quantities are resolved: of those that are bounded no less than what they vary by within the rounding.
+// The same where quantities are resolved: of those that are bounded no less than what they vary by within the rounding, and with
+// that of their own operations.
 static int symdyn_event_rounding(symdyn_run *run, double t, const double *x, double *noise) {
     int failure = symdyn_event_noise(run, t, x, noise);
 #if SYMDYN_HAS_BOUNDS
