@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from symdyn.formulation.equations import Equations
-from symdyn.tape.external import UserFunction
+from symdyn.tape.external import Result, UserFunction
 from symdyn.tape.intervals import Interval, Jet, encloses, enclosures
 from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, Node
 from symdyn.tape.tape import Tape, reachable
 
 BOUNDS, RANGES = "event_bounds", "event_ranges"
+# Functions that can make no pulse far narrower than their argument's own changes.
+_EVEN = (sp.sin, sp.cos, sp.sinh, sp.cosh, sp.asinh, sp.log)
 # Of a leaf, in the order of its bounds: value, derivative and second derivative by the place within the part, from and to.
 _ENDS = ("least", "most", "least rate", "most rate", "least bend", "most bend")
 
@@ -24,6 +28,25 @@ def enclosed(equations: Equations) -> list[bool]:
         return []
     ways = [equations] if equations.otherwise is None else [equations, equations.otherwise]
     return [all(encloses(way.recorder, way.quantity("events")[k]) for way in ways) for k in range(len(equations.events))]
+
+
+def unproved(equations: Equations) -> list[str]:
+    """Of every event that is not enclosed, but has functions in its expression that can make narrow pulses, which; else ""."""
+    parameters = set(equations.symbols.parameters)
+    return ["" if can else _steep(event.value, parameters)
+            for can, event in zip(enclosed(equations), equations.events, strict=True)]
+
+
+def _steep(expression: sp.Expr, parameters: set[sp.Symbol]) -> str:
+    found = set()
+    for part in sp.preorder_traversal(expression):
+        if part.free_symbols <= parameters:
+            continue
+        if isinstance(part, sp.Pow) and not (part.exp.is_number and part.exp.is_positive):
+            found.add("a quotient" if part.exp.is_number else "a power")
+        elif isinstance(part, sp.Function) and not isinstance(part, (*_EVEN, AppliedUndef, Result)):
+            found.add(str(part.func))
+    return f"{', '.join(sorted(found))} of what is only sampled" if found else ""
 
 
 def event_leaves(equations: Equations) -> list[int]:

@@ -298,8 +298,11 @@ class System:
         """An event where a value passes zero: its time and state are found and recorded in every simulation.
 
         Within every step the value is sampled as finely as it varies, so that zeros close together are found as well (see
-        symdyn.panels); where it varies so quickly that this has no end, simulate warns. A peak that is far narrower than a
-        seventh of a step and alone in it can still be missed: give simulate a max_step of its width.
+        symdyn.panels), and interval arithmetic proves that it does not pass zero between samples; where either has no end,
+        simulate warns. Three kinds of values are only sampled: those of inputs given by functions and of functions of the user;
+        those of multipliers, reactions and accelerations; and those of over 400 operations. simulate warns of the first, and of
+        the others where a function such as exp, Piecewise or a quotient could make a pulse narrower than the samples are apart;
+        give it event_spacing, the longest time between samples.
 
         value      an expression as for add_output, such as sd.position(ball)[1] - h
         direction  1: only upwards through zero, -1: only downwards, 0: either way; in the course of the run, so that in a run

@@ -122,14 +122,16 @@ def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: floa
 
 
 def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
-    """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, and the
-    inputs that are given by functions; "" where none does, and where the user has chosen the spacing of samples."""
+    """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, the
+    inputs that are given by functions, and those that are not enclosed; "" where none does, and where the user has chosen the
+    spacing of samples."""
     if look is None or spacing:
         return ""
     told = []
     for record, wanted in zip(module.metadata.events, look, strict=True):
-        of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
-        told += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
+        of = [f"the function {f}" for f in record["functions"]] + [f"the input {i}" for i in record["inputs"] if i in functions]
+        of += [record["unproved"]] if record["unproved"] else []
+        told += [f"{record['name']} depends on {', '.join(of)}"] if wanted and of else []
     if not told:
         return ""
     return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "

@@ -125,6 +125,38 @@ def test_a_function_of_the_user_is_warned_of_or_sampled() -> None:
     assert spaced.doubts == ()
 
 
+def hinged(value: Callable[[Any], Any], backend: str = "numpy") -> Any:
+    """A double pendulum with an event of the force on its hinge, whose speeds equations are solved for."""
+    q = sd.coordinates("q1 q2")
+    s = sd.System("pendulum", gravity=[0, -1])
+    upper, lower = (s.add_body(name, mass=1) for name in ("upper", "lower"))
+    s.add_joint(sd.Revolute("hinge", s.ground, upper, q[0], child_point=[0, 1]))
+    s.add_joint(sd.Revolute("knee", upper, lower, q[1], child_point=[0, 1]))
+    s.add_event("pull", value(sd.reaction("hinge")[1]))
+    s.initial = {q[0]: 1}
+    return s.embedding().compile(backend=backend)
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+def test_a_narrow_pulse_of_a_reaction_is_warned_of_or_found_with_a_spacing(backend: str) -> None:
+    level = hinged(lambda N: N - 2, backend).simulate((0, 3), rtol=1e-10)
+    module = hinged(lambda N: sp.exp(-((N - 2) / 0.001) ** 2) - sp.Rational(1, 2), backend)
+    match = "pendulum: zeros of events may be missed: pull depends on exp of what is only sampled, and a pulse"
+    with pytest.warns(SimulationWarning, match=match):
+        module.simulate((0, 3))
+    spaced = module.simulate((0, 3), event_spacing=2e-4, rtol=1e-10)
+    assert level.doubts == spaced.doubts == () and len(level.events["pull"].t) > 0
+    np.testing.assert_allclose(spaced.events["pull"].t.reshape(-1, 2).mean(axis=1), level.events["pull"].t, atol=1e-4)
+
+
+def test_a_pulse_in_a_long_value_is_warned_of() -> None:
+    """A sum of two hundred sines, which bounds say little of."""
+    s = particle(lambda y: sp.exp(-sum(sp.sin(k * y + k) for k in range(1, 201)) ** 2) - sp.Rational(1, 2))
+    module = s.embedding().compile(backend="numpy")
+    with pytest.warns(SimulationWarning, match="pulse depends on exp of what is only sampled, and a pulse of a function"):
+        module.simulate((0, 0.01))
+
+
 @pytest.mark.parametrize("backend", ["c", "numpy"])
 def test_what_cannot_be_proved_is_warned_of(backend: str) -> None:
     """The value is 1e-6 all the time; bounds of its parts, which cancel, do not show it before a hundred thousandth of a step."""
