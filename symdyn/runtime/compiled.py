@@ -200,9 +200,13 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
             chatters = chatter(of.t, report.x, of.n_steps) if chatter is not None else ""
             if chatters:
                 break
-            if short is not None and (warning := short(of.t, report.x, of.n_steps)):
-                warned.append(warning)
-                warnings.warn(warning, SimulationWarning, stacklevel=5)  # now: such a run may take very long
+            told, ends = short(float(report[0]), report[8:8 + n_x], int(report[2])) if short is not None else ("", False)
+            if ends:
+                chatters = told
+                break
+            if told:
+                warned.append(told)
+                warnings.warn(told, SimulationWarning, stacklevel=5)  # now: such a run may take very long
     except KeyboardInterrupt:
         interrupted = True
     if run.trouble and isinstance(run.trouble[0], KeyboardInterrupt):

@@ -230,10 +230,12 @@ class Run:
         if not self.message and self.chatter is not None and self.accepted % STEPS_OF_SCIPY == 0:
             self.message = self.chatter(self.here, self.state, self.accepted)
         if not self.message and self.short is not None and self.accepted % TRIED_OF_SCIPY == 0:
-            warning = self.short(self.here, self.state, self.accepted)
-            if warning:
-                self.warned.append(warning)
-                warnings.warn(warning, SimulationWarning, stacklevel=7)  # now: such a run may take very long
+            told, ends = self.short(self.here, self.state, self.accepted)
+            if ends:
+                self.message = told
+            elif told:
+                self.warned.append(told)
+                warnings.warn(told, SimulationWarning, stacklevel=7)  # now: such a run may take very long
         if not self.message and self.accepted == self.request.max_steps and self.solver.status == "running":
             self.message = f"stopped after {self.accepted} steps, as asked"
 

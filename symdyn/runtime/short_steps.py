@@ -3,7 +3,8 @@
 A motion is smooth where a cubic describes it within some tolerances over as many steps as are looked at: of any method a few
 steps would do. If stability does not ask for the short ones (they are far below the inverse of the largest eigenvalue of the
 smooth part), and the rate of an entry goes to and fro from step to step, that is what they follow: a jump that the run cannot see
-into, as in functions of the user, or noise.
+into, as in functions of the user, or noise. Where the rate at the same time jumps from one side of the motion to the other, and
+drives it back from both, it slides along the jump (symdyn.runtime.chatter), and the run ends there.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ if TYPE_CHECKING:
 # Steps of a trial that are compared with a cubic, of compiled methods and of SciPy's: as many times shorter than needed they are.
 TRIED, TRIED_OF_SCIPY = 1000, 1000
 # A look is worth a trial where steps are this part of the longest before, or where a run has taken so many times the steps of a
-# trial, and again with every doubling of these.
-SHRUNK, MANY = 1e-3, 20
+# trial, and again with every doubling of these; the part of a run with functions of the user, which may jump, is larger.
+SHRUNK, OF_FUNCTIONS, MANY = 1e-3, 1e-2, 20
 # How far a cubic may be away, in tolerances, which radau eases for itself, at this part of the states; product of a step and the
 # largest eigenvalue below which stability asks for no shorter ones; how much further a rate goes to and fro than it gets.
 MISSED, MOST, STABLE, TO_AND_FRO = 1000.0, 0.9, 0.05, 20.0
+# Distances to either side of a motion at which a jump stays as it is, in those that its steps go; what is left of it nearby.
+ASIDE, LEFT = (2.0, 8.0, 32.0), 0.8
 
 Trial = Callable[[float, np.ndarray, float, int], "Outcome"]
 
@@ -43,36 +46,43 @@ class ShortSteps:
         self.next = 2 * tried  # steps after which the next trial may be
         self.warned = False
 
-    def __call__(self, t: float, x: np.ndarray, n_steps: int) -> str:
-        """What to warn of at (t, x) after so many steps; "" if nothing, or once it has been said."""
+    def __call__(self, t: float, x: np.ndarray, n_steps: int) -> tuple[str, bool]:
+        """What to say at (t, x) after so many steps, and whether the run ends there, else it is a warning; "" if nothing, or once
+        it has been said."""
         done = n_steps - self.n_steps
         if done <= 0 or self.warned:
-            return ""
+            return "", False
         step = abs(t - self.t) / done
         self.t, self.n_steps = t, n_steps
         self.longest = max(self.longest, step)
         wanted = self.request.max_step
-        if n_steps < self.next or (step > SHRUNK * self.longest and n_steps < MANY * self.tried) or 0 < wanted < 3 * step:
-            return ""
+        shrunk = SHRUNK if self.request.inputs.function is None else OF_FUNCTIONS
+        long = step > shrunk * self.longest and n_steps < MANY * self.tried
+        if n_steps < self.next or long or 0 < wanted < 3 * step:
+            return "", False
         self.next = 2 * n_steps
         tried = self.trial(t, x, step, self.tried)
         if tried.interrupted:
             raise KeyboardInterrupt
         try:
             found = self._entry(tried)
+            slides = "" if found is None else self._slides(tried, found[0])
         except (SymdynError, np.linalg.LinAlgError):
-            return ""
+            return "", False
         if found is None:
-            return ""
+            return "", False
         self.warned = True
+        if slides:
+            return slides, True
         k, length, jump = found
         names, n = self.module.metadata.x, self.request.n_state
         state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x[:n], strict=True))
-        return (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter than "
+        told = (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter than "
                 f"the motion itself needs there: the rate of {names[k]} goes to and fro by {jump:.3g} a second from step to "
-                f"step, as behind a jump or noise in a load, an input or a function of the user; "
-                f"the state there: {state}. Make that "
-                "smooth, or write a jump as an expression (sign, Piecewise), so that a motion along it is stopped with its name")
+                f"step, as behind a jump or noise in a load, an input or a function of the user; the state there: {state}. Make "
+                "that smooth, or write a jump as an expression (sign, Piecewise), so that a motion along it is stopped with its "
+                "name")
+        return told, False
 
     def _entry(self, found: Outcome) -> tuple[int, float, float] | None:
         """The entry whose rate goes to and fro most, by its tolerance; the mean step; how far it goes."""
@@ -93,6 +103,37 @@ class ShortSteps:
         k = int(weight.argmax())
         # What goes to and fro must be what the errors of steps are about.
         return (k, step, float(ways[:, k].max())) if weight[k] > 1e-3 else None
+
+    def _slides(self, found: Outcome, k: int) -> str:
+        """What to say where the motion slides along a jump that entry k passes; "" where it does not."""
+        n, middle = self.request.n_state, len(found.t) // 2
+        t, x = found.t, found.x[:, :n]
+        span = t[-1] - t[0]
+        powers = np.vander((t - t[0]) / span, 4)
+        cubic = np.linalg.lstsq(powers, x, rcond=None)[0]
+        here, goes = powers[middle] @ cubic, (np.array([3, 2, 1]) * powers[middle, 1:]) @ cubic[:3, k] / span
+        off = x - powers @ cubic
+        far = float(np.quantile(np.abs(off[:, k]), MOST))
+        along = off[:, k] @ off / (off[:, k] @ off[:, k])  # how the others go with it, such as by constraints
+        rows = here + np.outer([sign * far * a for a in (*ASIDE, ASIDE[0]) for sign in (-1, 1)], along)
+        at = np.full(len(rows), t[middle])
+        rates = self._rates(at, rows)[:, k].reshape(-1, 2)
+        jumps = rates[:, 0] - rates[:, 1]
+        if not (rates[:, 0] > goes).all() or not (rates[:, 1] < goes).all() or (rates[0] != rates[-1]).any():
+            return ""
+        if jumps.min() < LEFT * jumps.max():
+            return ""
+        about = self.module.metadata
+        inputs = self.request.inputs.rows(at, rows).reshape(-1, len(about["inputs"]))
+        jumping = [name for name, (below, above) in zip(about["inputs"], inputs[-2:].T, strict=True)
+                   if abs(above - below) > LEFT * 1e-3 * max(abs(above), abs(below))] if len(inputs) == len(rows) else []
+        what = f"input {', '.join(jumping)}" if jumping else "a load or a function of the user"
+        name = about["x"][k]
+        return (f"{what} chatters: the motion is driven onto a jump at {name} = {here[k]:.6g} from both sides, at rates of "
+                f"{rates[0, 0] - goes:.3g} and {rates[0, 1] - goes:.3g} of its unit a second, and every step crosses it, "
+                f"{len(t)} steps took {abs(span):.3g} s; make the jump smooth, for example by tanh({name}/eps) in place of "
+                f"sign({name}) with a small eps, or end the motion there by an event with stop=True and go on with equations for "
+                "what sticks")
 
     def _radius(self, t: float, x: np.ndarray) -> float:
         """The largest size of the eigenvalues of x_dot by x, from differences that cross no jump: to one side, the smaller."""
