@@ -18,6 +18,7 @@ DOUBLE = np.dtype(float)
 # Axes that values of any argument have at most, with one to spare.
 MOST_AXES = 4
 MASKED = "a masked array, whose hidden entries would count; pass .filled(...) or .compressed()"
+TRUTH = "True and False are no numbers; pass 1.0 and 0.0 if these are meant"
 
 
 class NotReal(ValueError):
@@ -27,15 +28,15 @@ class NotReal(ValueError):
 def real(values: Any) -> np.ndarray:
     """An array of doubles, the array itself if it is one; NaN and infinity pass.
 
-    Raises NotReal for complex numbers (also with imaginary part zero), masked entries, text, dates, numbers beyond the range of
-    doubles, rows of different lengths, and anything else that has no numbers.
+    Raises NotReal for complex numbers (also with imaginary part zero), masked entries, truth values, text, dates, numbers beyond
+    the range of doubles, rows of different lengths, and anything else that has no numbers.
     """
     if type(values) is np.ndarray and values.dtype is DOUBLE:
         return values
     if type(values) is float:
         return np.array(values)
-    if _holds_masked(values):
-        raise NotReal(MASKED)
+    if isinstance(values, (list, tuple)):
+        _check_entries(values)
     try:
         array = np.asanyarray(values)
     except Exception as error:  # rows of different lengths, or whatever __array__ and __len__ of a user's class raise
@@ -43,8 +44,10 @@ def real(values: Any) -> np.ndarray:
     if np.ma.isMaskedArray(array):
         raise NotReal(MASKED)
     array = np.asarray(array)
-    if array.dtype.kind in "fiub":
+    if array.dtype.kind in "fiu":
         return array.astype(float) if array.dtype is not DOUBLE else array
+    if array.dtype.kind == "b":
+        raise NotReal(TRUTH)
     if array.dtype.kind == "c":
         raise NotReal("complex; pass the real part, .real, if that is meant")
     if array.dtype.kind in "SUT":
@@ -87,21 +90,31 @@ def number_of(value: Any, owner: str, wanted: str) -> float:
         raise ArgumentError(f"{owner}: {wanted}, found {shown(value)}: {error}") from None
 
 
-def _holds_masked(values: Any) -> bool:
-    """Whether a list has masked arrays, or entries of some, in it, whose masks NumPy leaves out."""
-    rows = [values] if isinstance(values, (list, tuple)) else []
+def _check_entries(values: Any) -> None:
+    """Raises NotReal where a list has masked arrays, or entries of some, in it, whose masks NumPy leaves out, or truth values,
+    which it turns into numbers among numbers."""
+    rows = [values]
     for _ in range(MOST_AXES):  # a list may be an entry of itself
-        entries = [v for row in rows for v in row if not isinstance(v, (float, int))]
+        entries = [v for row in rows for v in row if type(v) is not float and type(v) is not int]
         if any(np.ma.isMaskedArray(v) for v in entries):
-            return True
+            raise NotReal(MASKED)
+        if any(_is_truth(v) for v in entries):
+            raise NotReal(TRUTH)
         rows = [v for v in entries if isinstance(v, (list, tuple))]
-    return False
+
+
+def _is_truth(value: Any) -> bool:
+    """Whether it is True or False, of Python, NumPy or SymPy, which this module does not import, or an array of such."""
+    return isinstance(value, (bool, np.bool_)) or getattr(value, "is_Boolean", False) is True \
+        or (isinstance(value, np.ndarray) and value.dtype.kind == "b")
 
 
 def _double(value: Any) -> float:
     """One entry of an array of objects."""
     if value is None or isinstance(value, (str, bytes, complex, np.complexfloating)):
         raise NotReal(f"not all numbers ({shown(value, 40)} is among them)")
+    if _is_truth(value):
+        raise NotReal(TRUTH)
     try:
         return float(value)
     except OverflowError:

@@ -34,6 +34,11 @@ UNREAL: list[tuple[Any, str]] = [
     (np.array([None, 0.2, 0.0, 0.1]), "not all numbers"),
     (np.array(["2020-01-01"] * 4, dtype="M8[D]"), "not numbers"),
     ([[0.1, 0.2], [0.1]], "no array of numbers"),
+    (np.array([True, False, False, True]), "True and False are no numbers; pass 1.0 and 0.0 if these are meant"),
+    ([0.1, True, 0.0, 0.1], "True and False are no numbers"),
+    ([0.1, 0.2, np.False_, 0.1], "True and False are no numbers"),
+    (np.array([0.1, True, 0.0, 0.1], dtype=object), "True and False are no numbers"),
+    ([0.1, 0.2, 0.0, sp.true], "True and False are no numbers"),
 ]
 
 
@@ -95,7 +100,8 @@ def test_no_call_takes_them_for_numbers(cart: Any, door: str, k: int) -> None:
         DOORS[door](cart, value)
 
 
-@pytest.mark.parametrize("value", [1j, np.complex128(1), np.ma.masked, "1.5", 10**400, -10**5000, [1.0], None, sp.I], ids=shown)
+@pytest.mark.parametrize("value", [1j, np.complex128(1), np.ma.masked, "1.5", 10**400, -10**5000, [1.0], None, sp.I,
+                                   True, np.False_, sp.true], ids=shown)
 def test_parameters_are_real_numbers(cart: Any, value: Any) -> None:
     name = cart.metadata.parameters[0]
     calls: list[Callable[[], Any]] = [
@@ -191,6 +197,16 @@ def test_numbers_of_a_model_are_doubles(value: Any) -> None:
         system.add_joint(sd.Revolute("pin", system.ground, make(system), sd.coordinates("q")))
         with pytest.raises(ModelError, match=r"double precision|complex|masked|real"):
             system.check()
+
+
+@pytest.mark.parametrize("value", [True, np.True_, sp.false], ids=shown)
+@pytest.mark.parametrize("where", ["defaults", "initial"])
+def test_defaults_and_starts_are_no_truth_values(where: str, value: Any) -> None:
+    system, q, m = sd.System("s", gravity=[0, -9.81, 0]), sd.coordinates("q"), sd.parameters("m")
+    system.add_joint(sd.Revolute("pin", system.ground, system.add_body("bob", m, [1, 1, 1]), q))
+    setattr(system, where, {m if where == "defaults" else q: value})
+    with pytest.raises(ModelError, match=rf"{where}.*is .*(True|alse).*; pass a finite number, real and within double"):
+        system.check()
 
 
 @pytest.mark.parametrize("rows", [list, np.array, lambda rows: [list(rows), [0, 1]], lambda rows: [[e, 0] for e in rows]])

@@ -328,9 +328,12 @@ def _is_double(value: sp.Number) -> bool:
 
 
 def finite(value: Any) -> float | None:
-    """A finite real number, also of SymPy and NumPy, as a double; None for anything else, and beyond the range of doubles."""
+    """A finite real number, also of SymPy and NumPy, as a double; None for anything else, such as True, and beyond the range of
+    doubles."""
     if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 and not isinstance(value, sp.Basic):
         value = None if np.ma.is_masked(value) else value.item()
+    if isinstance(value, bool):  # which Python counts among whole numbers
+        return None
     if not isinstance(value, (int, float)) and not (isinstance(value, sp.Expr) and value.is_number):
         return None
     try:
