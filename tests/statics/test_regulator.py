@@ -253,9 +253,22 @@ def test_python_control_gets_names(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_python_control_that_is_there_takes_them() -> None:
+    """Its regulator, by a solver of its own, is ours."""
     control = pytest.importorskip("control")
-    system = cart().linearize().to_control()
+    linear = cart().linearize()
+    system = linear.to_control()
     assert isinstance(system, control.StateSpace) and system.state_labels == ["x", "phi", "x_dot", "phi_dot"]
+    assert (system.name, system.input_labels, system.output_labels) == ("cart", ["F"], ["y_x", "y_phi", "y_x_dot", "y_phi_dot"])
+    K, _, values = control.lqr(system, np.diag([1, 2, 3, 4]), [[5.0]])
+    ours = linear.lqr([1, 2, 3, 4], [5])
+    np.testing.assert_allclose(ours.K, K, rtol=1e-9)
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(linear.A - linear.B @ ours.K)), np.sort_complex(values), rtol=1e-7)
+
+
+def test_python_control_takes_equations_without_inputs() -> None:
+    pytest.importorskip("control")
+    system = sd.systems.get("pendulum").embedding().compile(backend="numpy").linearize().to_control()
+    assert (system.ninputs, system.noutputs, system.nstates) == (0, 2, 2)
 
 
 def test_python_control_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
