@@ -29,6 +29,7 @@ from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, Ensembl
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.runtime.batch import UNIT
+from symdyn.runtime.inputs import varies_over_time
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 
@@ -87,6 +88,10 @@ def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, 
     vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
     portable = PortableModule(module, [*functions_of(module, measures), *functions, *[UNIT] * vectors])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
+    if varies_over_time(inputs):
+        raise ArgumentError(f"{module.name}: an ensemble takes numbers as inputs, found {shown(inputs, 80)}; write what goes "
+                            "over time as an expression in sd.t, with parameters that samples may change, or run "
+                            "module.simulate_batch, which takes functions, splines and tables")
     setting = setting_of(portable, drawn.names, times, measures, given, consistent, options)
     setting = replace(setting, vectors=vectors)
     size, ahead = _whole(chunk, "chunk", module), _whole(outstanding, "outstanding", module)

@@ -70,10 +70,10 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
             given[name] = number(value)
         except NotReal as error:
             why = "" if isinstance(value, str) else f": {error}"
+            if what == "inputs" and over_time(value):
+                raise ArgumentError(f"{owner}: {what}: {_of_one_time(name, value, names)}") from None
             if np.shape(value) != () and len(np.shape(value)) == 2 and np.shape(value)[1] == 2 and what == "inputs":
                 why += "; pass a table over time as a pair (times, values)"
-            elif callable(value):
-                why += "; functions of time are for simulate and simulate_batch"
             faults.append(f"the value of {name} is {shown(value)}, not a number{why}")
     missing = [n for n in names if n not in given and defaults.get(n) is None]
     missing = [n for n in missing if not any(n in f for f in faults)]
@@ -84,6 +84,25 @@ def _from_mapping(values: Mapping, names: Sequence[str], what: str, defaults: Ma
     array = np.array([given.get(n, defaults.get(n)) for n in names], dtype=float)
     _finite(array, names, what, owner)
     return array
+
+
+class OverTime:
+    """What stands for an input over time."""
+
+
+def over_time(value: Any) -> bool:
+    """Whether a value for one input is a function, a spline or a table over time, or a sampled controller."""
+    pair = isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1
+    return callable(value) or pair or isinstance(value, OverTime)
+
+
+def _of_one_time(name: str, value: Any, names: Sequence[str]) -> str:
+    """What to say of an input over time where its number at one time belongs."""
+    told = (f"{name} is {shown(value, 60)}, over time; functions, splines and tables are for simulate, simulate_batch and "
+            "consistent. Here pass its number at this time")
+    if f"{name}_dot" not in names:
+        return f"{told}, inputs={{{name}: 0.1}}"
+    return f"{told}, and those of its rate and acceleration, inputs={{{name}: 0.1, {name}.dot: 0.2, {name}.ddot: 0}}"
 
 
 def _finite(array: np.ndarray, names: Sequence[str], what: str, owner: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import real_of
-from symdyn.runtime.arguments import take
+from symdyn.runtime.arguments import over_time, take
 from symdyn.shown import name_of, shown
 
 
@@ -30,7 +30,8 @@ def take_rows(values: Any, names: Sequence[str], what: str, defaults: Mapping[st
                                 f"{': ' + ', '.join(names) if names else ''}")
         return array
     given = {name_of(key): value for key, value in values.items()}
-    columns = {name: _column(value, name, what, owner) for name, value in given.items() if _several(value)}
+    columns = {name: _column(value, name, what, owner) for name, value in given.items()
+               if _several(value) and not (what == "inputs" and over_time(value))}
     faults = [_unknown(name, names) for name in columns if name not in names]
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.arguments import OverTime
 from symdyn.runtime.raised import called
 
 # Instants closer than this part of the shortest period are one.
@@ -18,7 +19,7 @@ RESOLVED = 1e-11
 
 
 @dataclass(frozen=True)
-class Sampled:
+class Sampled(OverTime):
     """A controller that is asked at instants and whose value is held until the next one (zero-order hold).
 
     function   f(t, x) -> the input's value, or one for each of several inputs; x = [q; u; z], (n_x,). In every simulation it

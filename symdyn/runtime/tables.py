@@ -11,7 +11,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import real_of
-from symdyn.runtime.arguments import fixed
+from symdyn.runtime.arguments import OverTime, fixed
 from symdyn.shown import shown
 
 INTERPOLATIONS, EXTENDS = ("linear", "cubic"), ("error", "hold")
@@ -44,7 +44,7 @@ class Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(OverTime):
     """An input over time by its values at certain times, for `simulate(inputs={"F": Table(times, values)})`.
 
     times           (n,), s, increasing

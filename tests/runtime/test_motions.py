@@ -345,3 +345,21 @@ def test_a_batch_takes_no_rates_apart_from_the_motion(backend: str) -> None:
     module = hung(z, "Prismatic").embedding().compile(backend)
     with pytest.raises(ArgumentError, match="z_ddot is not zero, but the motion itself does not change"):
         module.simulate_batch({"q": [0.4, 0.5]}, t=(0, 1), inputs={z.ddot: 5.0})
+
+
+def test_numbers_belong_where_one_time_is_looked_at() -> None:
+    m = hung(z, "Prismatic").embedding().compile("numpy")
+    match = (r"inputs: z is .*, over time; functions, splines and tables are for simulate, simulate_batch and consistent. Here "
+             r"pass its number at this time, and those of its rate and acceleration, inputs=\{z: 0.1, z.dot: 0.2, z.ddot: 0\}")
+    of_ensembles = (r"an ensemble takes numbers as inputs, found \{z: .*; write what goes over time as an expression in sd.t, with "
+                    r"parameters that samples may change, or run module.simulate_batch, which takes functions, splines and tables")
+    times = np.linspace(0, 1, 6)
+    for course in (CubicSpline(times, times**2), (times, times**2), sd.Table(times, times**2), lambda t: (t, 1.0, 0.0)):
+        given = {z: course}
+        for call in (lambda given: m.rhs(0, [0, 0], inputs=given), lambda given: m.rhs_batch(0, [[0, 0]] * 2, inputs=given),
+                     lambda given: m.mass_matrix(0, [0.0, 0.0], inputs=given), lambda given: m.linearize(inputs=given),
+                     lambda given: m.equilibrium(inputs=given), lambda given: m.actuation(0, [0], [0], [0], inputs=given)):
+            with pytest.raises(ArgumentError, match=match):
+                call(given)
+        with pytest.raises(ArgumentError, match=of_ensembles):
+            sd.ensemble(m, {"q": [0.1, 0.2]}, t=(0, 1), inputs=given)

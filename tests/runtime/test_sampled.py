@@ -373,7 +373,7 @@ def test_many_motions_take_no_controller_backward() -> None:
 
 
 def test_an_ensemble_takes_numbers_only() -> None:
-    with pytest.raises(sd.ArgumentError, match=r"the value of F is Sampled.*, not a number"):
+    with pytest.raises(sd.ArgumentError, match=r"an ensemble takes numbers as inputs, found .*F.*: Sampled"):
         sd.ensemble(cart(), {"x": [1.0, 2.0]}, inputs={"F": sd.Sampled(pd, PERIOD)}, t=(0, 1))
 
 

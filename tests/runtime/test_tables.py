@@ -167,7 +167,8 @@ def test_a_table_in_another_form_gets_advice():
     module = sd.systems.get("cart_pole").compile(backend="numpy")
     with pytest.raises(ArgumentError, match=r"an array of the shape \(11, 2\).*pass a table over time as a pair \(times, va"):
         module.simulate((0, 1), inputs={"F": np.zeros((11, 2))})
-    with pytest.raises(ArgumentError, match="functions of time are for simulate and simulate_batch"):
+    with pytest.raises(ArgumentError, match=r"F is <function .*, over time; functions, splines and tables are for sim.* "
+                                            r"Here pass its number at this time, inputs=\{F: 0.1\}"):
         module.rhs(0.0, np.zeros(4), inputs={"F": lambda t, x: 0.0})
     with pytest.raises(ArgumentError, match="found the time 1 after 2 in row 2"):
         sd.Table([0, 2, 1], [0, 1, 2])
