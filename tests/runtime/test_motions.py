@@ -351,8 +351,8 @@ def test_numbers_belong_where_one_time_is_looked_at() -> None:
     m = hung(z, "Prismatic").embedding().compile("numpy")
     match = (r"inputs: z is .*, over time; functions, splines and tables are for simulate, simulate_batch and consistent. Here "
              r"pass its number at this time, and those of its rate and acceleration, inputs=\{z: 0.1, z.dot: 0.2, z.ddot: 0\}")
-    of_ensembles = (r"an ensemble takes numbers as inputs, found \{z: .*; write what goes over time as an expression in sd.t, with "
-                    r"parameters that samples may change, or run module.simulate_batch, which takes functions, splines and tables")
+    of_ensembles = (r"an ensemble takes numbers as inputs, found \{z: .*; write what goes over time as an expression in sd.t, "
+                    r"with parameters that samples may change, or run module.simulate_batch, which takes functions, splines and")
     times = np.linspace(0, 1, 6)
     for course in (CubicSpline(times, times**2), (times, times**2), sd.Table(times, times**2), lambda t: (t, 1.0, 0.0)):
         given = {z: course}
