@@ -12,9 +12,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from symdyn import kinds
 from symdyn.backend.methods import method_of
@@ -31,6 +32,7 @@ from symdyn.runtime.arguments import some
 from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path
+from symdyn.runtime.stored import write_whole
 from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 from symdyn.shown import shown
 
@@ -115,14 +117,19 @@ def compile_equations(equations: Equations, backend: str | None = None, template
 
 
 def write_source(source: Source, folder: Path) -> list[Path]:
-    """Write the files of a source into a folder (made if absent); returns their paths."""
+    """Write the files of a source into a folder (made if absent), each in one step, so that programs and threads that read or
+    write them at the same time have whole ones; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, text in source.files.items():
         path = folder / name
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, partial(_put, text.encode()), sync=False)
         paths.append(path)
     return paths
+
+
+def _put(content: bytes, file: IO[bytes]) -> None:
+    file.write(content)
 
 
 def output_shapes(equations: Equations) -> list[list[Any]]:

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import pytest
 
+import symdyn as sd
 from symdyn.errors import CacheError, CacheWarning, CompileError
 from symdyn.runtime import cache as subject
 from symdyn.runtime import cache_folder, objects
@@ -335,6 +336,26 @@ def test_threads_that_write_the_same_module(folder: Path) -> None:
         with ThreadPoolExecutor(8) as threads:
             assert {job.result() for job in [threads.submit(make) for _ in range(8)]} == {k}
     assert not [name for name in names(folder) if name.endswith(".tmp")]
+
+
+def test_threads_that_write_the_same_files_leave_no_half(tmp_path: Path) -> None:
+    """Whoever reads a written module meanwhile reads a whole one, and can import it."""
+    module = sd.systems.get("pendulum").embedding().compile(backend="numpy")
+    (path,) = module.write(tmp_path)
+    whole, start = path.read_text(encoding="utf-8"), threading.Barrier(8)
+
+    def write() -> None:
+        start.wait()
+        for _ in range(5):
+            module.write(tmp_path)
+
+    with ThreadPoolExecutor(8) as threads:
+        jobs = [threads.submit(write) for _ in range(8)]
+        while not all(job.done() for job in jobs):
+            assert path.read_text(encoding="utf-8") == whole
+        for job in jobs:
+            job.result()
+    assert names(tmp_path) == [path.name]
 
 
 def test_damaged_modules_are_written_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
