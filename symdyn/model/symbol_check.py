@@ -88,7 +88,8 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
             elif symbol.name == "t" and symbol != time:
                 faults.append(f"{where} uses a symbol t with assumptions, which is not the time; use symdyn.t")
             elif constant and (symbol in moving or isinstance(symbol, (Coordinate, Rate, Input))):
-                faults.append(f"{where} depends on {symbol}, but must be constant; use parameters and numbers")
+                moved = ", and a joint of its own for what moves, such as a Prismatic" if where.startswith("joint ") else ""
+                faults.append(f"{where} depends on {symbol}, but must be constant; use parameters and numbers{moved}")
             elif symbol in moving:
                 continue
             elif isinstance(symbol, (Coordinate, Rate)) and symbol.name in named:

@@ -171,7 +171,7 @@ SPATIAL: dict[str, Case] = {
                    "joint 'wrist': parent_point, component 1 is the text 'l'"),
     "point long": (lambda s: joined(s, sd.Revolute, q3, child_point=[0] * 4), "joint 'wrist': child_point has 4 components"),
     "point moving": (lambda s: joined(s, sd.Revolute, q3, parent_point=[q1, 0, 0]),
-                     "joint 'wrist' depends on q1|must be constant"),
+                     "joint 'wrist' depends on q1|must be constant|a joint of its own for what moves, such as a Prismatic"),
     "rotation skewed": (lambda s: joined(s, sd.Revolute, q3, parent_rotation=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]),
                         "joint 'wrist': parent_rotation is not a rotation|differs from the identity by 0.1"),
     "rotation mirrored": (lambda s: joined(s, sd.Revolute, q3, child_rotation=[1, 1, -1]),
