@@ -128,8 +128,11 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
     for name, count in names.items():
         if count > 1:
             found = " and ".join(described(a) for a in everything if a.name == name)
+            plain = any(type(a) is sp.Symbol for a in everything if a.name == name)
+            moves = plain and any(isinstance(a, Coordinate) for a in everything if a.name == name)
+            once = f", by sd.coordinates({name!r}) where it moves," if moves else ","
             faults.append(f"{count} different symbols are named {shown(name)} (by kind or assumptions), {found}; "
-                          "make each symbol once, or give them different names")
+                          f"make each symbol once{once} or give them different names")
     if "t" in names:
         faults.append("a coordinate, speed or state is named 't', which is the time; give it another name")
     for u in speeds:
