@@ -223,7 +223,8 @@ def test_a_speed_and_a_dynamicsymbol_of_one_name_are_named() -> None:
     with pytest.raises(sd.ModelError, match="uses u, a coordinate without assumptions, but u of the system is a speed without"):
         _pendulum(q1, dynamicsymbols("u"), speed=sd.speeds("u")).check()
     with pytest.raises(sd.ModelError, match=r"2 different symbols are named .q1. .*, a coordinate without assumptions and a "
-                                            "parameter without assumptions; make each symbol once, by sd.coordinates..q1.. where it moves, or"):
+                                            "parameter without assumptions; make each symbol once, by "
+                                            r"sd.coordinates\('q1'\) where it moves, or give them different names"):
         _pendulum(q1, sp.Symbol("q1")).check()
 
 
