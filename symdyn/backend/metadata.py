@@ -102,7 +102,8 @@ class Metadata:
 
 
 class EventRecord(NamedTuple):
-    """An event; reset: indices in x; enclosed: whether its value has bounds; the inputs and functions that it depends on."""
+    """An event; reset: indices in x; enclosed: whether its value has bounds; the inputs and functions that it depends on;
+    unproved: why a pulse of its value may be missed, "" where its bounds rule that out."""
 
     name: str
     direction: int
@@ -111,6 +112,7 @@ class EventRecord(NamedTuple):
     enclosed: bool
     inputs: tuple[str, ...]
     functions: tuple[str, ...]
+    unproved: str = ""
 
 
 class Chart(NamedTuple):

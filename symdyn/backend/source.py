@@ -55,8 +55,7 @@ class Content:
     outputs  user outputs: (name, shape) in the order of the function `outputs`
     unit_groups   coordinates that form a unit vector: the compiled integrator keeps its length
     otherwise     tapes by function name for where the first ones fail
-    events        what the function `events` is about: records with direction, stop and reset, entries of x, enclosed and
-                  unproved
+    events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
     """
 
@@ -174,7 +173,7 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
              and method.template != "taylor")
-    called = functions(method, context["arguments_of"], context["field_call"], shape.sizes.inputs, n_rows > 0)
+    called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
     return {"runtime": Parts(read, switches(method, shape, gathered)), "runtime_sizes": runtime_sizes(method, shape, gathered),
             "integrated": called, "resets": shape.resets, "held": shape.held,
             "divided": units, "linked": "SYMDYN_HIDDEN" if units else "static"}
@@ -212,7 +211,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
              lanes: Batch | None, method: str, states: int) -> dict[str, Any]:
     groups = content.groups
     sizes = {group: len(groups[group]) for group in ("q", "u", "z", "ud", "inputs", "p")}
-    n_x = sizes.q + sizes.u + sizes.z
+    n_x = sizes["q"] + sizes["u"] + sizes["z"]
     # A file with the name of a standard module would be imported in its place by whatever runs beside it.
     # The runtime in C has names that begin with symdyn_.
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
@@ -238,13 +237,13 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         return "".join(f"{g}, " for g in part.arguments)
 
     def state(argument: str, base: str) -> str:
-        offset = {"q": 0, "u": sizes.q, "z": sizes.q + sizes.u}.get(argument)
+        offset = {"q": 0, "u": sizes["q"], "z": sizes["q"] + sizes["u"]}.get(argument)
         return argument if offset is None else base if offset == 0 else f"{base} + {offset}"
 
     def rows_call(f: Function) -> str:
         strided = {"t": "frame->t[i * frame->t_stride]", "p": "frame->p", "c": "frame->c",
-                   "ud": f"frame->ud + i * frame->ud_stride * {sizes.ud}",
-                   "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes.inputs}"}
+                   "ud": f"frame->ud + i * frame->ud_stride * {sizes['ud']}",
+                   "inputs": f"frame->inputs + i * frame->inputs_stride * {sizes['inputs']}"}
         x = f"frame->x + i * frame->x_stride * {n_x}"
         return ", ".join([strided.get(g) or state(g, x) for g in f.arguments] + [f"frame->out + i * {f.size}"])
 
@@ -254,7 +253,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
 
     projection = None
     if all(n in uses for n in CORRECTIONS):
-        projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes.q,
+        projection = {"n_rows": next(f.size for f in program.functions if f.name == CORRECTIONS[0]) - sizes["q"],
                       "turning": [turns(content.units.get(n)) for n in groups["u"]],
                       "angles": [is_angle(content.units.get(n)) for n in groups["q"]]}
 
@@ -278,8 +277,8 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "hash": hashlib.sha256(identity.encode()).hexdigest()[:16], "header": _header(content, program), "program": program,
         "standalone": standalone, "integrator": integrator, "reference": reference, "digits": DIGITS,
         "parameters": list(groups["p"]), "metadata": _metadata_lines(metadata),
-        "metadata_record": metadata, "n_q": sizes.q, "n_u": sizes.u, "n_z": sizes.z, "n_x": n_x,
-        "n_in": sizes.inputs, "signature": signature, "part_signature": part_signature, "part_call": part_call,
+        "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
+        "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
         "lanes": lanes, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
         "one_call": ", ".join([*("time" if g == "t" else state(g, "one") for g in uses.get("rhs", ())), "result"]),
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],

@@ -11,7 +11,7 @@ from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constrained import BAUMGARTE
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns
+from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.skipped import skipped
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
@@ -92,9 +92,9 @@ def event_records(equations: Equations) -> tuple[EventRecord, ...]:
     """Events as plain data."""
     symbols = equations.symbols
     places = {s: k for k, s in enumerate((*symbols.coordinates, *symbols.speeds, *symbols.states))}
-    about = zip(equations.events, enclosed(equations), unknowns(equations), strict=True)
+    about = zip(equations.events, enclosed(equations), unproved(equations), unknowns(equations), strict=True)
     return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
-                             tuple(functions)) for e, can, (inputs, functions) in about)
+                             tuple(functions), why) for e, can, why, (inputs, functions) in about)
 
 
 def _entries(tape: Tape) -> tuple[Any, ...]:

@@ -200,7 +200,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
             chatters = chatter(of.t, report.x, of.n_steps) if chatter is not None else ""
             if chatters:
                 break
-            told, ends = short(float(report[0]), report[8:8 + n_x], int(report[2])) if short is not None else ("", False)
+            told, ends = short(of.t, report.x, of.n_steps) if short is not None else ("", False)
             if ends:
                 chatters = told
                 break

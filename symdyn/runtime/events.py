@@ -129,9 +129,9 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
         return ""
     told = []
     for record, wanted in zip(module.metadata.events, look, strict=True):
-        of = [f"the function {f}" for f in record["functions"]] + [f"the input {i}" for i in record["inputs"] if i in functions]
-        of += [record["unproved"]] if record["unproved"] else []
-        told += [f"{record['name']} depends on {', '.join(of)}"] if wanted and of else []
+        of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
+        of += [record.unproved] if record.unproved else []
+        told += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
     if not told:
         return ""
     return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "

@@ -124,11 +124,11 @@ class ShortSteps:
         if jumps.min() < LEFT * jumps.max():
             return ""
         about = self.module.metadata
-        inputs = self.request.inputs.rows(at, rows).reshape(-1, len(about["inputs"]))
-        jumping = [name for name, (below, above) in zip(about["inputs"], inputs[-2:].T, strict=True)
+        inputs = self.request.inputs.rows(at, rows).reshape(-1, len(about.inputs))
+        jumping = [name for name, (below, above) in zip(about.inputs, inputs[-2:].T, strict=True)
                    if abs(above - below) > LEFT * 1e-3 * max(abs(above), abs(below))] if len(inputs) == len(rows) else []
         what = f"input {', '.join(jumping)}" if jumping else "a load or a function of the user"
-        name = about["x"][k]
+        name = about.x[k]
         return (f"{what} chatters: the motion is driven onto a jump at {name} = {here[k]:.6g} from both sides, at rates of "
                 f"{rates[0, 0] - goes:.3g} and {rates[0, 1] - goes:.3g} of its unit a second, and every step crosses it, "
                 f"{len(t)} steps took {abs(span):.3g} s; make the jump smooth, for example by tanh({name}/eps) in place of "

@@ -69,7 +69,7 @@ def test_relative_motion_under_constraints_chatters() -> None:
     s.add_joint(sd.Prismatic("upon", low, high, y, axis=[1, 0]))
     s.add_joint_force("upon", F)
     module = s.augmented(coordinates="absolute").compile()
-    names = module.metadata["x"]
+    names = module.metadata.x
     below, above = names.index("x_low_dot"), names.index("x_high_dot")
     q, u = module.consistent(u={"x_low_dot": 0.0, "x_high_dot": 1.0})
     stops(module, r"pile: stopped at t = 0.\d+: input F chatters: ", t=(0, 3), q=q, u=u,
