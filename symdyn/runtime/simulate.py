@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time as clock
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -35,7 +36,7 @@ from symdyn.runtime.scipy_run import run_scipy, solver_class_of, takes_changed_s
 from symdyn.runtime.solution import Solution
 from symdyn.runtime.stabilization import Projector, Stabilization, choose, chosen_gain
 from symdyn.runtime.watches import WATCHES, warn
-from symdyn.shown import shown
+from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -178,6 +179,11 @@ def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
     parts = []
     for what, values in (("q", q), ("u", u), ("z", z)):
         names = module.metadata.names(what)
+        given = {name_of(key) for key in values} if isinstance(values, Mapping) else set()
+        followed = [n for n in module.metadata.motions if given & {n, f"{n}_dot"}]
+        if followed:
+            raise ArgumentError(f"{module.name}: initial {what} has the motion {followed[0]}, which follows an input; pass it "
+                                f"there, inputs={{{followed[0]}: ...}}: a function of t, a spline, a table or a number")
         parts.append(take(values, names, f"initial {what}", {n: initial.get(n, 0.0) for n in names}, module.name))
     return normalised(module, np.concatenate(parts))
 

@@ -1,5 +1,7 @@
 """Joints, constraints and the ground follow inputs: against the same motion written as an expression in t, in all forms."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -363,3 +365,12 @@ def test_numbers_belong_where_one_time_is_looked_at() -> None:
                 call(given)
         with pytest.raises(ArgumentError, match=of_ensembles):
             sd.ensemble(m, {"q": [0.1, 0.2]}, t=(0, 1), inputs=given)
+
+
+@pytest.mark.parametrize("start", [{"q": {z: 1.0}}, {"u": {z.dot: 1.0}}, {"q": {"z": 1.0, "q": 0.1}}])
+def test_a_motion_has_no_start_of_its_own(start: dict[str, Any]) -> None:
+    module = hung(z, "Prismatic").embedding().compile("numpy")
+    match = (r"initial [qu] has the motion z, which follows an input; pass it there, inputs=\{z: ...\}: a function of t, a "
+             "spline, a table or a number")
+    with pytest.raises(ArgumentError, match=match):
+        module.simulate((0, 1), **start)
