@@ -94,8 +94,8 @@ from symdyn.errors import (
 from symdyn.exact.prove import prove as prove
 from symdyn.flexible.beam import Beam as Beam
 from symdyn.flexible.shape import Shape as Shape
-from symdyn.formulation.explicit import embedding as embedding
-from symdyn.formulation.explicit_augmented import augmented as augmented
+from symdyn.formulation.by_hand.augmented import augmented as augmented
+from symdyn.formulation.by_hand.embedding import embedding as embedding
 from symdyn.frames import Frame as Frame
 from symdyn.frames import rate as rate
 from symdyn.model import shapes as shapes
@@ -208,11 +208,11 @@ from symdyn.model.symbols import (
     speeds as speeds,
 )
 from symdyn.model.system import System as System
-from symdyn.report.full import full_report as full_report
+from symdyn.overview.page import full_report as full_report
 from symdyn.report.latex import latex as latex
-from symdyn.runtime.inputs import Smooth as Smooth
-from symdyn.runtime.sampled import Sampled as Sampled
-from symdyn.runtime.tables import Table as Table
+from symdyn.runtime.inputs.inputs import Smooth as Smooth
+from symdyn.runtime.inputs.sampled import Sampled as Sampled
+from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.urdf.read import read_urdf as read_urdf
 
 __version__: str

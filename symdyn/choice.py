@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 from symdyn.collector import collector_paused
 from symdyn.errors import SymdynError
-from symdyn.formulation.augmented import augment
-from symdyn.formulation.embedding import embed
-from symdyn.formulation.motion_equations import MotionEquations
-from symdyn.formulation.recursion import recursive
+from symdyn.formulation.constraints.augmented import augment
+from symdyn.formulation.printed.independent_speeds import MotionEquations
+from symdyn.formulation.trees.embedding import embed
+from symdyn.formulation.trees.recursive import recursive
 from symdyn.functions.tapes import function_tape
 from symdyn.kinds import flag
 from symdyn.model.record import Model, joint_speeds
@@ -105,14 +105,14 @@ def choose(model: Model, tune: bool = False, formulation: str = "auto", coordina
     compiler to tune with.
     """
     if flag(tune, "tune"):
-        from symdyn.runtime.compiler import require_compiler
+        from symdyn.runtime.building.compiler import require_compiler
 
         require_compiler()
     with collector_paused():
         derived = _worth_comparing(model, formulation, coordinates)
     times: Sequence[float | None] = [None] * len(derived)
     if tune:
-        from symdyn.bench.side_by_side import times_side_by_side
+        from symdyn.timing.side_by_side import times_side_by_side
 
         times = times_side_by_side([d.equations for d in derived])
     table = [d.candidate(t) for d, t in zip(derived, times, strict=True)]

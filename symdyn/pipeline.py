@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from symdyn import kinds
+from symdyn.arguments import some
 from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.backend.source import Source, render
@@ -26,12 +27,11 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.functions.content import content_of, module_metadata
-from symdyn.runtime.arguments import some
-from symdyn.runtime.compiler import find_compiler, no_compiler_reason, plain, require_compiler
+from symdyn.runtime.building.compiler import find_compiler, no_compiler_reason, plain, require_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.stored import write_whole
 from symdyn.runtime.module import Module
 from symdyn.runtime.paths import as_path
-from symdyn.runtime.stored import write_whole
-from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 from symdyn.shown import shown
 
 

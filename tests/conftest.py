@@ -59,7 +59,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def compile_quickly() -> None:
     """Have C compiled with -O0, in a fifth of the time: without fused operations the results keep every bit of -O3's."""
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     compiler = None if "SYMDYN_CC" in os.environ or os.name != "posix" else find_compiler()
     if compiler is not None and compiler.kind in ("gcc", "clang"):
@@ -117,7 +117,7 @@ def compiled(derived: Callable[..., Any]) -> Callable[..., Any]:
     known: dict[Any, Any] = {}
 
     def module(name: str, backend: str, **options: Any) -> Any:
-        from symdyn.runtime.compiler import find_compiler
+        from symdyn.runtime.building.compiler import find_compiler
 
         if backend == "c" and find_compiler() is None:
             pytest.skip("no C compiler here")

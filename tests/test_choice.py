@@ -12,17 +12,17 @@ import pytest
 
 import symdyn as sd
 from symdyn import choice, systems
-from symdyn.bench.random_tree import random_tree
-from symdyn.bench.side_by_side import times_side_by_side
 from symdyn.choice import FORMULATIONS, HEADING, Candidate, choose, derived_in_frames, formulated
 from symdyn.cli import main
 from symdyn.errors import CompilerNotFound, EvaluationError, ModelError, SymdynError
-from symdyn.formulation.embedding import embed
-from symdyn.formulation.recursion import recursive
+from symdyn.formulation.trees.embedding import embed
+from symdyn.formulation.trees.recursive import recursive
 from symdyn.functions.tapes import function_tape
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.recall import recall
+from symdyn.lab.random_tree import random_tree
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.building.recall import recall
 from symdyn.tape.cycles import fused_products
+from symdyn.timing.side_by_side import times_side_by_side
 from tests.helpers import close, quantities, state
 from tests.mechanisms import kitchen_sink
 
@@ -32,7 +32,7 @@ needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times need not be good here."""
-    monkeypatch.setattr("symdyn.bench.kernel.TIMING_SECONDS", 1e-5)
+    monkeypatch.setattr("symdyn.timing.loops.TIMING_SECONDS", 1e-5)
 
 
 def taken(equations: Any) -> Candidate:
@@ -181,7 +181,7 @@ def test_tuning_takes_the_least_measured_time(capsys: pytest.CaptureFixture[str]
 @needs_c
 def test_each_evaluation_waits_for_the_one_before() -> None:
     """Accelerations do not depend on the place of the cart, nor on the first angle of a chain about the vertical."""
-    from symdyn.bench.side_by_side import _fed
+    from symdyn.timing.side_by_side import _fed
 
     assert _fed(systems.cart_pole().embedding()) == 1 and _fed(systems.get("spatial_chain", n=2).embedding()) == 1
     assert _fed(systems.get("prismatic_chain").embedding()) == 0

@@ -17,8 +17,8 @@ import pytest
 import symdyn
 from symdyn import systems
 from symdyn.cli import main
-from symdyn.runtime import recall
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building import recall
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.module import Module
 
 ROOT = str(Path(symdyn.__file__).parents[1])

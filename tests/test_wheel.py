@@ -101,7 +101,7 @@ def test_installed_elsewhere(wheel: Path, tmp_path: Path) -> None:
                 shutil.copytree(kept, place, dirs_exist_ok=True)
             else:
                 shutil.copy2(kept, place)
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     backends = ["numpy", "c"] if find_compiler() is not None else ["numpy"]
     printed = run(python, "-c", PROGRAM, ROOT, *backends, cwd=tmp_path).splitlines()

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from symdyn.analytic.lagrange import CLOSED, PUT_IN, Mechanics, momentum_leaves
-from symdyn.formulation.augmented_equations import AugmentedEquations
+from symdyn.formulation.printed.augmented import AugmentedEquations
 
 if TYPE_CHECKING:
-    from symdyn.formulation.motion_equations import MotionEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
 
 
 def equations_of(equations: MotionEquations) -> tuple[sp.Eq, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from symdyn.errors import ArgumentError
-from symdyn.runtime.stored import write_whole
+from symdyn.runtime.building.stored import write_whole
 
 
 def read(path: Path) -> Any:

@@ -42,7 +42,7 @@ def demo(arguments: argparse.Namespace) -> int:
 
 def _loaded(module: Module) -> str:
     """What the module runs on."""
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     compiler = find_compiler() if module.backend == "c" else None
     if compiler is None:

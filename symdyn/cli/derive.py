@@ -17,7 +17,7 @@ OF_CONSTRAINTS = ("C_r", "F_d", "C")
 
 def derive(arguments: argparse.Namespace) -> int:
     """Print the symbols, and every quantity that was asked for."""
-    from symdyn.report.full_equations import written_out
+    from symdyn.overview.equations import written_out
 
     equations = find_equations(arguments)
     tied = bool(equations.constraints)

@@ -13,7 +13,7 @@ from symdyn.cli.userfile import from_file
 from symdyn.errors import SymdynError
 
 if TYPE_CHECKING:
-    from symdyn.formulation.motion_equations import MotionEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
     from symdyn.model.system import System
     from symdyn.runtime.module import Module
 
@@ -64,7 +64,7 @@ def module_of(name: str, options: Mapping[str, Any], backend: str | None, formul
         system = find_system(name, options)
         return formulated(system, formulation, coordinates=coordinates).compile(backend)  # type: ignore[no-any-return]
     from symdyn import systems
-    from symdyn.runtime.recall import recall
+    from symdyn.runtime.building.recall import recall
 
     if options:
         check_options(name, getattr(systems, name), options)

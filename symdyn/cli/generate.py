@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from symdyn.cli.find import find_equations
 
 if TYPE_CHECKING:
-    from symdyn.formulation.motion_equations import MotionEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
 
 
 def generate(arguments: argparse.Namespace) -> int:

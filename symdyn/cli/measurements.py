@@ -71,51 +71,51 @@ _STORE = Option("file", "--store", {"metavar": "FILE", "type": path,
 
 MEASUREMENTS: dict[str, Measurement] = {
     "figures": Measurement(
-        "symdyn.bench.pipeline:run", "the pipeline, from description to motion: times, operations, energy errors", (_ONLY,)),
+        "symdyn.lab.pipeline:run", "the pipeline, from description to motion: times, operations, energy errors", (_ONLY,)),
     "peers": Measurement(
-        "symdyn.bench.peers.command:run", "accelerations beside Pinocchio and CasADi's C code, in one run", (
+        "symdyn.lab.peers.command:run", "accelerations beside Pinocchio and CasADi's C code, in one run", (
             _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON)),
     "robots": Measurement(
-        "symdyn.bench.robots.command:run", "robots from URDF files beside Pinocchio: agreement, operations, times", (
+        "symdyn.lab.robots.command:run", "robots from URDF files beside Pinocchio: agreement, operations, times", (
             _names("--only", "only", "some of the robots; names with * and ?", "ROBOT"),
             _number("--states", "states", "random states of each robot (default: 100)"),
             Option("no_times", "--no-times", {"action": "store_true", "help": "compile nothing"}))),
     "loops": Measurement(
-        "symdyn.bench.loops:run", "mechanisms with loops beside published motions and closed forms", (
+        "symdyn.lab.loops:run", "mechanisms with loops beside published motions and closed forms", (
             _names("--systems", "names", "some of the mechanisms, such as andrews_squeezer or 'n_four_bar(2)'"), _TIMED, _JSON)),
     "published": Measurement(
-        "symdyn.bench.work.published:run", "published mechanisms within their bounds, in the least time of all programs", (
+        "symdyn.lab.published.command:run", "published mechanisms within their bounds, in the least time of all programs", (
             _names("--only", "names", "some of the mechanisms, such as A03"),
             _names("--against", "peers", "other programs, as of symdyn bench"), _LEAST,
             _number("--budget", "budget", "begin nothing new after this time, in which derivation, compilation and the "
                     "search for tolerances count; the same command goes on", float, "SECONDS"),
             _folder("published"), Option("progress", "--progress", {"action": "store_true", "help": "show a bar (needs tqdm)"}))),
     "growth": Measurement(
-        "symdyn.bench.growth:run", "how everything grows with the number of bodies: table and picture", (
+        "symdyn.lab.growth:run", "how everything grows with the number of bodies: table and picture", (
             Option("sizes", "--sizes", {"metavar": "N", "nargs": "+", "type": int,
                                         "help": "numbers of bodies (default: 2 to 100)"}),
             _folder("growth"))),
     "printing": Measurement(
-        "symdyn.bench.printing:run", "operations of printed equations in every form, and the time", (
+        "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
             _names("--systems", "only", "some of the mechanisms of the catalogue"),)),
     "batch": Measurement(
-        "symdyn.bench.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
+        "symdyn.lab.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
     "sweep": Measurement(
-        "symdyn.bench.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
+        "symdyn.lab.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
             _number("--count", "count", "motions (default: 1000000)"),
             _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
     "turbine": Measurement(
-        "symdyn.bench.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
+        "symdyn.lab.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
     "flexible": Measurement(
-        "symdyn.bench.flexible:run", "flexible bodies: published frequencies and motions, energy, limits", (_ONLY,)),
+        "symdyn.lab.flexible:run", "flexible bodies: published frequencies and motions, energy, limits", (_ONLY,)),
     "costs": Measurement(
-        "symdyn.bench.cost_model:run", "the constants by which the fastest formulation is predicted, from 40 systems", (_BEST,)),
+        "symdyn.lab.cost_model:run", "the constants by which the fastest formulation is predicted, from 40 systems", (_BEST,)),
     "references": Measurement(
         "symdyn.bench.work.store:run", "make the references of work against error anew, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "*", "help": "some of symdyn bench --all (default: all)"}),
             _number("--digits", "digits", "of the local errors (default: 20)"), _STORE)),
     "extended": Measurement(
-        "symdyn.bench.extended:run", "make the references of symdyn bench loops anew, with more digits than floats", (
+        "symdyn.lab.extended:run", "make the references of symdyn bench loops anew, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "+", "help": "such as puma560, or 'flyball_governor(rods)'"}),
             _number("--t", "end", "s (default: the system's duration, which is the published one)", float, "END"),
             _number("--digits", "digits", "of the local errors (default: 26)"), _STORE,

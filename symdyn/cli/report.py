@@ -31,7 +31,7 @@ def report(arguments: argparse.Namespace) -> int:
 
 def _full(arguments: argparse.Namespace) -> int:
     """Write the page, saying on the way what is going on."""
-    from symdyn.report.full import BUDGET, full_report
+    from symdyn.overview.page import BUDGET, full_report
 
     options = options_of(arguments)
     system = find_mechanism(arguments.system, options)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from symdyn.errors import MissingExtra
 
 if TYPE_CHECKING:
-    from symdyn.runtime.solution import Solution
+    from symdyn.runtime.solutions.solution import Solution
 
 # A longer motion is shown faster than it happens.
 FILM_SECONDS = 20.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from symdyn.runtime.solution import Solution
+    from symdyn.runtime.solutions.solution import Solution
 
 # States beyond these are not told.
 SHOWN = 12

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.arguments import some, take
 from symdyn.diagnosis.mobility import Mobility, mobility
 from symdyn.diagnosis.paths import LOST, NEAR, STEP, Near, Scaled, follow
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState
 from symdyn.errors import ArgumentError, ModelError, SymdynError
-from symdyn.formulation.consistent_states import ConstraintStates
-from symdyn.formulation.dependent_rows import ranks
+from symdyn.formulation.constraints.consistent_states import ConstraintStates
+from symdyn.formulation.probes.dependent_rows import ranks
 from symdyn.model.loop_check import CARRIER
-from symdyn.runtime.arguments import some, take
 from symdyn.runtime.consistent import number
 from symdyn.shown import shown
 from symdyn.tape.floats import evaluate_rows
 
 if TYPE_CHECKING:
-    from symdyn.formulation.augmented import ConstrainedTree
+    from symdyn.formulation.constraints.augmented import ConstrainedTree
     from symdyn.formulation.equations import Equations
     from symdyn.model.record import Model
     from symdyn.model.system import System
@@ -41,13 +41,13 @@ STARTS = 12
 def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, coordinates: str = "relative",
              reach: float = REACH) -> Diagnosis:
     """What the constraints of a system do; see System.diagnose."""
-    from symdyn.formulation.absolute import in_absolute_coordinates
-    from symdyn.formulation.absolute_start import absolute_start
-    from symdyn.formulation.augmented import COORDINATES, ConstrainedTree
-    from symdyn.formulation.augmented_equations import AugmentedEquations
-    from symdyn.formulation.constraints import Gathered
-    from symdyn.formulation.contradictions import contradictions
-    from symdyn.formulation.tree_equations import tree_of, tree_result
+    from symdyn.formulation.constraints.absolute import in_absolute_coordinates
+    from symdyn.formulation.constraints.absolute_start import absolute_start
+    from symdyn.formulation.constraints.augmented import COORDINATES, ConstrainedTree
+    from symdyn.formulation.constraints.rows import Gathered
+    from symdyn.formulation.printed.augmented import AugmentedEquations
+    from symdyn.formulation.probes.contradictions import contradictions
+    from symdyn.formulation.trees.equations import tree_of, tree_result
 
     if not isinstance(coordinates, str) or coordinates not in COORDINATES:
         raise SymdynError(f"coordinates {shown(coordinates)} asked for; there are {' and '.join(map(repr, COORDINATES))}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symdyn.formulation.consistent_states import FULFILLED, ConstraintStates
+from symdyn.formulation.constraints.consistent_states import FULFILLED, ConstraintStates
 
 STEP = 0.05
 # Motions that are followed, each both ways.

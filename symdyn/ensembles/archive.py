@@ -10,7 +10,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from symdyn.runtime.stored import write_whole
+from symdyn.runtime.building.stored import write_whole
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 # Bytes that are read at a time.

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.arguments import take
 from symdyn.ensembles.measures import Measure
 from symdyn.ensembles.portable import NotSent
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, SimulationWarning, SymdynError
-from symdyn.runtime.arguments import take
-from symdyn.runtime.batch_run import why_one_by_one
-from symdyn.runtime.inputs import Inputs
+from symdyn.runtime.batches.motions import why_one_by_one
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.outcome import Outcome
 from symdyn.runtime.module import Module
-from symdyn.runtime.outcome import Outcome
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions.solution import Solution
 from symdyn.shown import shown
 
 GROUPS = ("q", "u", "z", "parameters", "inputs")

@@ -13,13 +13,13 @@ from scipy.integrate import trapezoid
 
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import length_of, real_of
+from symdyn.runtime.integrating.simulate import N_POINTS
 from symdyn.runtime.memory import demand
-from symdyn.runtime.simulate import N_POINTS
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
-    from symdyn.runtime.solution import Solution
+    from symdyn.runtime.solutions.solution import Solution
 
 # (t (n_t,), values (n_t, ...)) -> result (...)
 REDUCTIONS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from symdyn.ensembles.result import Ensemble
 
 try:
-    from symdyn.runtime.pictures.figure import Picture
+    from symdyn.pictures.figure import Picture
 except ImportError as error:
     raise MissingExtra(f"pictures need matplotlib: pip install 'symdyn[plot]' ({error})") from None
 

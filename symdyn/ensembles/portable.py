@@ -12,9 +12,9 @@ from typing import Any
 from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.errors import SymdynError
-from symdyn.runtime.compiler import require_compiler
+from symdyn.runtime.building.compiler import require_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
 from symdyn.runtime.module import Module
-from symdyn.runtime.unit import CUnit, PythonUnit, Unit
 
 
 class NotSent(SymdynError):

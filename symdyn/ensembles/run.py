@@ -28,8 +28,8 @@ from symdyn.ensembles.store import Store, check_folder, check_same, write_manife
 from symdyn.errors import ArgumentError, CompileError, CompilerNotFound, EnsembleStopped
 from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
-from symdyn.runtime.batch import UNIT
-from symdyn.runtime.inputs import varies_over_time
+from symdyn.runtime.batches.states import UNIT
+from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 

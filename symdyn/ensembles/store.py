@@ -20,7 +20,7 @@ import numpy as np
 from symdyn.ensembles.archive import Entry, reading, write_archive
 from symdyn.ensembles.chunk import Done
 from symdyn.errors import ArgumentError
-from symdyn.runtime.stored import write_whole
+from symdyn.runtime.building.stored import write_whole
 
 RESULT, FAILURES, MANIFEST = "ensemble.npz", "failures.jsonl", "manifest.json"
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from symdyn.analytic.units import UnitReport
-    from symdyn.formulation.identification import BaseParameters
+    from symdyn.formulation.identification.quantities import BaseParameters
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
     from symdyn.verification import Verification
@@ -286,8 +286,11 @@ class Equations:
             return write_source(source, target)
 
     def base_parameters(self) -> BaseParameters:
-        """The smallest set of inertial parameters that the equations depend on; see symdyn.formulation.identification."""
-        from symdyn.formulation.identification import base_parameters
+        """The smallest set of inertial parameters that the equations depend on.
+
+        See symdyn.formulation.identification.quantities.
+        """
+        from symdyn.formulation.identification.quantities import base_parameters
 
         return base_parameters(self)
 

@@ -23,8 +23,8 @@ from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.node import Node
 
 if TYPE_CHECKING:
+    from symdyn.formulation.accelerations import Motion
     from symdyn.formulation.equations import Symbols
-    from symdyn.formulation.motion import Motion
 
 # Arguments of `variation` and `second_variation`, by what they stand for: first the state that varies, then the direction.
 FIRST, DIRECTION = "vary", "along"

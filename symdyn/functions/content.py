@@ -9,10 +9,10 @@ from typing import Any
 from symdyn.backend.metadata import Chart, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
-from symdyn.formulation.constrained import BAUMGARTE
+from symdyn.formulation.constraints.motion import BAUMGARTE
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
-from symdyn.formulation.skipped import skipped
+from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
 from symdyn.model.symbols import GivenMotion

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symdyn.backend.right_side import RightSide
-from symdyn.formulation.constrained import residual_names
+from symdyn.formulation.constraints.motion import residual_names
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names

@@ -23,7 +23,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime.methods import COMPILED
+from symdyn.runtime.integrating.methods import COMPILED
 
 # Errors in tolerances that are accepted between steps.
 BOUND = 100.0

@@ -411,7 +411,7 @@ def _modules() -> list[Call]:
 
 @cache
 def _backends() -> tuple[str, ...]:
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     return ("numpy", "c") if find_compiler() is not None else ("numpy",)
 

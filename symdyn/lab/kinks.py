@@ -21,7 +21,7 @@ import numpy as np
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime.methods import COMPILED
+from symdyn.runtime.integrating.methods import COMPILED
 
 AS_SMOOTH = "gauss as smooth"
 METHODS = (*COMPILED, AS_SMOOTH)

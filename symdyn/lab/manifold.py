@@ -1,6 +1,6 @@
 """The manifold of the constraints in numbers: states on it, and how many displacements and speeds are independent.
 
-Nothing here uses symdyn.runtime.statics or symdyn.runtime.consistent, so that what these give can be compared with it.
+Nothing here uses symdyn.statics or symdyn.runtime.consistent, so that what these give can be compared with it.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from types import ModuleType
 from symdyn import systems
 from symdyn.backend.source import Source
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import require_compiler
+from symdyn.runtime.building.compiler import require_compiler
 
 # Mechanisms with open chains, loops and contacts, whose functions hold choices.
 NAMES = ("two_link_arm", "cart_pole", "four_bar", "slider_crank")

@@ -8,7 +8,7 @@ from sympy import Matrix, cos, simplify, sin
 
 import symdyn as sd
 from symdyn.comparison.case import Case, Formula, Slide
-from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.lecture.chapter_3_straight_track import place_on_track
 
 TRACK = "Vehicle constrained to move along the straight track"

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     from symdyn.diagnosis import Diagnosis
     from symdyn.flexible.beam import Beam
     from symdyn.flexible.modal_body import ModalBody
-    from symdyn.formulation.augmented_equations import AugmentedEquations
-    from symdyn.formulation.embedding import EmbeddedEquations
-    from symdyn.formulation.motion_equations import MotionEquations
-    from symdyn.formulation.recursion import RecursiveEquations
+    from symdyn.formulation.printed.augmented import AugmentedEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
+    from symdyn.formulation.trees.embedding import EmbeddedEquations
+    from symdyn.formulation.trees.recursive import RecursiveEquations
     from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Numbers, Scalar, Values, Vector
     from symdyn.model.shapes import Shape
     from symdyn.runtime.module import Module
@@ -354,7 +354,7 @@ class System:
                  where axes stay parallel
         Raises ModelError with every fault found.
         """
-        from symdyn.formulation.embedding import embed
+        from symdyn.formulation.trees.embedding import embed
 
         return embed(self.check(), frames)
 
@@ -364,7 +364,7 @@ class System:
         frames   as for `embedding`
         Raises ModelError with every fault found.
         """
-        from symdyn.formulation.recursion import recursive
+        from symdyn.formulation.trees.recursive import recursive
 
         return recursive(self.check(), frames)
 
@@ -381,7 +381,7 @@ class System:
         Raises ModelError with every fault found, and for constraints that cannot hold or move nothing; SymdynError for an
         orientation that nothing takes: in relative coordinates or in a plane.
         """
-        from symdyn.formulation.augmented import augment
+        from symdyn.formulation.constraints.augmented import augment
 
         return augment(self.check(), coordinates, orientation, frames)
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 if TYPE_CHECKING:
-    from symdyn.formulation.augmented_equations import AugmentedEquations
-    from symdyn.formulation.motion_equations import MotionEquations
+    from symdyn.formulation.printed.augmented import AugmentedEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
 
 # Above this many operations a right-hand side is not written out in a notebook unless it is asked for by name.
 TOO_LONG = 400

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from symdyn.choice import HEADING, Candidate
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.skipped import skipped
+from symdyn.formulation.printed.skipped import skipped
 from symdyn.tape.tape import Tape
 
 # What the report counts besides the standard functions where there are constraints.

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.arguments import take
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.real_numbers import NotReal
 from symdyn.real_numbers import number as double
-from symdyn.runtime.arguments import take
 from symdyn.runtime.constraints import (
     CONSISTENT,
     as_velocities,
@@ -26,7 +26,7 @@ from symdyn.runtime.constraints import (
     position_residual,
     velocity_residual,
 )
-from symdyn.runtime.inputs import inputs_at
+from symdyn.runtime.inputs.inputs import inputs_at
 from symdyn.shown import name_of, shown
 from symdyn.tape.kernels import MASSLESS
 

@@ -13,32 +13,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from symdyn.arguments import fixed, take
 from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError
 from symdyn.kinds import text
 from symdyn.real_numbers import DOUBLE, number_of, real_of
-from symdyn.runtime.arguments import fixed, take
+from symdyn.runtime.building.library import Evaluator, Unit
 from symdyn.runtime.calls import Call, ordered
+from symdyn.runtime.inputs.sampled import Sampled
+from symdyn.runtime.inputs.tables import Table
 from symdyn.runtime.paths import as_path, writing
-from symdyn.runtime.sampled import Sampled
-from symdyn.runtime.tables import Table
-from symdyn.runtime.unit import Evaluator, Unit
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.given import Names, States, Times
-    from symdyn.runtime.actuation import Actuation
-    from symdyn.runtime.batch_solution import BatchSolution
-    from symdyn.runtime.inputs import Inputs
+    from symdyn.runtime.batches.solution import BatchSolution
+    from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.labelled import Labelled
-    from symdyn.runtime.solution import Solution
-    from symdyn.runtime.statics.campbell import Campbell
-    from symdyn.runtime.statics.equilibria import Equilibria
-    from symdyn.runtime.statics.equilibrium import Equilibrium
-    from symdyn.runtime.statics.linearize import Linearization
-    from symdyn.runtime.statics.stability import Stability
+    from symdyn.runtime.solutions.solution import Solution
+    from symdyn.statics.actuation import Actuation
+    from symdyn.statics.campbell import Campbell
+    from symdyn.statics.equilibria import Equilibria
+    from symdyn.statics.equilibrium import Equilibrium
+    from symdyn.statics.linearize import Linearization
+    from symdyn.statics.stability import Stability
 
 Provider = Callable[[str | RightSide], Unit]
 Numbers = Sequence[float] | np.ndarray
@@ -119,7 +119,7 @@ class Module:
         Rows that cannot be evaluated are NaN, and an EvaluationWarning tells which and why. Values have the same bits as
         those of `rhs`. Quickest with states entry by entry in memory (x = a.T of an array a (n_x, n)).
         """
-        from symdyn.runtime.batch import rhs_batch
+        from symdyn.runtime.batches.states import rhs_batch
 
         return rhs_batch(self, t, x, params, inputs, out)
 
@@ -127,7 +127,7 @@ class Module:
     def batch_width(self) -> int:
         """How many states one processor core computes at once in `rhs_batch` and `simulate_batch`; 1: the backend is NumPy, or
         the C compiler has no vectors."""
-        from symdyn.runtime.batch import width
+        from symdyn.runtime.batches.states import width
 
         return width(self)
 
@@ -266,9 +266,9 @@ class Module:
         nonlinearly are found by Newton's method with the exact derivative, near `start` if there are several solutions.
         Raises ArgumentError for a motion that violates the constraints, or that the inputs cannot make, with the direction in
         coordinates and the force that is missing; where no solution is found; and where more inputs than freedoms enter
-        nonlinearly, by name. See symdyn.runtime.actuation.Actuation for the result, and for the source.
+        nonlinearly, by name. See symdyn.statics.actuation.Actuation for the result, and for the source.
         """
-        from symdyn.runtime.actuation import actuation
+        from symdyn.statics.actuation import actuation
 
         return actuation(self, t, q, u, ud, params, inputs, z, start, project, keep)
 
@@ -278,7 +278,7 @@ class Module:
 
         inputs   where they enter nonlinearly the matrix depends on them; default: their initial values
         """
-        from symdyn.runtime.actuation import input_matrix
+        from symdyn.statics.actuation import input_matrix
 
         return input_matrix(self, t, x, params, inputs)
 
@@ -381,10 +381,10 @@ class Module:
         interpolation, extend   of tables that are pairs: "linear" or "cubic", a smooth spline (steps end at the times of both);
                     beyond the first and the last time "error", or "hold": the first value, and the last one
         rtol, atol  relative and absolute tolerance of a step; rtol from 1e-15 to 0.1; atol a number or (n_x,), default rtol
-        method      compiled: one of symdyn.runtime.methods.COMPILED: "dop853" (default with the C backend), "bs54" for loose
-                    tolerances, "taylor" for fine ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very
-                    long conservative motion (with first_step its steps have that length, but for some that a warning counts); or
-                    one of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
+        method      compiled: one of "dop853" (default with the C backend), "bs54" for loose tolerances, "taylor" for fine
+                    ones, "radau" for stiff systems ("radau5" at loose tolerances), "gauss" for very long
+                    conservative motion (with first_step its steps have that length, but for some that a warning counts); or one
+                    of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
                     Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an
                     implicit method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and
                     constraints; `Solution.why` gives the reason
@@ -402,12 +402,12 @@ class Module:
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
-        see symdyn.runtime.chatter. Of steps that are far too short, and of events whose zeros may be missed, a SimulationWarning
-        is given and kept in the Solution's `doubts`. What a function of the user raises ends a run like that, and is its `cause`.
-        Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
+        see symdyn.runtime.integrating.chatter. Of steps that are far too short, and of events whose zeros may be missed, a
+        SimulationWarning is given and kept in the Solution's `doubts`. What a function of the user raises ends a run like that,
+        and is its `cause`. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
         Raises ArgumentError for values that do not fit.
         """
-        from symdyn.runtime.simulate import simulate
+        from symdyn.runtime.integrating.simulate import simulate
 
         return simulate(self, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method, steps=steps,
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
@@ -444,7 +444,7 @@ class Module:
         loads leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
         ArgumentError for what does not fit.
         """
-        from symdyn.runtime.batch_run import simulate_batch
+        from symdyn.runtime.batches.motions import simulate_batch
 
         return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
                               first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
@@ -475,7 +475,7 @@ class Module:
         EquilibriumNotUnique with the direction that has no stiffness, or none beyond rounding, ArgumentError for what does not
         fit.
         """
-        from symdyn.runtime.statics.equilibrium import equilibrium
+        from symdyn.statics.equilibrium import equilibrium
 
         return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
 
@@ -494,7 +494,7 @@ class Module:
         all the way by whole turns, Euler parameters by their sign. A start that leads to none is listed in `failures`; raises
         NoEquilibrium with the first message if none of them leads anywhere.
         """
-        from symdyn.runtime.statics.equilibria import equilibria
+        from symdyn.statics.equilibria import equilibria
 
         return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
@@ -510,9 +510,9 @@ class Module:
         hold          coordinates and speeds that are held when the state is disturbed, by name or symbol; default: what `fixed`
                       names or the equilibrium kept, but for the conditions of a trim; () holds nothing
 
-        See symdyn.runtime.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
+        See symdyn.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
         """
-        from symdyn.runtime.statics.linearize import linearize
+        from symdyn.statics.linearize import linearize
 
         return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold)
 
@@ -533,7 +533,7 @@ class Module:
         more like blades, a body that spins about its axis) after the change, others by Floquet theory. Raises ArgumentError where
         neither holds, NoEquilibrium where no periodic motion is found.
         """
-        from symdyn.runtime.statics.stability import stability
+        from symdyn.statics.stability import stability
 
         return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
 
@@ -558,7 +558,7 @@ class Module:
         Without blades a change of variables that makes the equations constant is looked for; where there is none (two blades, an
         anisotropic rotor on anisotropic bearings), Floquet theory gives the modes. Raises NoEquilibrium, ArgumentError.
         """
-        from symdyn.runtime.statics.campbell import campbell
+        from symdyn.statics.campbell import campbell
 
         return campbell(self, speed, values, free, fixed, start, params, t, inputs, blades, azimuth, azimuths, max_iterations,
                         frame, averaged)
@@ -569,8 +569,8 @@ class Module:
         """What was generated, what was skipped and why, operation counts; prints as text."""
         if self._reporter is None:
             raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
-        from symdyn.runtime.batch import UNIT
-        from symdyn.runtime.batch_run import many_at_once
+        from symdyn.runtime.batches.motions import many_at_once
+        from symdyn.runtime.batches.states import UNIT
 
         return replace(self._reporter(), many=many_at_once(self, UNIT in self._units))
 

@@ -102,7 +102,7 @@ def _rotations(sol: Any) -> np.ndarray:
 
 def flips(short: bool) -> Iterator[Row]:
     """A body that flips about its intermediate axis over many periods, against elliptic functions."""
-    from symdyn.runtime.methods import COMPILED
+    from symdyn.runtime.integrating.methods import COMPILED
 
     periods = 30 if short else 1000
     I, a, c = (1.0, 2.0, 3.0), 1.0, 1.05 * math.sqrt(1 / 3)

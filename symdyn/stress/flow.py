@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions.solution import Solution
 from symdyn.stress.record import MotionStops, NotApplicable, StandsStill
 from symdyn.stress.subject import RTOL, Subject
 

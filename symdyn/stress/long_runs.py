@@ -13,7 +13,7 @@ from symdyn.errors import ArgumentError
 from symdyn.model.joints import Prismatic
 from symdyn.model.symbols import coordinates, parameters
 from symdyn.model.system import System
-from symdyn.runtime.methods import COMPILED
+from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.stress.flow import local_error
 from symdyn.stress.record import DEGRADE, FAIL, Row, within
 from symdyn.stress.subject import EPS, Subject

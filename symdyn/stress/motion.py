@@ -7,14 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions.solution import Solution
 from symdyn.stress.flow import Path, demand_motion, flow, growth_back, path
 from symdyn.stress.record import DEGRADE, FAIL, PASS, MotionStops, NotApplicable, Row, within
 from symdyn.stress.subject import EPS, RTOL, Subject
 
 # Magnifications up to here leave the digits to see an error by.
 MAGNIFIED = 1e3
-# Of constraints, by projection; relative to the mechanism's length, see symdyn.runtime.stabilization.
+# Of constraints, by projection; relative to the mechanism's length, see symdyn.runtime.integrating.stabilization.
 KEPT = 1e-12
 # A change that is followed: far above rounding errors and tolerances, far below where it is no longer small.
 CHANGE = 1e-6
@@ -186,7 +186,7 @@ def reversible(subject: Subject, short: bool, both: bool = True) -> tuple[Path, 
 
 def _onto(subject: Subject, x: np.ndarray) -> np.ndarray:
     """The state on the constraints."""
-    from symdyn.runtime.stabilization import Projector
+    from symdyn.runtime.integrating.stabilization import Projector
 
     return Projector(subject.module, subject.params)(0.0, x)
 
@@ -196,7 +196,7 @@ def _tangent(subject: Subject, t: float, x: np.ndarray, scales: np.ndarray, chan
     size = float(np.linalg.norm(change))
     if size == 0:
         return change
-    from symdyn.runtime.stabilization import Projector
+    from symdyn.runtime.integrating.stabilization import Projector
 
     project = Projector(subject.module, subject.params)
     step = 1e-6 / size

@@ -14,7 +14,7 @@ import numpy as np
 from symdyn.errors import ArgumentError, CompileError, SymdynError
 from symdyn.formulation.equations import Symbols
 from symdyn.functions.tapes import function_tape
-from symdyn.runtime.compiler import Compiler, find_compiler, package_path, probe
+from symdyn.runtime.building.compiler import Compiler, find_compiler, package_path, probe
 from symdyn.stress.coded import SMALLEST, Coded, imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, judged, refusals, set_aside
 from symdyn.stress.record import FAIL, NotApplicable, Row
@@ -89,7 +89,7 @@ def states(subject: Subject, n: int, seed: int = 1) -> States:
 
 def _consistent(subject: Subject, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     """States on the constraints, from these as guesses; where there is none nearby the start with other speeds."""
-    from symdyn.runtime.stabilization import Projector
+    from symdyn.runtime.integrating.stabilization import Projector
 
     project = Projector(subject.module, subject.params)
     n_q = project.n_q

@@ -15,10 +15,10 @@ from symdyn.formulation.equations import Equations
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import Compiler, find_compiler, plain
+from symdyn.runtime.building.compiler import Compiler, find_compiler, plain
+from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.runtime.module import Module
-from symdyn.runtime.solution import Solution
-from symdyn.runtime.unit import CUnit, PythonUnit
+from symdyn.runtime.solutions.solution import Solution
 
 if TYPE_CHECKING:
     from symdyn.model.system import System

@@ -8,8 +8,8 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from symdyn.bench.precise import Lost, program
 from symdyn.functions.tapes import function_tape, tape_as_derived
+from symdyn.precision.program import Lost, program
 from symdyn.stress.subject import EPS, Subject
 from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node

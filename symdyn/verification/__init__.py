@@ -147,7 +147,7 @@ def verify(equations: Equations, states: int = 5, digits: int = 30, params: Mapp
     With constraints the states are consistent ones near the initial state, to all digits, and speeds are projected.
     Returns a Verification; its `passed` is False if a check failed. Raises SymdynError where no states are found.
     """
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     whole(states, "the number of states")
     whole(digits, "digits", 1, MOST_DIGITS)

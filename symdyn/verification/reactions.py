@@ -9,8 +9,8 @@ import mpmath
 import numpy as np
 
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.locking import places
-from symdyn.formulation.reactions import own_rows
+from symdyn.formulation.probes.vanishing_pivots import places
+from symdyn.formulation.trees.reactions import own_rows
 from symdyn.model.closures import Gear
 from symdyn.model.elements import AddedMass
 from symdyn.model.joints import Modal

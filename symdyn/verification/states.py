@@ -10,10 +10,10 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from symdyn.arguments import some
 from symdyn.errors import SymdynError
-from symdyn.formulation.consistent_states import ConstraintStates
+from symdyn.formulation.constraints.consistent_states import ConstraintStates
 from symdyn.formulation.equations import Equations
-from symdyn.runtime.arguments import some
 from symdyn.shown import name_of
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.evaluate import evaluate

@@ -12,8 +12,8 @@ from symdyn import systems
 from symdyn.functions.table import FUNCTIONS
 from symdyn.functions.tapes import has_function
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler, flags
-from symdyn.runtime.unit import CUnit, PythonUnit
+from symdyn.runtime.building.compiler import find_compiler, flags
+from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.tape.evaluate import evaluate
 
 # Relative to the largest entry of a result; the second column is for functions that solve with the mass matrix, where

@@ -14,10 +14,10 @@ import pytest
 from symdyn.backend.source import Content, Source, render
 from symdyn.errors import SymdynError
 from symdyn.pipeline import emit
-from symdyn.runtime import cache
-from symdyn.runtime.batch import tables_of
-from symdyn.runtime.compiler import Compiler, find_compiler, plain
-from symdyn.runtime.unit import CUnit
+from symdyn.runtime.batches.states import tables_of
+from symdyn.runtime.building import cache
+from symdyn.runtime.building.compiler import Compiler, find_compiler, plain
+from symdyn.runtime.building.library import CUnit
 from symdyn.systems import get
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.node import COORDINATE, PARAMETER

@@ -10,10 +10,10 @@ import pytest
 
 from symdyn.backend import c_records
 from symdyn.errors import SymdynError
-from symdyn.runtime.batch import Table
-from symdyn.runtime.compiled import Problem
-from symdyn.runtime.compiler import find_compiler, require_compiler
-from symdyn.runtime.run_record import STATUS, RunReport
+from symdyn.runtime.batches.states import Table
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.integrating.compiled import Problem
+from symdyn.runtime.integrating.run_record import STATUS, RunReport
 
 RECORDS = {"runtime/report_type.h": (RunReport, "symdyn_report"), "runtime/problem_type.h": (Problem, "symdyn_problem"),
            "runtime/table_type.h": (Table, "symdyn_table")}

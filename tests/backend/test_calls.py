@@ -20,7 +20,7 @@ from symdyn.backend import source
 from symdyn.backend.dialect import Dialect, read_dialect
 from symdyn.errors import EvaluationError, SymdynError
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.floats import evaluate_rows
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]

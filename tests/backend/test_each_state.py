@@ -15,8 +15,8 @@ import pytest
 import symdyn as sd
 from symdyn.errors import EvaluationError, EvaluationWarning
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.unit import PythonUnit
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.building.library import PythonUnit
 from tests.user_functions import BOUNDED
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

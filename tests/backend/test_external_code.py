@@ -20,8 +20,8 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import EvaluationError, SimulationWarning, SymdynError, UnsupportedExpression
 from symdyn.pipeline import emit, write_source
-from symdyn.runtime import cache
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building import cache
+from symdyn.runtime.building.compiler import find_compiler
 from tests.user_functions import BOUNDED, HEIGHT, HEIGHT_1, PAIR, SHARED, SLOPES, c_text, height, pair, pair_numpy
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]

@@ -11,7 +11,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.pipeline import emit, write_source
-from symdyn.runtime.compiler import find_compiler, require_compiler
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from tests.runtime.test_events import ball
 
 PROGRAM = """#include <stdalign.h>

@@ -14,7 +14,7 @@ from symdyn.backend import source
 from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.tape import unsigned
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

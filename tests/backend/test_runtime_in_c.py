@@ -17,9 +17,9 @@ from symdyn.backend.metadata import EventRecord
 from symdyn.backend.methods import METHODS
 from symdyn.backend.methods.gauss import COEFFICIENTS
 from symdyn.backend.source import _shipped, template_folders
-from symdyn.runtime.compiled import Problem
-from symdyn.runtime.compiler import find_compiler, require_compiler
-from symdyn.runtime.run_record import STATUS, RunReport
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.integrating.compiled import Problem
+from symdyn.runtime.integrating.run_record import STATUS, RunReport
 
 RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
 STRICT = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable",

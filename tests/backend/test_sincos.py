@@ -18,8 +18,8 @@ import pytest
 
 from symdyn.backend.source import Content, Source, render
 from symdyn.errors import EvaluationError
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.unit import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.node import COORDINATE
 

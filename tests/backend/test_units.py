@@ -12,9 +12,9 @@ import pytest
 import symdyn as sd
 from symdyn.backend.units import LEAST_LINES
 from symdyn.pipeline import emit
-from symdyn.runtime import objects
-from symdyn.runtime.compiler import find_compiler, require_compiler
-from symdyn.runtime.unit import CUnit
+from symdyn.runtime.building import objects
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.runtime.building.library import CUnit
 from symdyn.translation_units import TranslationUnit, joined, translation_units
 from tests.runtime.test_events import ball
 

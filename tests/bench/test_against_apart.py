@@ -15,7 +15,7 @@ import pytest
 
 from symdyn.bench.work.against.apart import Apart
 from symdyn.bench.work.against.peer import Failed, Unfit
-from symdyn.runtime.compiler import LINUX
+from symdyn.runtime.building.compiler import LINUX
 
 pytestmark = pytest.mark.skipif(not LINUX, reason="processes of their own are forked")
 MOTION = (None, None, None, None)

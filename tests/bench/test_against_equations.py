@@ -21,7 +21,7 @@ from symdyn.bench.work.against.peer import Failed, Peer, Unfit, fitting
 from symdyn.bench.work.against.scipy_methods import Scipy
 from symdyn.bench.work.against.walk import ARITHMETIC, right_hand_side, walk
 from symdyn.errors import ArgumentError, SymdynError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape import Recorder
 from symdyn.tape.node import SPEED
 from symdyn.tape.ops import OPERATIONS

@@ -9,12 +9,12 @@ import math
 import pytest
 
 import symdyn as sd
-from symdyn.bench import loops
-from symdyn.bench.loop_cases import CASES, REFERENCE, chosen, largest
-from symdyn.bench.loops import Point, fastest, measure
 from symdyn.cli import main
 from symdyn.errors import SymdynError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab import loops
+from symdyn.lab.loop_cases import CASES, REFERENCE, chosen, largest
+from symdyn.lab.loops import Point, fastest, measure
+from symdyn.runtime.building.compiler import find_compiler
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 # One of each kind: a constraint, loops, folds and lost rank, a redundant loop, time, constraints of the velocity.

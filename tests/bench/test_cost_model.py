@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from symdyn import systems
-from symdyn.bench import cost_model
-from symdyn.bench.cost_model import Regret, Sample, cross_validated, fit, measure, predict
 from symdyn.choice import COSTS, Candidate
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab import cost_model
+from symdyn.lab.cost_model import Regret, Sample, cross_validated, fit, measure, predict
+from symdyn.runtime.building.compiler import find_compiler
 
 CANDIDATE = Candidate("embedding", "body", 0, 0, 0, 0.0)
 

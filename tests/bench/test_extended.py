@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench import extended
-from symdyn.bench.extended import Precise, agreement, known, motion
-from symdyn.bench.extrapolation import integrate
-from symdyn.bench.loop_cases import REFERENCE
 from symdyn.bench.work.converged import distance
 from symdyn.cli import main
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab import extended
+from symdyn.lab.extended import known
+from symdyn.lab.loop_cases import REFERENCE
+from symdyn.precision.extrapolation import integrate
+from symdyn.precision.motion import Precise, agreement, motion
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
 
 

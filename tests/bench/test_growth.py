@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import symdyn as sd
-from symdyn.bench import growth
-from symdyn.bench.growth import Growth
-from symdyn.bench.random_tree import random_tree
 from symdyn.cli import main
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab import growth
+from symdyn.lab.growth import Growth
+from symdyn.lab.random_tree import random_tree
+from symdyn.runtime.building.compiler import find_compiler
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from symdyn import systems
-from symdyn.bench import kernel
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.timing import loops as kernel
 
 
 class FakeTime:

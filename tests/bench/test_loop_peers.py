@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symdyn.bench.peers.contest import fastest
-from symdyn.bench.peers.four_bar import LoopRow, four_bar_contest, moving_state
-from symdyn.bench.peers.kane_peer import KanePeer
-from symdyn.bench.peers.kkt_peer import KktPeer
-from symdyn.bench.peers.loop_table import loop_lines, loop_record, loop_verdict
 from symdyn.cli import main
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab.peers.contest import fastest
+from symdyn.lab.peers.four_bar import LoopRow, four_bar_contest, moving_state
+from symdyn.lab.peers.kane_peer import KanePeer
+from symdyn.lab.peers.kkt_peer import KktPeer
+from symdyn.lab.peers.loop_table import loop_lines, loop_record, loop_verdict
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.systems import get
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -25,7 +25,7 @@ SYMDYN = ["symdyn with multipliers", "symdyn"]
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times are not looked at."""
-    monkeypatch.setattr("symdyn.bench.kernel.TIMING_SECONDS", 1e-5)
+    monkeypatch.setattr("symdyn.timing.loops.TIMING_SECONDS", 1e-5)
 
 
 def test_linkage_is_closed_and_moves() -> None:
@@ -73,7 +73,7 @@ def test_pinocchio_agrees() -> None:
 
 @needs_c
 def test_without_peers(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    monkeypatch.setattr("symdyn.bench.peers.toolchain._installed", lambda name: None)
+    monkeypatch.setattr("symdyn.bench.toolchain._installed", lambda name: None)
     code = main(["bench", "peers", "--models", "four_bar", "--repeats", "1", "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     assert "CasADi is left out: the Python package casadi is not installed" in printed

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from symdyn.bench.figures import print_figures
 from symdyn.bench.work import converged, store
 from symdyn.bench.work.cases import known
 from symdyn.cli import main
 from symdyn.cli.measurements import MEASUREMENTS, Measurement, overview
 from symdyn.errors import ArgumentError
+from symdyn.lab.figures import print_figures
 
 ROOT = Path(__file__).parents[2]
 TEXTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "notebooks").glob("*.py"))]

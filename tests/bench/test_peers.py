@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 from symdyn import systems
-from symdyn.bench.peers import command, toolchain
-from symdyn.bench.peers.casadi_peer import CasadiPeer
-from symdyn.bench.peers.contest import Row, contest, random_state
-from symdyn.bench.peers.contestant import Contestant, unsorted
-from symdyn.bench.peers.description import Description, describe
-from symdyn.bench.peers.models import CASES, Bound, cases, turbine_tree
-from symdyn.bench.peers.race import agree, race
-from symdyn.bench.peers.table import heading, line, record, verdict
+from symdyn.bench import toolchain
 from symdyn.cli import main
 from symdyn.errors import SymdynError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab.peers import command
+from symdyn.lab.peers.casadi_peer import CasadiPeer
+from symdyn.lab.peers.contest import Row, contest, random_state
+from symdyn.lab.peers.contestant import Contestant, unsorted
+from symdyn.lab.peers.description import Description, describe
+from symdyn.lab.peers.models import CASES, Bound, cases, turbine_tree
+from symdyn.lab.peers.race import agree, race
+from symdyn.lab.peers.table import heading, line, record, verdict
+from symdyn.runtime.building.compiler import find_compiler
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -118,7 +119,7 @@ def counting(name: str, value: float, calls: list[str]) -> Contestant:
 
 
 def test_contestants_take_turns_and_must_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("symdyn.bench.kernel.TIMING_SECONDS", 0.0)
+    monkeypatch.setattr("symdyn.timing.loops.TIMING_SECONDS", 0.0)
     calls: list[str] = []
     contestants = [counting("a", 1.0, calls), counting("b", 1.0 + 1e-9, calls)]
     assert 0 < agree(contestants, "mechanism") < 1e-8
@@ -142,7 +143,7 @@ def test_names_of_cases() -> None:
 
 @needs_c
 def test_without_peers(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    monkeypatch.setattr("symdyn.bench.peers.toolchain._installed", lambda name: None)
+    monkeypatch.setattr("symdyn.bench.toolchain._installed", lambda name: None)
     code = main(["bench", "peers", "--models", "turbine_tree", "--repeats", "1", "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     assert printed.splitlines()[0] == ("the peers are not installed, symdyn is measured alone; "

@@ -2,8 +2,8 @@
 
 import dataclasses
 
-from symdyn.bench import printing
 from symdyn.cli import main
+from symdyn.lab import printing
 
 
 def test_table(capsys):

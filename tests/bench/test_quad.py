@@ -12,14 +12,16 @@ import pytest
 from mpmath import libmp
 
 import symdyn as sd
-from symdyn.bench import kept, precise, quad
-from symdyn.bench.extended import Precise, agreement, motion, record
-from symdyn.bench.extrapolation import midpoint
+from symdyn.bench import kept
 from symdyn.bench.work import store
 from symdyn.bench.work.cases import subject
 from symdyn.bench.work.converged import converged, distance
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.precision import program as precise
+from symdyn.precision import quad
+from symdyn.precision.extrapolation import midpoint
+from symdyn.precision.motion import Precise, agreement, motion, record
 from symdyn.tape.node import COORDINATE, PARAMETER
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
@@ -172,7 +174,7 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(*given):
         raise OSError(28, "no space left")
 
-    monkeypatch.setattr("symdyn.runtime.stored.os.replace", full)
+    monkeypatch.setattr("symdyn.runtime.building.stored.os.replace", full)
     with pytest.raises(OSError, match="no space left"):
         kept.put(path, "c", {})
     assert path.read_text() == before and [p.name for p in path.parent.iterdir()] == ["references.json"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from symdyn.bench.robots import collection
 from symdyn.cli import main
 from symdyn.errors import MissingExtra
+from symdyn.lab.robots import collection
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
 pytest.importorskip("defusedxml", reason="defusedxml is not installed; run: pip install 'symdyn[robots]'")

@@ -29,7 +29,7 @@ from symdyn.bench.work.subject import Subject, Yardstick
 from symdyn.bench.work.timing import Timing, one_pass
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
-from symdyn.runtime.compiler import LINUX
+from symdyn.runtime.building.compiler import LINUX
 
 ASKED = {"method_names": ["dop853"], "tolerances": [1e-4, 1e-7, 1e-10], "repeats": 2}
 
@@ -305,7 +305,8 @@ def test_code_of_every_method_is_in_the_fingerprint(tmp_path, monkeypatch):
     seen = {}
     monkeypatch.setattr(resume, "digest", lambda files: seen.update(files) or "")
     resume.code.__wrapped__()
-    methods = {"backend/methods/taylor.py", "backend/methods/radau.py", "backend/methods/bs54.py", "runtime/methods.py"}
+    methods = {"backend/methods/taylor.py", "backend/methods/radau.py", "backend/methods/bs54.py",
+               "runtime/integrating/methods.py"}
     assert methods < set(seen) and any(name.endswith(".jinja") for name in seen) and "cli/parser.py" not in seen
 
 

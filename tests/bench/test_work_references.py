@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench import extended
 from symdyn.bench.work import closed_forms, store
 from symdyn.bench.work.cases import CASES, file_name, of_system, subject
 from symdyn.bench.work.converged import Exact, TooLong, converged, states
@@ -15,6 +14,7 @@ from symdyn.bench.work.record import Reference
 from symdyn.bench.work.reference import agreement, default_times, find_reference
 from symdyn.bench.work.subject import Yardstick
 from symdyn.errors import CompileError, SymdynError
+from symdyn.precision import motion as extended
 
 
 @pytest.fixture(scope="module")

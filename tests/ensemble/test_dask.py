@@ -16,7 +16,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli import main
-from symdyn.runtime.recall import recall
+from symdyn.runtime.building.recall import recall
 
 COUNT = 400
 
@@ -70,7 +70,7 @@ SCRIPT = """
 import sys
 from mpi4py.futures import MPIPoolExecutor
 import symdyn as sd
-from symdyn.runtime.recall import recall
+from symdyn.runtime.building.recall import recall
 
 if __name__ == "__main__":
     drawn = sd.Samples({"q1": {"from": -1, "to": 1}}, "random", 40, 2)

@@ -23,7 +23,7 @@ from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
-from symdyn.runtime.recall import recall
+from symdyn.runtime.building.recall import recall
 
 T = (0.0, 0.5)
 

@@ -13,7 +13,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli import main, sweep
-from symdyn.runtime.recall import recall
+from symdyn.runtime.building.recall import recall
 
 GOOD = """
 system = "double_pendulum"

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import symdyn as sd
-from symdyn.bench import flexible_cases as cases
-from symdyn.bench import flexible_crank as crank
+from symdyn.lab import flexible_cases as cases
+from symdyn.lab import flexible_crank as crank
 from symdyn.systems.nrel_5mw_tower import ONSHORE
 from tests.flexible.beam_model import Column
 

@@ -11,8 +11,8 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
-from symdyn.formulation.independent import independent
-from symdyn.formulation.regrouping import factors
+from symdyn.formulation.identification.regrouping import factors
+from symdyn.formulation.probes.independent import independent
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import vector
 from symdyn.tape import Recorder, Tape

@@ -12,8 +12,8 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.constraints import Gathered
-from symdyn.formulation.tree_equations import tree_of
+from symdyn.formulation.constraints.rows import Gathered
+from symdyn.formulation.trees.equations import tree_of
 from symdyn.model.symbols import symbols_of
 from symdyn.tape import Tape
 from symdyn.tape.differentiate import forward

@@ -11,7 +11,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ModelError, ModelWarning, SymdynError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from tests.helpers import close, largest, quantities, state
 
 t = sd.t

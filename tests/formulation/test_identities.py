@@ -15,7 +15,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.model.orientation import SEQUENCES
 from symdyn.tape import Tape
 from symdyn.tape.differentiate import forward
@@ -250,7 +250,7 @@ def test_seeds_cover_every_kind_of_joint() -> None:
 
 def tree_of(seed: int) -> Any:
     from symdyn.formulation.algebra import TapeAlgebra, leaves_of
-    from symdyn.formulation.tree import build
+    from symdyn.formulation.trees.tree import build
     from symdyn.tape import Recorder
 
     model = Draw(seed).s.check()

@@ -13,7 +13,7 @@ from sympy.physics import mechanics as me
 
 import symdyn as sd
 from symdyn.errors import EvaluationError, SimulationWarning
-from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.model.orientation import SEQUENCES
 from symdyn.model.symbols import symbols_of
 from tests import helpers

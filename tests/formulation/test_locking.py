@@ -12,11 +12,11 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import EvaluationError
-from symdyn.formulation import tree as trees
-from symdyn.formulation.locking import lockable
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.numbers import NumericTree
-from symdyn.formulation.tree_equations import tree_of
+from symdyn.formulation.probes.vanishing_pivots import lockable
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.numbers import NumericTree
+from symdyn.formulation.trees import tree as trees
+from symdyn.formulation.trees.equations import tree_of
 from symdyn.functions.tapes import function_tape
 from symdyn.model.orientation import SEQUENCES
 from symdyn.stress.attitude import free_body, platform

@@ -9,11 +9,11 @@ import pytest
 
 import symdyn as sd
 from symdyn.formulation.algebra import TapeAlgebra
-from symdyn.formulation.composite import factorize
-from symdyn.formulation.consistent_states import ConstraintStates
-from symdyn.formulation.dependent_rows import ranks, scaled
-from symdyn.formulation.null_space import NullSpaceSolver, elimination_order
-from symdyn.formulation.saddle import RangeSolver, fewest_neighbours
+from symdyn.formulation.constraints.consistent_states import ConstraintStates
+from symdyn.formulation.constraints.null_space import NullSpaceSolver, elimination_order
+from symdyn.formulation.constraints.saddle import RangeSolver, fewest_neighbours
+from symdyn.formulation.probes.dependent_rows import ranks, scaled
+from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import vector
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import COORDINATE, is_zero

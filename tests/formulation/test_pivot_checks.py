@@ -7,7 +7,7 @@ import pytest
 
 from symdyn import systems
 from symdyn.errors import EvaluationError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.recorder import Recorder
 
 

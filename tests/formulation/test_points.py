@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.spatial.vectors import vector
 from symdyn.tape import Tape
 from symdyn.tape.differentiate import forward, jacobian
@@ -150,7 +150,7 @@ def test_body_of_another_system() -> None:
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 def test_compiled_and_over_time(backend: str, tmp_path: Any) -> None:
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")
@@ -176,8 +176,8 @@ def test_compiled_and_over_time(backend: str, tmp_path: Any) -> None:
 
 
 def test_pictures_leave_matrices_out() -> None:
-    from symdyn.runtime.pictures.panels import panels_of
-    from symdyn.runtime.pictures.points import points_of
+    from symdyn.pictures.panels import panels_of
+    from symdyn.pictures.points import points_of
 
     s = sd.systems.get("two_link_arm")
     at = (s.bodies[-1], [sd.parameters("l2"), 0])

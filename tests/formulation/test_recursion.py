@@ -10,7 +10,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ModelError, SymdynError
-from symdyn.formulation.motion_equations import MotionEquations
+from symdyn.formulation.printed.independent_speeds import MotionEquations
 from tests import helpers
 from tests.formulation.test_identities import Draw
 

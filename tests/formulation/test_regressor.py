@@ -101,7 +101,7 @@ def test_bodies_held_to_the_ground_have_no_part() -> None:
 
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 def test_compiled(backend: str) -> None:
-    from symdyn.runtime.compiler import find_compiler
+    from symdyn.runtime.building.compiler import find_compiler
 
     if backend == "c" and find_compiler() is None:
         pytest.skip("no C compiler here")

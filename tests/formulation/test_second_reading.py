@@ -12,9 +12,9 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium, SimulationWarning
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
-from symdyn.formulation.recursion import RecursiveTree
-from symdyn.formulation.tree import build
-from symdyn.formulation.tree_quantities import TreeQuantities
+from symdyn.formulation.trees.quantities import TreeQuantities
+from symdyn.formulation.trees.recursive import RecursiveTree
+from symdyn.formulation.trees.tree import build
 from symdyn.model.symbols import time
 from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate

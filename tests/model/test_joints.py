@@ -14,7 +14,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.embedding import EmbeddedEquations
+from symdyn.formulation.trees.embedding import EmbeddedEquations
 from symdyn.model.orientation import SEQUENCES
 from tests import helpers
 

@@ -9,10 +9,10 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.consistent_states import ConstraintStates
+from symdyn.formulation.constraints.consistent_states import ConstraintStates
 from symdyn.pipeline import emit
 from symdyn.runtime.constraints import turning
-from symdyn.runtime.statics.equilibria import LENGTHS, TURNS, _spans
+from symdyn.statics.equilibria import LENGTHS, TURNS, _spans
 
 
 def looped(units: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.peers.models import turbine_tree
+from symdyn.lab.peers.models import turbine_tree
 from symdyn.model import joints
 from symdyn.tape.floats import evaluate_rows
 from tests.oracles.random_trees import random_state, random_tree

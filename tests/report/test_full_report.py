@@ -19,10 +19,14 @@ from symdyn.bench.work.record import Reference, Row, Skipped
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.functions.tapes import function_tape
-from symdyn.report import full, full_condition, full_equations, full_pictures, full_work
-from symdyn.report.full import full_report
+from symdyn.overview import condition as full_condition
+from symdyn.overview import equations as full_equations
+from symdyn.overview import page as full
+from symdyn.overview import pictures as full_pictures
+from symdyn.overview import work as full_work
+from symdyn.overview.page import full_report
 from symdyn.report.notation import entry_latex, name_latex
-from symdyn.runtime.charts import distances
+from symdyn.runtime.integrating.charts import distances
 from symdyn.stress.record import Row as StressRow
 from symdyn.stress.record import StressReport
 from symdyn.stress.run import stress
@@ -31,7 +35,7 @@ from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
-from symdyn.runtime.pictures import embedded
+from symdyn.pictures import embedded
 
 PLATE = """
 import symdyn as sd
@@ -247,7 +251,7 @@ def test_a_part_that_fails_is_told_and_loses_nothing(quick: None, tmp_path: Path
 
 def test_without_extras(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "latex2mathml.converter", None)
-    monkeypatch.setitem(sys.modules, "symdyn.runtime.pictures.figure", None)
+    monkeypatch.setitem(sys.modules, "symdyn.pictures.figure", None)
     page = full_report("pendulum", tmp_path / "page.html", verify=False).read_text(encoding="utf-8")
     part = section(page, "equations")
     assert "latex2mathml; install it with" in unescape(part) and "<math" not in part and r"<code>\tilde{\mathbf{M}}" in part

@@ -9,7 +9,7 @@ import pytest
 
 import symdyn as sd
 from symdyn import systems
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 
 def driven() -> sd.System:

@@ -15,7 +15,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationWarning, SimulationInterrupted, SimulationWarning
-from symdyn.runtime.batch_arguments import take_rows
+from symdyn.runtime.batches.arguments import take_rows
 from tests.user_functions import BOUNDED
 
 N = 11  # more than two vectors of four lanes, and some left over

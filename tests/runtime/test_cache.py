@@ -24,13 +24,13 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import CacheError, CacheWarning, CompileError
-from symdyn.runtime import cache as subject
-from symdyn.runtime import cache_folder, objects
-from symdyn.runtime import compiler as compilers
-from symdyn.runtime.cache import SUFFIX, build, cache_dir, load
-from symdyn.runtime.compiler import Compiler, find_compiler
-from symdyn.runtime.recall import recall
-from symdyn.runtime.unit import PythonUnit
+from symdyn.runtime.building import cache as subject
+from symdyn.runtime.building import cache_folder, objects
+from symdyn.runtime.building import compiler as compilers
+from symdyn.runtime.building.cache import SUFFIX, build, cache_dir, load
+from symdyn.runtime.building.compiler import Compiler, find_compiler
+from symdyn.runtime.building.library import PythonUnit
+from symdyn.runtime.building.recall import recall
 
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="the compilers of these tests are shell scripts"
@@ -169,8 +169,8 @@ def worker(tmp_path: Path) -> subprocess.Popen[str]:
     """Another process that loads the kernel with the fake compiler and prints its value."""
     program = (
         "import ctypes, sys\n"
-        "from symdyn.runtime.cache import load\n"
-        "from symdyn.runtime.compiler import Compiler\n"
+        "from symdyn.runtime.building.cache import load\n"
+        "from symdyn.runtime.building.compiler import Compiler\n"
         "compiler = Compiler((sys.argv[1],), 'other', 'fakecc 1.0')\n"
         "kernel = load(sys.argv[2], 'm', compiler).kernel\n"
         "kernel.restype, kernel.argtypes = ctypes.c_double, [ctypes.c_double]\n"

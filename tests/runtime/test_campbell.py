@@ -14,8 +14,8 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, NoEquilibrium
-from symdyn.runtime.statics.campbell import Campbell
-from symdyn.runtime.statics.multiblade import Rotor
+from symdyn.statics.campbell import Campbell
+from symdyn.statics.multiblade import Rotor
 
 HALF, ROOT = sp.Rational(1, 2), sp.sqrt(3) / 2
 HUB = {"M": 10.0, "J": 1.0, "m": 1.5, "e": 0.3, "r": 1.2, "k_h": 900.0, "k_b": 4.0, "d": 0.0}
@@ -203,7 +203,7 @@ def test_sets_hold_the_same_coordinate_of_every_blade() -> None:
 def test_picture_of_many_modes() -> None:
     """One colour for each part, a name at every right end; what lies far above is left out and reported; rpm above."""
     pytest.importorskip("matplotlib")
-    from symdyn.runtime.pictures.campbell import part
+    from symdyn.pictures.campbell import part
 
     names = [*[f"blade1_{n} {w}" for n in ("flap1", "edge1", "flap2") for w in ("backward", "collective", "forward")],
              "tower_fa1", "tower_ss1", "x", "y", "yaw"]

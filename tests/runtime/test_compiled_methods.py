@@ -14,12 +14,12 @@ import symdyn as sd
 from symdyn.backend.methods import METHODS
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.pipeline import emit
-from symdyn.runtime import methods, simulate
-from symdyn.runtime.automatic import Modes, automatic
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.inputs import Inputs
-from symdyn.runtime.methods import COMPILED
-from symdyn.runtime.outcome import Outcome, Request
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating import methods, simulate
+from symdyn.runtime.integrating.automatic import Modes, automatic
+from symdyn.runtime.integrating.methods import COMPILED
+from symdyn.runtime.integrating.outcome import Outcome, Request
 from tests.runtime.constrained import module as constrained
 
 START = {"q": {"q1": 2.0}, "u": {"q1_dot": 0.5}}

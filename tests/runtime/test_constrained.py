@@ -13,8 +13,8 @@ import pytest
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.stops import lost_rank
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating.stops import lost_rank
 from tests.runtime.constrained import module
 
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow", "-fsyntax-only"]

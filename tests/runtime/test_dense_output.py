@@ -10,7 +10,7 @@ import pytest
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, SimulationWarning
 from symdyn.lab.dense_output import METHODS, Result, main, measure, misfit, problems, table
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from tests.runtime.constrained import module as constrained
 
 STIFF, TRANSIENT, SMOOTH = 3, 4, 0

@@ -10,8 +10,8 @@ import pytest
 
 import symdyn as sd
 from symdyn.cli.summary import summarize
-from symdyn.runtime import run_tables
-from symdyn.runtime.run_report import write_report
+from symdyn.runtime.solutions import tables as run_tables
+from symdyn.runtime.solutions.report import write_report
 
 G = 9.81
 

@@ -14,11 +14,11 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, EquilibriumNotUnique, NoEquilibrium, SimulationWarning
-from symdyn.runtime.statics.equilibria import _turn, same
-from symdyn.runtime.statics.equilibrium import begin
-from symdyn.runtime.statics.gimbal import lock
-from symdyn.runtime.statics.search import Search
-from symdyn.runtime.statics.selection import select
+from symdyn.statics.equilibria import _turn, same
+from symdyn.statics.equilibrium import begin
+from symdyn.statics.gimbal import lock
+from symdyn.statics.search import Search
+from symdyn.statics.selection import select
 
 
 @functools.cache

@@ -14,14 +14,14 @@ from typing import Any
 import pytest
 
 import symdyn.runtime
-import symdyn.runtime.statics
+import symdyn.statics
 from symdyn.pipeline import emit, write_source
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
 SYMBOLIC = {"sympy", "mpmath", "jinja2"}
 HEAVY = SYMBOLIC | {"numpy", "scipy", "matplotlib", "tqdm"}
-RUNTIME = [f"{package.__name__}.{m.name}" for package in (symdyn.runtime, symdyn.runtime.statics)
+RUNTIME = [f"{package.__name__}.{m.name}" for package in (symdyn.runtime, symdyn.statics)
            for m in pkgutil.iter_modules(package.__path__)]
 
 
@@ -38,7 +38,7 @@ def test_import_symdyn_costs_next_to_nothing(tmp_path: Path) -> None:
     assert not HEAVY & imported("import symdyn; symdyn.__version__; dir(symdyn)", tmp_path)
     assert not HEAVY & imported("import symdyn; symdyn.SymdynError, symdyn.ModelError", tmp_path)
     assert not HEAVY & imported("import symdyn; symdyn.systems.names()", tmp_path)
-    assert not HEAVY & imported("import symdyn.runtime.compiler, symdyn.runtime.cache", tmp_path)
+    assert not HEAVY & imported("import symdyn.runtime.building.compiler, symdyn.runtime.building.cache", tmp_path)
 
 
 def test_names_come_when_they_are_used(tmp_path: Path) -> None:
@@ -63,8 +63,8 @@ import json, sys
 from pathlib import Path
 from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.runtime.module import Module
-from symdyn.runtime.unit import CUnit, PythonUnit
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit
+from symdyn.runtime.building.compiler import find_compiler
 metadata = ModuleMetadata.of_plain(json.loads(Path("metadata.json").read_text()))
 def provide(what):
     name = what if isinstance(what, str) else "rhs"

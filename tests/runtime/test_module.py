@@ -14,7 +14,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, CompilerNotFound, EvaluationError, SymdynError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
 
 

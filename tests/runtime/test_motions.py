@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline, UnivariateSpline, make_interp_spline
 import symdyn as sd
 from symdyn.errors import ArgumentError, ModelError
 from symdyn.formulation.equations import Equations
-from symdyn.runtime.following import take_motion
+from symdyn.runtime.inputs.following import take_motion
 
 z = sd.motions("z")
 q, q2 = sd.coordinates("q q2")

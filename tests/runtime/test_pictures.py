@@ -20,14 +20,14 @@ import symdyn
 from symdyn import systems
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.runtime.module import Module
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions.solution import Solution
 
 pytest.importorskip("matplotlib")
 image = pytest.importorskip("PIL.Image")
 
-from symdyn.runtime.pictures import animate, plot  # noqa: E402
-from symdyn.runtime.pictures.drawing import Drawing  # noqa: E402
-from symdyn.runtime.pictures.points import points_of  # noqa: E402
+from symdyn.pictures import animate, plot  # noqa: E402
+from symdyn.pictures.drawing import Drawing  # noqa: E402
+from symdyn.pictures.points import points_of  # noqa: E402
 
 ROOT = str(Path(symdyn.__file__).parents[1])
 OPTIONS: dict[str, dict[str, Any]] = {"n_link_pendulum": {"n": 3}, "spatial_chain": {"n": 4}, "prismatic_chain": {"n": 3}}

@@ -16,15 +16,16 @@ import symdyn as sd
 from symdyn.cli import main
 from symdyn.cli.summary import summarize
 from symdyn.errors import ArgumentError, SimulationWarning
-from symdyn.runtime import run_report, run_tables
 from symdyn.runtime.module import Module
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions import report as run_report
+from symdyn.runtime.solutions import tables as run_tables
+from symdyn.runtime.solutions.solution import Solution
 from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
 
-from symdyn.runtime.pictures import embedded
-from symdyn.runtime.pictures.panels import Panel
+from symdyn.pictures import embedded
+from symdyn.pictures.panels import Panel
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -215,7 +216,7 @@ def test_curves_that_would_flatten_others_have_axes_of_their_own() -> None:
 def test_files_that_cannot_be_written_are_refused(solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ArgumentError, match=r"cannot write the report to run.pdf: the ending must be \.html"):
         solution.report(tmp_path / "run.pdf")
-    monkeypatch.setattr("symdyn.runtime.run_report.page", lambda solution: "")
+    monkeypatch.setattr("symdyn.runtime.solutions.report.page", lambda solution: "")
     (tmp_path / "taken").write_text("")
     with pytest.raises(ArgumentError, match="the report cannot be written to"):
         solution.report(tmp_path / "taken" / "run.html")

@@ -12,7 +12,7 @@ import scipy.linalg
 import sympy as sp
 
 import symdyn as sd
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 MASS, K_P, K_D, PERIOD = 2.0, 8.0, 4.0, 0.05
 SCIPY = ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]

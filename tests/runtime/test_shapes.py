@@ -17,19 +17,19 @@ from symdyn.errors import ArgumentError, ModelError
 from symdyn.model.faults import Faults
 from symdyn.model.shapes import drawn
 from symdyn.runtime.module import Module
-from symdyn.runtime.solution import Solution
+from symdyn.runtime.solutions.solution import Solution
 
 pytest.importorskip("matplotlib")
 image = pytest.importorskip("PIL.Image")
 
 from matplotlib.figure import Figure  # noqa: E402
 
-from symdyn.runtime.pictures.bodies import make_axes  # noqa: E402
-from symdyn.runtime.pictures.drawing import Drawing  # noqa: E402
-from symdyn.runtime.pictures.meshes import Part, parts_of  # noqa: E402
-from symdyn.runtime.pictures.painter import Camera, cut, order, planes  # noqa: E402
-from symdyn.runtime.pictures.scene import Scene  # noqa: E402
-from symdyn.runtime.pictures.solids import Solids, part_way  # noqa: E402
+from symdyn.pictures.bodies import make_axes  # noqa: E402
+from symdyn.pictures.drawing import Drawing  # noqa: E402
+from symdyn.pictures.meshes import Part, parts_of  # noqa: E402
+from symdyn.pictures.painter import Camera, cut, order, planes  # noqa: E402
+from symdyn.pictures.scene import Scene  # noqa: E402
+from symdyn.pictures.solids import Solids, part_way  # noqa: E402
 
 S = sd.shapes
 

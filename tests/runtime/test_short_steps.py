@@ -13,7 +13,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import SimulationWarning
-from symdyn.runtime import compiled, scipy_run, short_steps
+from symdyn.runtime.integrating import compiled, scipy_run, short_steps
 
 
 @pytest.fixture(scope="module")

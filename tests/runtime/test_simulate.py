@@ -27,8 +27,8 @@ from symdyn.errors import (
     SimulationInterrupted,
     SimulationWarning,
 )
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.methods import COMPILED
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating.methods import COMPILED
 
 ROOT = Path(__file__).parents[2]
 
@@ -501,7 +501,7 @@ PROGRAM = """
 import signal, sys, time
 sys.path.insert(0, {root!r})
 from symdyn.errors import SimulationInterrupted
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from tests.mechanisms import driven_oscillator
 module = driven_oscillator().embedding().compile(backend={backend!r})
 usual = signal.getsignal(signal.SIGINT)

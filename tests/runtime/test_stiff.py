@@ -14,8 +14,8 @@ import symdyn as sd
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError, SimulationWarning
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.run_tables import facts
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.solutions.tables import facts
 from tests.runtime.constrained import module as constrained
 
 

@@ -14,10 +14,10 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ArgumentError, SimulationWarning, UnsupportedExpression
 from symdyn.pipeline import emit
-from symdyn.runtime.compiled import run_compiled
-from symdyn.runtime.inputs import Inputs
-from symdyn.runtime.outcome import Request
-from symdyn.runtime.stabilization import Stabilization
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.compiled import run_compiled
+from symdyn.runtime.integrating.outcome import Request
+from symdyn.runtime.integrating.stabilization import Stabilization
 from tests.helpers import GRAVITY, swing
 from tests.oracles.random_trees import random_tree
 from tests.runtime.constrained import module as constrained

@@ -13,7 +13,7 @@ import scipy.linalg
 import sympy as sp
 
 import symdyn as sd
-from symdyn.runtime.statics.regulator import Regulator
+from symdyn.statics.regulator import Regulator
 
 
 @functools.cache

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.runtime.statics.modes import Mode, Modes
+from symdyn.statics.modes import Mode, Modes
 from tests.runtime.test_campbell import rotor
 from tests.statics.test_frozen_time import free_rotor
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.runtime.charts import distances
+from symdyn.runtime.integrating.charts import distances
 from symdyn.stress.attitude import free_body
 
 

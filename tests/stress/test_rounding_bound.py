@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler, plain
-from symdyn.runtime.unit import CUnit
+from symdyn.runtime.building.compiler import find_compiler, plain
+from symdyn.runtime.building.library import CUnit
 from symdyn.stress import attitude, rounding
 from symdyn.stress.coded import imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, set_aside

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units, yardstick
 from symdyn.stress.finding import Finding, judged
 from symdyn.stress.record import FAIL, PASS, NotApplicable, Row

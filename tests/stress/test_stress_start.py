@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.stress.extremes import masses
 from symdyn.stress.flow import stands_still
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, StandsStill
@@ -154,7 +154,7 @@ def test_lengths_count_against_those_of_the_mechanism() -> None:
 
 
 def test_the_report_says_that_nothing_moves(tmp_path: Any) -> None:
-    from symdyn.report import full
+    from symdyn.overview import page as full
 
     part = full.Part("Condition")
     full._show_condition(part, Subject(crane()))

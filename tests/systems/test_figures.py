@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.peers import arm
-from symdyn.bench.peers.models import CASES
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab.peers import arm
+from symdyn.lab.peers.models import CASES
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
 
 

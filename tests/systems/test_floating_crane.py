@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 import symdyn as sd
-from symdyn.bench.turbine import States, values
+from symdyn.lab.turbine import States, values
 
 HELD = {"x": 0.0, "y": 0.0, "psi": 0.0}  # nothing else holds them
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.loop_cases import REFERENCE
-from symdyn.runtime.compiler import find_compiler
+from symdyn.lab.loop_cases import REFERENCE
+from symdyn.runtime.building.compiler import find_compiler
 
 VARIANTS = [*[(name, {}) for name in sd.systems.names(constrained=True)], ("n_four_bar", {"n": 1}),
             ("particle_on_moving_slope", {"rocking": True}), ("flyball_governor", {"links": "rods"})]

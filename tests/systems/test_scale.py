@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.random_tree import random_tree
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.numbers import NumericTree
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.numbers import NumericTree
+from symdyn.lab.random_tree import random_tree
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import symdyn as sd
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 from symdyn.systems.platforms import BASE, PLATFORM
 
 TOLERANCE = 1e-12

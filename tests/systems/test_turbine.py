@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.turbine import (
+from symdyn.errors import NoEquilibrium
+from symdyn.lab.turbine import (
     BARE,
     States,
     beam_numbers,
@@ -21,7 +22,6 @@ from symdyn.bench.turbine import (
     turbine,
     values,
 )
-from symdyn.errors import NoEquilibrium
 from symdyn.systems import nrel_5mw as nrel
 from symdyn.systems import nrel_5mw_tower
 from symdyn.systems.turbine_parts import BLADE_MODES, TOWER_MODES

@@ -14,8 +14,8 @@ from scipy.integrate import quad, solve_ivp
 
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.unit import CUnit, PythonUnit
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.catenary import Catenary, potential
 from symdyn.tape.differentiate import forward

@@ -12,8 +12,8 @@ import pytest
 
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError, UnsupportedExpression
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.unit import CUnit, PythonUnit
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.cube import Cube
 from symdyn.tape.differentiate import forward, reverse

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.bench.robots import collection
-from symdyn.bench.robots.agreement import differences
-from symdyn.bench.robots.collection import ROBOTS, Listed
 from symdyn.errors import MissingExtra, ModelError, ModelWarning
+from symdyn.lab.robots import collection
+from symdyn.lab.robots.agreement import differences
+from symdyn.lab.robots.collection import ROBOTS, Listed
 from tests.urdf.texts import ALL, BOX, joint, link, saved
 from tests.urdf.texts import robot as text_of
 
 pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
-from symdyn.bench.robots.pinocchio_robot import PinocchioRobot
+from symdyn.lab.robots.pinocchio_robot import PinocchioRobot
 
 # Of all sorts, without those that take longest: `symdyn bench robots` has them all, at 100 states each.
 LARGE = ("pr2", "tiago_pro", "baxter", "anymal_c_simple", "centauro", "g1_29dof_with_hand_rev_1_0", "g1_29dof_rev_1_0", "icub",

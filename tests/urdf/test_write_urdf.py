@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import symdyn as sd
-from symdyn.bench.robots import collection
 from symdyn.errors import ArgumentError, MissingExtra, ModelError, ModelWarning
+from symdyn.lab.robots import collection
 from symdyn.urdf.angles import angles, rotation
 from tests.urdf.texts import ALL, saved
 
@@ -56,8 +56,8 @@ def test_every_joint_is_read_back_equal(tmp_path: Path) -> None:
 
 def test_pinocchio_reads_it(tmp_path: Path) -> None:
     pytest.importorskip("pinocchio", reason="Pinocchio is not installed; run: pip install pin")
-    from symdyn.bench.robots.agreement import differences
-    from symdyn.bench.robots.pinocchio_robot import PinocchioRobot
+    from symdyn.lab.robots.agreement import differences
+    from symdyn.lab.robots.pinocchio_robot import PinocchioRobot
 
     system = sd.read_urdf(saved(tmp_path, TREE))
     model = system.check()

@@ -24,7 +24,7 @@ from symdyn.bench.work.timing import PASSES
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
 from symdyn.progress import bar as progress_bar
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 RESULTS = "results.json"
 STATE, BODIES = "coordinates (q) and speeds (u)", "poses (q) and velocities (u) of all bodies"

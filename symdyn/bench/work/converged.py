@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench import quad
-from symdyn.bench.extended import MORE, SPARE, WITH, Precise
-from symdyn.bench.extrapolation import integrate
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation
 from symdyn.errors import SymdynError
+from symdyn.precision import quad
+from symdyn.precision.extrapolation import integrate
+from symdyn.precision.motion import MORE, SPARE, WITH, Precise
 
 # Decimal digits of the local errors; the second run, which shows that they suffice, has more of them.
 DIGITS = 20

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from symdyn.runtime.compiler import find_compiler
-from symdyn.runtime.methods import COMPILED, is_compiled
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating.methods import COMPILED, is_compiled
 
 # Of SciPy, on the compiled right-hand side; measured if they are named.
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA", "RK23")

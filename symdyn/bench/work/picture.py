@@ -43,7 +43,7 @@ def write_pictures(benchmark: Benchmark, folder: Path) -> list[Path]:
 def picture(benchmark: Benchmark) -> Any:
     """The figure: a row of panels for the end and for every time of interest."""
     try:
-        from symdyn.runtime.pictures.figure import Picture
+        from symdyn.pictures.figure import Picture
     except ImportError:
         raise MissingExtra("pictures of the bench need matplotlib: pip install 'symdyn[plot]'") from None
     times: list[float | None] = [None, *[t for t in reversed(benchmark.at) if not math.isclose(t, benchmark.end)]]

@@ -16,7 +16,7 @@ import symdyn
 from symdyn.bench import kept
 from symdyn.bench.work import against
 from symdyn.errors import ArgumentError
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building.compiler import find_compiler
 
 # Folders of the package that shape neither the code that runs nor how it is measured.
 _BESIDE = ("cli", "comparison", "lecture", "report", "stress")

@@ -19,7 +19,7 @@ from symdyn.bench import kept
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Formulation
 from symdyn.errors import ArgumentError, EvaluationError, SymdynError
-from symdyn.runtime.cache import cache_dir
+from symdyn.runtime.building.cache import cache_dir
 
 STORE = Path(__file__).with_name("references.json")
 # Rates of the stored states may differ by this from the module's, relative to the largest, before they are another motion's.

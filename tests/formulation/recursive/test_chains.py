@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from symdyn import systems
-from symdyn.formulation.articulated import Articulated
-from symdyn.formulation.inertial_forces import inertial_forces
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.numbers import NumericTree
-from symdyn.formulation.tree import Tree
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.numbers import NumericTree
+from symdyn.formulation.trees.articulated import Articulated
+from symdyn.formulation.trees.inertial_forces import inertial_forces
+from symdyn.formulation.trees.tree import Tree
 from tests.formulation.recursive.trees import check, random_vector
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from symdyn.errors import SymdynError
-from symdyn.formulation.recursive.bias import bias, gravity_load
-from symdyn.formulation.recursive.composite_bodies import composite_bodies
-from symdyn.formulation.recursive.coriolis import coriolis
-from symdyn.formulation.recursive.energy import energy
+from symdyn.formulation.textbook.bias import bias, gravity_load
+from symdyn.formulation.textbook.composite_bodies import composite_bodies
+from symdyn.formulation.textbook.coriolis import coriolis
+from symdyn.formulation.textbook.energy import energy
 from tests import helpers
 from tests.formulation.recursive.trees import at, by_time, check, numeric, state
 
@@ -41,7 +41,7 @@ def test_in_floats(seed: int, options: dict[str, bool]) -> None:
 def test_matrix_of_two_links() -> None:
     """The textbook's: h = m2 l1 lc2 sin q2, C = [[-h q2_dot, -h (q1_dot + q2_dot)], [h q1_dot, 0]]."""
     from symdyn import systems
-    from symdyn.formulation.recursive.numbers import NumericTree
+    from symdyn.formulation.textbook.numbers import NumericTree
 
     model = systems.get("two_link_arm").check()
     (a, b), p = (0.7, -1.3), {s.name: v for s, v in model.defaults.items()}

@@ -15,11 +15,11 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn import systems
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.numbers import NumericTree
-from symdyn.formulation.recursive.page import Page
-from symdyn.formulation.recursive.velocities import velocities
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.numbers import NumericTree
+from symdyn.formulation.textbook.page import Page
+from symdyn.formulation.textbook.velocities import velocities
 from symdyn.model.symbols import symbols_of
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Output

@@ -10,14 +10,14 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import SymdynError
-from symdyn.formulation.recursive.composite_bodies import composite_bodies, held_inertia
-from symdyn.formulation.recursive.energy import energy
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import InverseDynamics, inverse_dynamics
-from symdyn.formulation.recursive.momentum import momentum
-from symdyn.formulation.recursive.numbers import Numbers, NumericTree
-from symdyn.formulation.recursive.velocities import base_acceleration, joint_accelerations
-from symdyn.formulation.tree import GROUND, Tree
+from symdyn.formulation.textbook.composite_bodies import composite_bodies, held_inertia
+from symdyn.formulation.textbook.energy import energy
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import InverseDynamics, inverse_dynamics
+from symdyn.formulation.textbook.momentum import momentum
+from symdyn.formulation.textbook.numbers import Numbers, NumericTree
+from symdyn.formulation.textbook.velocities import base_acceleration, joint_accelerations
+from symdyn.formulation.trees.tree import GROUND, Tree
 from tests import helpers
 from tests.formulation.recursive.trees import at, by_time, numeric, random_vector, state
 

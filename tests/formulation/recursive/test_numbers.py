@@ -14,10 +14,10 @@ import sympy as sp
 import symdyn as sd
 from symdyn import systems
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.formulation.recursive.doubles import Doubles
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.numbers import NumericTree, numeric_tree
+from symdyn.formulation.textbook.doubles import Doubles
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.numbers import NumericTree, numeric_tree
 from symdyn.tape import Tape
 from symdyn.tape.evaluate import evaluate
 from tests import helpers

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from symdyn.formulation.algebra import TapeAlgebra, leaves_of
-from symdyn.formulation.loads import Loads
-from symdyn.formulation.recursive.bias import gravity_load
-from symdyn.formulation.recursive.center_frame import at_center
-from symdyn.formulation.recursive.coriolis import coriolis
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.momentum import momentum
-from symdyn.formulation.recursive.page import Page
-from symdyn.formulation.recursive.velocities import joint_accelerations
-from symdyn.formulation.tree import build
+from symdyn.formulation.loads.recorded import Loads
+from symdyn.formulation.textbook.bias import gravity_load
+from symdyn.formulation.textbook.center_frame import at_center
+from symdyn.formulation.textbook.coriolis import coriolis
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.momentum import momentum
+from symdyn.formulation.textbook.page import Page
+from symdyn.formulation.textbook.velocities import joint_accelerations
+from symdyn.formulation.trees.tree import build
 from symdyn.spatial.sixvectors import force_cross
 from symdyn.tape import Recorder, Tape
 from symdyn.tape.evaluate import evaluate

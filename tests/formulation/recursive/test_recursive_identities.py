@@ -8,16 +8,17 @@ import pytest
 
 from symdyn import systems
 from symdyn.errors import SymdynError
-from symdyn.formulation import composite, inertial_forces, newton_euler
-from symdyn.formulation.articulated import Articulated
-from symdyn.formulation.kinematics import Kinematics
-from symdyn.formulation.recursive.bias import bias, gravity_load
-from symdyn.formulation.recursive.composite_bodies import composite_bodies
-from symdyn.formulation.recursive.energy import energy
-from symdyn.formulation.recursive.forward_dynamics import forward_dynamics
-from symdyn.formulation.recursive.inverse_dynamics import inverse_dynamics
-from symdyn.formulation.recursive.numbers import Numbers, NumericTree
-from symdyn.formulation.recursive.velocities import generalized, joint_accelerations, velocities
+from symdyn.formulation.textbook.bias import bias, gravity_load
+from symdyn.formulation.textbook.composite_bodies import composite_bodies
+from symdyn.formulation.textbook.energy import energy
+from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
+from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
+from symdyn.formulation.textbook.numbers import Numbers, NumericTree
+from symdyn.formulation.textbook.velocities import generalized, joint_accelerations, velocities
+from symdyn.formulation.trees import inertial_forces, newton_euler
+from symdyn.formulation.trees import mass_matrix as composite
+from symdyn.formulation.trees.articulated import Articulated
+from symdyn.formulation.trees.kinematics import Kinematics
 from tests import helpers
 from tests.formulation.recursive.trees import KINDS, RandomTree, at, by_time, check, numeric, random_vector, state
 

@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 import symdyn as sd
-from symdyn.formulation.recursive.numbers import Numbers, NumericTree
+from symdyn.formulation.textbook.numbers import Numbers, NumericTree
 from symdyn.model.orientation import SEQUENCES
 
 KINDS = ("revolute", "free", "universal", "prismatic", "body angles", "cylindrical", "angles", "helical", "free parameters",

@@ -25,7 +25,7 @@ import numpy as np
 from symdyn.bench.work.against.peer import Failed, Peer, Ran, Runner, Unfit
 from symdyn.bench.work.timing import one_pass
 from symdyn.errors import SymdynError
-from symdyn.runtime.compiler import LINUX
+from symdyn.runtime.building.compiler import LINUX
 
 # What is done for the first time, such as compiling for a tolerance, may take this part of what is left, s, and at least so many.
 _PART, _LEAST = 1 / 4, 1.0

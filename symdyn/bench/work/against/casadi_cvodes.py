@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.peers.toolchain import c_compiler, version
+from symdyn.bench.toolchain import c_compiler, version
 from symdyn.bench.work.against.peer import Failed, Ran, Runner
 from symdyn.bench.work.against.walk import ARITHMETIC, ELEMENTARY, right_hand_side
 from symdyn.errors import CompilerNotFound

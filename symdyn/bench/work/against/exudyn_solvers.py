@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.peers.toolchain import version
+from symdyn.bench.toolchain import version
 from symdyn.bench.work.against.mechanism import Tree, between, calibrated, tree_of
 from symdyn.bench.work.against.peer import Failed, Ran, Runner, Unfit, fitting
 from symdyn.bench.work.against.planar import Planar, planar_of

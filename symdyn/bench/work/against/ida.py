@@ -11,7 +11,7 @@ import numpy as np
 
 from symdyn.bench.work.against import sundials
 from symdyn.bench.work.against.peer import Ran, Runner, Unfit
-from symdyn.formulation.constrained import residual_names
+from symdyn.formulation.constraints.motion import residual_names
 from symdyn.tape.differentiate import jacobian
 
 _NORMAL, _ONE_STEP = 1, 2

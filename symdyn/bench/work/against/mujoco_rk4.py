@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from symdyn.bench.peers.toolchain import version
+from symdyn.bench.toolchain import version
 from symdyn.bench.work.against.mechanism import Link, Tree, between, calibrated, check_accelerations, tree_of
 from symdyn.bench.work.against.peer import Failed, Ran, Runner, fitting
 

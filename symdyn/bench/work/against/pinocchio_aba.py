@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.peers.toolchain import build_cpp, include_flags, package_folder, version
+from symdyn.bench.toolchain import build_cpp, include_flags, package_folder, version
 from symdyn.bench.work.against import casadi_cvodes
 from symdyn.bench.work.against.casadi_cvodes import family
 from symdyn.bench.work.against.mechanism import Tree, check_accelerations, tree_of

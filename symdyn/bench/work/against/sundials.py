@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.bench.peers import toolchain
+from symdyn.bench import toolchain
 from symdyn.bench.work.against.peer import LONGEST, Failed, Unfit
 from symdyn.bench.work.against.walk import constant_inputs
 from symdyn.errors import CompilerNotFound
 from symdyn.pipeline import emit
-from symdyn.runtime.compiler import require_compiler
-from symdyn.runtime.unit import CUnit, Frame
+from symdyn.runtime.building.compiler import require_compiler
+from symdyn.runtime.building.library import CUnit, Frame
 
 INSTALL = "scikit-sundae is not installed; run: pip install 'symdyn[peers]'"
 _PARTS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode", "ida")

@@ -1,0 +1,192 @@
+"""Solving M x + C^T lam = f, C x = d by eliminating dependent speeds: only M in the directions that C leaves must be regular.
+
+x = Z v + g with C Z = 0 and C g = d: Z^T M Z v = Z^T (f - M g), C_d^T lam = (f - M x)_d, where C_d are the columns of C of the
+dependent speeds, factorized as they are, in an order that is good at a sample state.
+Source: Benzi, Golub and Liesen, Numerical solution of saddle point problems, Acta Numerica 14 (2005), section 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.trees.mass_matrix import factorize
+from symdyn.spatial.vectors import congruence, inner, vector, zeros
+from symdyn.tape.node import Node, is_zero
+
+# Below this part of the size of its row, a pair of pivots below its square, a pivot takes too many digits away, from multipliers
+# those of its square: the kernel takes over.
+SMALLEST_PIVOT = Fraction(1, 10)
+# Pivots at the sample state are at least this part of the largest that there is.
+ADMITTED = 0.2
+# So few independent speeds are no reason to wait for their accelerations.
+FEW = 1
+
+
+class NullSpaceSolver:
+    """As statements.
+
+    pivots   (row, column) of C in the order of elimination; names: of the rows
+    least    squares of what the rows are compared with where they are small as a whole, (m,); default 0
+    columns  factors by which columns in other units compare, (n,); default 1
+    locking  speeds without which others move what they move at some positions, and these others (see locking)
+    """
+
+    def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, pivots: Sequence[tuple[int, int]], names: Sequence[str],
+                 speeds: Sequence[Any], least: Sequence[Any] = (), columns: Sequence[Any] = (),
+                 locking: Mapping[int, Collection[int]] | None = None) -> None:
+        self.algebra, self.M, self.C = algebra, M, C
+        self.least = least or [0] * len(C)
+        self.columns = vector(*(columns or [1] * C.shape[1]))
+        self.rows, self.d = [r for r, _ in pivots], [c for _, c in pivots]
+        self.i = [k for k in range(C.shape[1]) if k not in self.d]
+        with algebra.section("dependent speeds: C_r u_dot = F_d solved for them"):
+            self._factorize(names)
+            columns = [self._solve(-C[self.rows, k]) for k in self.i]
+            self.Z = zeros(C.shape[1], len(self.i))
+            for place, k in enumerate(self.i):
+                self.Z[k, place] = 1
+                self.Z[self.d, place] = algebra.name(f"Z_{k + 1}", columns[place])
+        with algebra.section("mass matrix of the independent speeds"):
+            self.MZ = M @ self.Z if self.i else zeros(len(M), 0)
+            reduced = congruence(M, self.Z)
+            algebra.name("Mi", reduced)
+            reasons = [f"the mass matrix under the constraints is not positive definite at {speeds[k]}" for k in self.i]
+            sizes = self._sizes(reduced, locking or {})
+            self.factors = factorize(algebra, reduced, reasons, "i", dict.fromkeys(sizes, algebra.rounding), sizes)
+
+    def _sizes(self, reduced: np.ndarray, locking: Mapping[int, Collection[int]]) -> dict[int, Any]:
+        """What pivots of the reduced mass matrix are compared with: those of the first independent speed of a motion that may
+        have no kinetic energy. Where other speeds of it are dependent, the entry that the pivot comes from may vanish itself."""
+        sizes: dict[int, Any] = {}
+        for first, others in locking.items():
+            dependent = any(k in self.d for k in (first, *others))
+            for k in (first,) if first in self.i else others:
+                if k in self.i:
+                    place = self.i.index(k)
+                    sizes[place] = reduced[place, place] + (self.M[k, k] if dependent else 0)
+        return sizes
+
+    def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        g = zeros(len(f))
+        if not all(is_zero(e) for e in d):
+            g[self.d] = self._solve(d[self.rows])
+        left = f - self.M @ g
+        v = self.factors.solve(vector(*[inner(self.Z[:, k], left) for k in range(len(self.i))]))
+        x = g + (self.Z @ v if len(v) else zeros(len(f)))
+        lam = zeros(len(d))
+        lam[self.rows] = self._multipliers(left, v)
+        return x, lam
+
+    def _multipliers(self, left: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """lam of C_d^T lam = (f - M x)_d, f - M x = left - M Z v; of few v column by column, so that little waits for them."""
+        if len(v) > FEW:
+            return self._solve_transposed(left[self.d] - self.MZ[self.d] @ v)
+        lam = self._solve_transposed(left[self.d])
+        for k, speed_rate in enumerate(v):
+            lam = lam - self._solve_transposed(self.MZ[self.d, k]) * speed_rate
+        return lam
+
+    # -- C_d = L U by blocks of one or two rows, in the order of the pivots; U with ones on its diagonal blocks
+
+    def _factorize(self, names: Sequence[str]) -> None:
+        A = self.C[np.ix_(self.rows, self.d)].copy()
+        n = len(A)
+        self.blocks = _blocks(A)
+        self.inverse: list[np.ndarray] = []
+        for b in self.blocks:
+            k, after = list(b), list(range(b.stop, n))
+            rows = [self.rows[p] for p in b]
+            scaled = [self.C[row] * self.columns for row in rows]
+            sizes = [inner(row, row) + self.least[place] for row, place in zip(scaled, rows, strict=True)]
+            label = " and ".join(names[self.rows[p]] for p in b)
+            self.inverse.append(self._inverse(A[np.ix_(k, k)], sizes, label, b.start))
+            if after:
+                A[np.ix_(k, after)] = self.inverse[-1] @ A[np.ix_(k, after)]
+                A[np.ix_(after, after)] = A[np.ix_(after, after)] - A[np.ix_(after, k)] @ A[np.ix_(k, after)]
+        self.LU = A
+
+    def _inverse(self, A: np.ndarray, sizes: Sequence[Any], label: str, place: int) -> np.ndarray:
+        """Of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from, scaled."""
+        a = self.algebra
+        determinant = A[0, 0] if len(A) == 1 else A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
+        if isinstance(determinant, Node):
+            least: Any = SMALLEST_PIVOT ** (2 * len(A))
+            for size in sizes:
+                least = least * size
+            scaled = determinant
+            for column in self.d[place:place + len(A)]:
+                scaled = scaled * self.columns[column]
+            reason = f"the dependent speeds do not follow from {label} here"
+            determinant = a.recorder.guard(determinant, scaled * scaled - least, reason)
+        over = a.name(f"iC{place + 1}", a.recorder.div(1, determinant))
+        if len(A) == 1:
+            return np.array([[over]], dtype=object)
+        return np.array([[A[1, 1] * over, -A[0, 1] * over], [-A[1, 0] * over, A[0, 0] * over]], dtype=object)
+
+    def _solve(self, right: np.ndarray) -> np.ndarray:
+        """y with C_d y = right, (m,)."""
+        y = np.array(right, dtype=object)
+        for b, inverse in zip(self.blocks, self.inverse, strict=True):
+            k = slice(b.start, b.stop)
+            y[k] = inverse @ y[k]
+            if b.stop < len(y):
+                y[b.stop:] = y[b.stop:] - self.LU[b.stop:, k] @ y[k]
+        for b in reversed(self.blocks):
+            if b.start:
+                y[:b.start] = y[:b.start] - self.LU[:b.start, b.start:b.stop] @ y[b.start:b.stop]
+        return y
+
+    def _solve_transposed(self, right: np.ndarray) -> np.ndarray:
+        """y with C_d^T y = right, (m,)."""
+        y = np.array(right, dtype=object)
+        for b in self.blocks:
+            if b.start:
+                y[b.start:b.stop] = y[b.start:b.stop] - self.LU[:b.start, b.start:b.stop].T @ y[:b.start]
+        for b, inverse in zip(reversed(self.blocks), reversed(self.inverse), strict=True):
+            if b.stop < len(y):
+                y[b.start:b.stop] = y[b.start:b.stop] - self.LU[b.stop:, b.start:b.stop].T @ y[b.stop:]
+            y[b.start:b.stop] = inverse.T @ y[b.start:b.stop]
+        return y
+
+
+def _blocks(A: np.ndarray) -> list[range]:
+    """Pairs of pivots whose rows and columns meet in all four entries: two pivots for one division. Others stand alone."""
+    blocks: list[range] = []
+    k = 0
+    while k < len(A):
+        paired = k + 1 < len(A) and not any(is_zero(e) for e in (A[k, k + 1], A[k + 1, k]))
+        blocks.append(range(k, k + 2 if paired else k + 1))
+        k = blocks[-1].stop
+    return blocks
+
+
+def elimination_order(sample: np.ndarray, structure: np.ndarray) -> list[tuple[int, int]] | None:
+    """Pivots (row, column) for a C of full rank, large at the sample and with little fill-in (Markowitz); None if there are none.
+
+    sample (m, n): C at a state, scaled; structure (m, n): where C is not zero by structure
+    """
+    A, filled = sample.astype(float).copy(), structure.copy()
+    rows, columns = set(range(len(A))), set(range(A.shape[1]))
+    pivots: list[tuple[int, int]] = []
+    while rows:
+        r, c = sorted(rows), sorted(columns)
+        part = np.abs(A[np.ix_(r, c)])
+        if not part.size or part.max() < 1e-9:
+            return None
+        best = min(((filled[i, c].sum() - 1) * (filled[r, j].sum() - 1), -abs(A[i, j]), i, j)
+                   for i in r for j in c if filled[i, j] and abs(A[i, j]) >= ADMITTED * np.abs(A[i, c]).max() > 1e-9)
+        _, _, i, j = best
+        pivots.append((i, j))
+        rows.remove(i)
+        columns.remove(j)
+        for k in rows:
+            if A[k, j] != 0:
+                A[k] -= A[k, j] / A[i, j] * A[i]
+            if filled[k, j]:
+                filled[k] |= filled[i]
+            A[k, j] = 0.0
+    return pivots

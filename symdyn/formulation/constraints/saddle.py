@@ -1,0 +1,129 @@
+"""Solving M x + C^T lam = f, C x = d, with M symmetric and C of few rows.
+
+Source: Benzi, Golub and Liesen, Numerical solution of saddle point problems, Acta Numerica 14 (2005), sections 5 and 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+
+from symdyn.formulation.trees.mass_matrix import Factors, factorize
+from symdyn.spatial.vectors import inner, vector, zeros
+from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
+from symdyn.tape.node import PARAMETER, Node, is_zero
+from symdyn.tape.recorder import Recorder
+
+# A pivot of the Schur complement below this part of its diagonal entry leaves too few digits: a constraint nearly depends
+# on the others, and the kernel takes over. The digits lost are those of this number.
+SMALLEST_PIVOT = 1e-6
+
+
+class SaddleSolver(Protocol):
+    """Gives x (n,) and lam (m,) for f (n,) and d (m,)."""
+
+    def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
+
+
+class RangeSolver:
+    """By the Schur complement S = C M^-1 C^T, with M = L^T D L factorized already.
+
+    names   of the rows
+    least   squares of the rows below which they are no constraint any more, (m,); default: none
+    """
+
+    def __init__(self, algebra: Any, factors: Factors, C: np.ndarray, names: Sequence[str], least: Sequence[Any] = ()) -> None:
+        self.factors, self.C = factors, C
+        n = len(factors.inverse_D)
+        with algebra.section("Schur complement C_r M^-1 C_r^T"):
+            self.Y = np.array([factors.inwards(row) for row in C], dtype=object).reshape(-1, n).T
+            self.Z = np.array([[0 if is_zero(e) else e * d for e in row]
+                               for row, d in zip(self.Y, factors.inverse_D, strict=True)], dtype=object).reshape(self.Y.shape)
+            S = zeros(len(C), len(C))
+            for i in range(len(C)):
+                for j in range(i + 1):
+                    S[i, j] = S[j, i] = inner(self.Y[:, i], self.Z[:, j])
+            algebra.name("S", S)
+            order = fewest_neighbours(S)
+            self.order = order
+            reasons = [f"constraint {names[k]} depends on the others here" for k in order]
+            for k, bound in enumerate(least):
+                if isinstance(S[k, k], Node) and any(isinstance(e, Node) and e.mask & ~PARAMETER for e in C[k]):
+                    margin = inner(C[k], C[k]) - bound
+                    S[k, k] = algebra.recorder.guard(S[k, k], margin, f"constraint {names[k]} holds nothing here")
+            self.S = factorize(algebra, S[np.ix_(order, order)], reasons, "S", dict.fromkeys(range(len(C)), SMALLEST_PIVOT))
+
+    def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        inwards = self.factors.inwards(f)
+        right = vector(*[inner(self.Z[:, k], inwards) - d[k] for k in range(len(d))])
+        found = self.S.solve(right[self.order])
+        lam = zeros(len(d))
+        lam[self.order] = found
+        return self.factors.outwards(inwards - (self.Y @ lam if len(lam) else zeros(len(f)))), lam
+
+
+class KernelSolver:
+    """By numeric algorithms that take a singular M and dependent rows; lam is the solution of least norm after scaling.
+
+    rows, columns   scales (m,) and (n,) of C that make its entries lengths by lengths
+    smoothed        see Saddle
+    """
+
+    def __init__(self, algebra: Any, M: np.ndarray, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], reason: str,
+                 smoothed: float = SMOOTHED) -> None:
+        self.recorder, self.M, self.C, self.smoothed = algebra.recorder, M, C, smoothed
+        self.rows, self.columns, self.reason = rows, columns, reason
+
+    def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        triangle = [self.M[i, j] for i in range(len(self.M)) for j in range(i + 1)]
+        m, n = self.C.shape
+        x = vector(*self.recorder.call(Saddle((n, m), self.reason), [
+            Fraction(repr(self.smoothed)), *triangle, *self.C.ravel(), *self.rows, *self.columns, *f, *d]))
+        return x, least_multipliers(self.recorder, self.C, self.rows, self.columns, f - self.M @ x, self.reason)
+
+
+def least_multipliers(recorder: Recorder, C: np.ndarray, rows: np.ndarray, columns: Sequence[Any], right: np.ndarray,
+                      reason: str) -> np.ndarray:
+    """lam (m,) of C^T lam = right, of least norm after scaling; scales as for KernelSolver."""
+    kernel = Multipliers((C.shape[1], len(C)), reason)
+    return vector(*recorder.call(kernel, [*C.ravel(), *rows, *columns, *right]))
+
+
+@dataclass(frozen=True)
+class SubsetSolver:
+    """With some of the rows only, which imply the others; the multipliers of these are 0.
+
+    kept   places of the rows among all n
+    """
+
+    solver: SaddleSolver
+    kept: list[int]
+    n: int
+
+    def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x, found = self.solver.solve(f, d[self.kept])
+        lam = zeros(self.n)
+        lam[self.kept] = found
+        return x, lam
+
+
+def fewest_neighbours(S: np.ndarray) -> list[int]:
+    """An order of the rows of a symmetric matrix in which eliminating from the last row to the first fills in little.
+
+    Minimum degree; Duff, Erisman and Reid, Direct Methods for Sparse Matrices, section 7.2.
+    """
+    near = [{j for j in range(len(S)) if j != i and not is_zero(S[i, j])} for i in range(len(S))]
+    left = set(range(len(S)))
+    eliminated: list[int] = []
+    while left:
+        k = min(left, key=lambda i: (len(near[i] & left), i))
+        left.remove(k)
+        neighbours = near[k] & left
+        for i in neighbours:
+            near[i] |= neighbours - {i}
+        eliminated.append(k)
+    return eliminated[::-1]

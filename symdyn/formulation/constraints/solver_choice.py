@@ -1,0 +1,143 @@
+"""How accelerations of constrained motion are computed: by statements, in the way that takes the fewest operations, and by the
+numeric algorithm where these lose their digits, or where no statements would do."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from symdyn.errors import ModelWarning
+from symdyn.formulation.constraints.motion import Constrained
+from symdyn.formulation.constraints.null_space import elimination_order
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.printed.augmented import AugmentedEquations
+from symdyn.formulation.probes.dependent_rows import Ranks
+from symdyn.formulation.probes.rank import first_dependent
+from symdyn.tape.node import is_zero
+from symdyn.tape.tape import Tape
+
+Q = TypeVar("Q", bound=Constrained)
+Rows = tuple[int, ...]
+Pivots = tuple[tuple[int, int], ...]
+# Mass in a direction that the constraints leave, by the largest: below this there is none.
+MASSLESS = 1e-12
+# Orders of elimination that are compared, each the best at one state.
+CANDIDATES = 8
+
+
+def choose(derivation: Callable[[bool, Rows | None, Pivots | None], Q],
+           result: Callable[[Q, Equations | None], AugmentedEquations],
+           search: Callable[[Equations], Ranks | None]) -> AugmentedEquations:
+    """The equations with the cheapest accelerations that hold at every state.
+
+    derivation   (kernel, independent, pivots) -> quantities, all on one tape; see Constrained
+    result       (quantities, the same for states where these fail) -> equations
+    search       finds which rows depend on the others; None: unknown
+    """
+    quantities = derivation(True, None, None)
+    whole = result(quantities, None)
+    rows = quantities.rows
+    if not rows:
+        return result(derivation(False, None, None), None)
+    found = search(whole)
+    remarks = _remarks(whole, quantities, found)
+    independent = found.independent if found is not None and found.rank < len(rows) else None
+    ways: dict[str, Q] = {}
+    if not singular(quantities):
+        ways["Schur complement of the mass matrix"] = derivation(False, independent, None)
+    pivots = _pivots(quantities, found)
+    if pivots is not None:
+        dependent = ", ".join(str(quantities.speeds[column]) for _, column in pivots)
+        ways[f"elimination of the dependent speeds {dependent}"] = derivation(False, independent, pivots)
+    notes = list(remarks)
+    if independent is not None and found is not None:
+        left = [r.name for k, r in enumerate(rows) if k not in independent]
+        notes.append(f"constraints {', '.join(left)}: they depend on the others at every state tried; accelerations come without "
+                     f"them, multipliers of least norm with them (rank {found.rank} of {len(rows)})")
+    if not ways:
+        notes.append("mass matrix alone is singular: accelerations come from the numeric algorithm for the whole system")
+        return replace(whole, notes=(*whole.notes, *notes))
+    counts = {name: operations(way) for name, way in ways.items()}
+    best = min(counts, key=lambda name: counts[name])
+    others = [f"{name}, {count}" for name, count in counts.items() if name != best]
+    others.append(f"the numeric algorithm, which takes over where a pivot vanishes, {operations(quantities)}")
+    notes.append(f"accelerations by {best}: {counts[best]} operations ({'; '.join(others)})")
+    chosen = result(ways[best], whole)
+    return replace(chosen, notes=(*chosen.notes, *notes))
+
+
+def _remarks(equations: Equations, quantities: Constrained, found: Ranks | None) -> list[str]:
+    """What there is to say about the states and motions that the constraints allow; warns where there seem to be none."""
+    symbols = equations.symbols
+    used = {leaf.args[1] for leaf in equations.tape("C", "C_r", "C_t").inputs}
+    lacking = [p.name for p in symbols.parameters if p not in symbols.defaults and p.name in used]
+    if found is None:
+        if not lacking:
+            given = getattr(quantities, "prescribed", ())
+            drives = f"; the motion of {', '.join(given)} in the loops is prescribed and may leave none" if given else ""
+            warnings.warn(f"{equations.name}: no state was found that fulfils the constraints "
+                          f"{', '.join(equations.constraints)}{drives}; check the numbers in defaults, or give a state near one "
+                          f"in initial{', or a coordinate to one of these joints' if given else ''}", ModelWarning, stacklevel=5)
+            return []
+        return [f"constraints: whether they depend on each other is unknown, because {', '.join(lacking)} "
+                f"{'has no number' if len(lacking) == 1 else 'have no numbers'} in defaults"]
+    if found.vanishing:
+        rows = ", ".join(equations.constraints[k] for k in found.vanishing)
+        warnings.warn(f"{equations.name}: all derivatives of {rows} vanish at every consistent state found, so that it holds "
+                      "nothing there; pass a constraint that changes its sign where it is fulfilled, for a square its root",
+                      ModelWarning, stacklevel=5)
+    if found.rank < len(symbols.speeds):
+        return []
+    if not lacking and all(is_zero(e) for e in quantities.C_t()):  # with random numbers it may be theirs
+        warnings.warn(f"{equations.name}: the constraints leave no motion: their rank is {found.rank}, as many as there are "
+                      "speeds; remove one, unless it is the forces at rest that you are after", ModelWarning, stacklevel=5)
+    return ["motion: the constraints determine every speed, so that the forces do not change the motion"]
+
+
+def operations(quantities: Constrained) -> int:
+    """Of one evaluation of the accelerations."""
+    return Tape.of(quantities.algebra.recorder, accelerations=quantities.accelerations()).operations
+
+
+def singular(quantities: Constrained) -> bool:
+    """Whether M_tilde is singular at every state."""
+    M = quantities.recall("M_tilde")
+    return any(is_zero(M[k, k]) for k in range(len(M))) or first_dependent(quantities.algebra.recorder, M) is not None
+
+
+def _pivots(quantities: Constrained, found: Ranks | None) -> Pivots | None:
+    """Dependent speeds and their order, where the sample state allows it."""
+    if found is None or not found.independent:
+        return None
+    kept = list(found.independent)
+    C_r = quantities.C_r()[kept]
+    structure = np.array([[not is_zero(e) for e in row] for row in C_r], dtype=bool).reshape(C_r.shape)
+    if not _holds(found, kept):
+        return None
+    samples = found.samples[:, kept]
+    orders = {tuple(order) for A in samples[:: max(1, len(samples) // CANDIDATES)]
+              if (order := elimination_order(A, structure)) is not None}
+    if not orders:
+        return None
+    whole = np.linalg.svd(samples, compute_uv=False)[:, -1]
+
+    def usual(order: tuple[tuple[int, int], ...]) -> float:
+        """How far the dependent speeds are from losing their rows, at most of the states."""
+        part = np.linalg.svd(samples[:, :, [column for _, column in order]], compute_uv=False)[:, -1]
+        return float(np.quantile(part / whole, 0.1))
+
+    best = max(sorted(orders), key=usual)
+    return tuple((kept[row], column) for row, column in best)
+
+
+def _holds(found: Ranks, kept: list[int]) -> bool:
+    """Whether there is mass in every direction that the constraints leave."""
+    free = np.linalg.svd(found.samples[0, kept])[2][len(kept):].T
+    if not free.shape[1]:
+        return True
+    values = np.linalg.eigvalsh(free.T @ found.mass @ free)
+    return bool(values[0] > MASSLESS * max(np.abs(found.mass).max(), 1e-300))

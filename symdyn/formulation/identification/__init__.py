@@ -1,0 +1,1 @@
+"""What identification takes: regressors, inertial and base parameters."""

@@ -1,0 +1,1 @@
+"""What equations print, and where their entries come from."""

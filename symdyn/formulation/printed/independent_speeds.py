@@ -1,0 +1,171 @@
+"""What equations in independent speeds print: J, M_tilde, k_tilde, F_tilde and the equations of motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.formulation.equations import Equations
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from symdyn.analytic.conserved import ConservedQuantities
+    from symdyn.analytic.equilibria import EquilibriumPoints
+    from symdyn.analytic.linear import Linearized
+    from symdyn.formulation.printed.provenance import Explanation
+
+
+class MotionEquations(Equations):
+    """M_tilde u_dot + k_tilde = F_tilde; every property is explicit SymPy, simplified as far as its time limit allows."""
+
+    @property
+    def J(self) -> sp.Matrix:
+        """(6 n_b, n_u), planar (3 n_b, n_u): [v_G; omega] of every body = J u (+ given motion), n-frame."""
+        return self.explicit("J")
+
+    @property
+    def Jdot(self) -> sp.Matrix:
+        """Derivative of J by time, same shape."""
+        return self.explicit("Jdot")
+
+    @property
+    def Jd_qd(self) -> sp.Matrix:
+        """(6 n_b, 1), planar (3 n_b, 1): accelerations that remain when u_dot = 0, J_dot u (+ given motion)."""
+        return self.explicit("Jd_qd")
+
+    @property
+    def M_tilde(self) -> sp.Matrix:
+        """(n_u, n_u) J^T M J, symmetric."""
+        return self.explicit("M_tilde")
+
+    @property
+    def k_tilde(self) -> sp.Matrix:
+        """(n_u, 1) J^T (M J_dot u + Q J u)."""
+        return self.explicit("k_tilde")
+
+    @property
+    def F_tilde(self) -> sp.Matrix:
+        """(n_u, 1) J^T F with all loads and gravity."""
+        return self.explicit("F_tilde")
+
+    @property
+    def equations(self) -> tuple[sp.Eq, ...]:
+        """One equation a speed: (M_tilde u_dot + k_tilde)_i = F_tilde_i."""
+        left = self.M_tilde * self.accelerations + self.k_tilde
+        return tuple(sp.Eq(a, b, evaluate=False) for a, b in zip(left, self.F_tilde, strict=True))
+
+    # -- the names of analytical mechanics, and of SymPy's; see symdyn.analytic
+
+    @property
+    def mass_matrix(self) -> sp.Matrix:
+        """(n_u, n_u) M_tilde under the name that SymPy's mechanics uses: mass_matrix u_dot = forcing."""
+        return self.M_tilde
+
+    @property
+    def forcing(self) -> sp.Matrix:
+        """(n_u, 1) F_tilde - k_tilde under the name that SymPy's mechanics uses; under constraints without their forces."""
+        return self.explicit("forcing")
+
+    @property
+    def rhs(self) -> sp.Matrix:
+        """(n_q + n_u + n_z, 1) x_dot of x = [q; u; z], explicit: accelerations by Cramer's rule, as rhs() of SymPy's
+        KanesMethod gives it. Augmented equations have the right side of their matrix under this name, and x_dot in a
+        module only."""
+        return self.explicit("state_rates")
+
+    @property
+    def T(self) -> sp.Expr:
+        """Kinetic energy, J."""
+        return self.explicit("T")
+
+    @property
+    def V(self) -> sp.Expr:
+        """Potential energy of gravity, springs and load elements, J; other loads are in `power`, whether or not they have a
+        potential. Raises SymdynError for equations by hand."""
+        return self.explicit("V")
+
+    @property
+    def lagrangian(self) -> sp.Expr:
+        """T - V, J, in q, u and t."""
+        return self.explicit("lagrangian")
+
+    @property
+    def momenta(self) -> sp.Matrix:
+        """(n_u, 1) dT/du; conjugate to the coordinates where u = q_dot."""
+        return self.explicit("momenta")
+
+    @property
+    def momentum_symbols(self) -> sp.Matrix:
+        """(n_q, 1) symbols of the momenta, p_q1 of q1, in `hamiltonian` and `hamilton_equations`."""
+        from symdyn.analytic.lagrange import momentum_leaves
+
+        return sp.Matrix(list(momentum_leaves(self).values()))
+
+    @property
+    def hamiltonian(self) -> sp.Expr:
+        """Hamilton's function p . q_dot - L in coordinates, momenta and t, J. Raises SymdynError for quasi-velocities, and
+        where the mass matrix couples more than three speeds."""
+        return self.explicit("hamiltonian")
+
+    @property
+    def hamilton_equations(self) -> tuple[sp.Eq, ...]:
+        """q_dot = dH/dp, then p_dot = -dH/dq + loads without potential; under constraints less C_r^T lam, and the constraints.
+
+        Where the mass matrix couples more than two speeds, p_dot is in q and q_dot; where more than three, p = dT/dq_dot stands
+        in place of q_dot = dH/dp. Raises SymdynError for quasi-velocities."""
+        from symdyn.analytic.hamilton import equations_of
+
+        return equations_of(self)
+
+    @property
+    def christoffel(self) -> sp.ImmutableDenseNDimArray:
+        """(n, n, n) Christoffel symbols of the first kind: k_tilde_i = sum of c[i, j, k] u_j u_k where nothing is prescribed.
+
+        Raises SymdynError for quasi-velocities."""
+        n = len(self.symbols.speeds)
+        return sp.ImmutableDenseNDimArray(list(self.explicit("christoffel")), (n, n, n))
+
+    def conserved(self, undriven: bool = False) -> ConservedQuantities:
+        """Momenta and energy, or Jacobi's integral, that every motion keeps, each with its proof; undriven: with inputs zero.
+
+        See symdyn.analytic.conserved. Raises SymdynError where loads depend on accelerations or reactions."""
+        from symdyn.analytic.conserved import conserved
+
+        return conserved(self, undriven)
+
+    def linearized(self, about: Mapping[Any, Any] | None = None, hold: Any = ()) -> Linearized:
+        """M, C, K, A, B about a state of rest or a steady motion, explicit in the parameters, with its conditions.
+
+        about   coordinates, speeds, states, inputs by symbol or name -> numbers or expressions in parameters; left out: zero
+        hold    coordinates or speeds that are held
+        See symdyn.analytic.linear. Raises ArgumentError, and SymdynError for what has no constant linear equations."""
+        from symdyn.analytic.linear import linearized
+
+        return linearized(self, about, hold)
+
+    def equilibria(self, fixed: Mapping[Any, Any] | None = None, values: Mapping[Any, Any] | None = None) -> EquilibriumPoints:
+        """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
+
+        fixed    coordinates that are held, inputs, speeds of a steady motion -> numbers or expressions in parameters
+        values   numbers for parameters
+        See symdyn.analytic.equilibria. Raises SymdynError with the reason where there is no closed form."""
+        from symdyn.analytic.equilibria import equilibria
+
+        return equilibria(self, fixed, values)
+
+    def explain(self, quantity: str, *index: int, simplify: bool = True) -> Explanation:
+        """Where an entry comes from: `explain("M_tilde", i, j)` and `explain("k_tilde", i)`, indices from 0.
+
+        The contributions of each body, translational and rotational, and for k_tilde the centrifugal, Coriolis and gyroscopic
+        ones. See symdyn.formulation.printed.provenance.
+        """
+        from symdyn.formulation.printed.provenance import explain
+
+        return explain(self, quantity, *index, simplify=simplify)
+
+    def _repr_latex_(self) -> str:
+        from symdyn.report.printing import equation_latex
+
+        return equation_latex(self)

@@ -1,0 +1,1 @@
+"""Probes in numbers that decide the structure of equations before code is made."""

@@ -1,0 +1,154 @@
+"""Which rows of the constraints depend on the others, and which speeds on the others, found in numbers at consistent states:
+the initial one, and those that are reached from there by walking along the motions that the constraints leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symdyn.formulation.constraints.consistent_states import FULFILLED, ConstraintStates
+from symdyn.formulation.equations import Equations
+from symdyn.tape.floats import evaluate_rows
+
+# Singular values of the scaled Jacobian below this part of the largest count as zero.
+RANK_TOLERANCE = 1e-8
+# Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
+WALKS, STEPS, STRIDE = 6, 12, 0.25
+# Starts that are tried, the initial state and others up to 1 m or 1 rad away.
+STARTS = 8
+# Sets of random numbers that are tried for parameters without numbers.
+TRIES = 4
+# Derivatives smaller than this part of those beside a state vanish there.
+VANISHING = 1e-5
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """rank: the largest found, of the scaled C_r; independent: rows that have it, far from losing it at all states.
+
+    samples   (s, n_c, n_u) scaled C_r at the states; mass (n_u, n_u): M_tilde at the first of them
+    vanishing   rows whose derivatives vanish at all these states, but not beside them
+    """
+
+    rank: int
+    independent: tuple[int, ...]
+    samples: np.ndarray
+    mass: np.ndarray
+    vanishing: tuple[int, ...] = ()
+
+
+def search(equations: Equations, tries: int = TRIES) -> Ranks | None:
+    """The same as `ranks` where parameters have no numbers, too: these take random ones, a few times.
+
+    Random numbers make no rows dependent that are not with all numbers.
+    """
+    symbols = equations.symbols
+    missing = [p for p in symbols.parameters if p not in symbols.defaults]
+    if not missing:
+        return ranks(equations)
+    stream = np.random.default_rng(3)
+    initial = dict(symbols.initial)
+    for group in equations.unit_groups:
+        if not any(initial.get(q) for q in group):
+            initial[group[0]] = 1.0
+    for _ in range(tries):
+        numbers = {**symbols.defaults, **{p: float(stream.uniform(0.5, 1.5)) for p in missing}}
+        found = ranks(replace(equations, symbols=replace(symbols, defaults=numbers, initial=initial)))
+        if found is not None:
+            return found
+    return None
+
+
+def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
+    """The rank of the constraints at consistent states; None where parameters have no numbers, or no consistent one
+    is found near the initial one."""
+    symbols = equations.symbols
+    if any(p not in symbols.defaults for p in symbols.parameters):
+        return None
+    states = ConstraintStates(equations, symbols.defaults)
+    start = np.array([[float(symbols.initial.get(q, 0.0)) for q in symbols.coordinates]])
+    stream = np.random.default_rng(seed)
+    near = stream.uniform(-1, 1, (STARTS, start.shape[1]))
+    near[0] = 0  # the initial state itself; from a singular one no step leads on
+    near, residual = states.nearest(start + near)
+    if not (residual < FULFILLED).any():
+        return None
+    consistent = near[residual < FULFILLED]
+    q = consistent[:1]
+    places = np.concatenate([q, *walked(states, q, stream)])
+    samples = scaled(states, places)
+    sizes = np.linalg.svd(samples, compute_uv=False)
+    counts = (sizes > RANK_TOLERANCE * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
+    rank = int(counts.max(initial=0))
+    samples = samples[counts == rank]
+    mass = _mass(equations, states, np.concatenate([places, consistent]))
+    if mass is None:
+        return None
+    return Ranks(rank, _independent(samples, rank), samples, mass, _vanishing(states, places, stream))
+
+
+def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
+    """M_tilde at the first of the places (s, n_q) where it exists: not at gimbal lock where a joint follows angles."""
+    values = {**states.values, **dict(zip(states.names, places.T, strict=True))}
+    masses = evaluate_rows(equations.tape("M_tilde"), values, len(places))["M_tilde"]
+    there = np.isfinite(masses).all(axis=(1, 2))
+    return masses[int(np.argmax(there))] if there.any() else None
+
+
+def _vanishing(states: ConstraintStates, places: np.ndarray, stream: np.random.Generator) -> tuple[int, ...]:
+    """Holonomic rows whose derivatives are as good as none at all places (s, n_q), compared with those beside them."""
+    here = np.abs(states.at(places)["C_r"]).max(axis=(0, 2), initial=0.0)
+    beside = np.abs(states.at(places + stream.uniform(-0.5, 0.5, places.shape))["C_r"]).max(axis=2, initial=0.0)
+    beside = np.where(np.isfinite(beside), beside, 0.0).max(axis=0, initial=0.0)
+    return tuple(int(k) for k in np.flatnonzero(states.holonomic & (here <= VANISHING * beside)))
+
+
+def walked(states: ConstraintStates, q: np.ndarray, stream: np.random.Generator) -> Iterator[np.ndarray]:
+    """Consistent states (s, n_q) on walks from one (1, n_q), each going on in its direction as the constraints allow."""
+    now = np.repeat(q, WALKS, axis=0)
+    n_u = len(states.angular)
+    direction = stream.normal(size=(WALKS, n_u))
+    direction[1::2] = -direction[::2]
+    for _ in range(STEPS):
+        found = states.at(now)
+        onward = _along(scaled_of(states, found), direction)
+        size = np.linalg.norm(onward, axis=1, keepdims=True)
+        if not (size > 1e-6).any():
+            return
+        direction = onward / np.maximum(size, 1e-6)
+        now, residual = states.nearest(now + states.moved(found, STRIDE * direction))
+        kept = residual < FULFILLED
+        if not kept.any():
+            return
+        now, direction = now[kept], direction[kept]
+        yield now
+
+
+def scaled(states: ConstraintStates, q: np.ndarray) -> np.ndarray:
+    """C_r (s, n_c, n_u) at coordinates (s, n_q), lengths by lengths."""
+    return scaled_of(states, states.at(q))
+
+
+def scaled_of(states: ConstraintStates, found: dict[str, np.ndarray]) -> np.ndarray:
+    """The same of what the states give."""
+    turning = np.where(states.angular[None, :], found["length"][:, None], 1.0)
+    return found["C_r"] * found["C_scale"][..., None] / turning[:, None, :]  # type: ignore[no-any-return]
+
+
+def _along(A: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Directions (s, n_u) without what the rows of A (s, m, n_u) hold."""
+    held = np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ (A @ direction[..., None])
+    return direction - held[..., 0]  # type: ignore[no-any-return]
+
+
+def _independent(samples: np.ndarray, rank: int) -> tuple[int, ...]:
+    """Rows of full rank at the samples (s, n_c, n_u): one after the other the row goes that the others replace best where they
+    do it worst, by its part in the combinations of rows that vanish."""
+    kept = list(range(samples.shape[1]))
+    while len(kept) > rank:
+        left = np.linalg.svd(samples[:, kept])[0][:, :, rank:]
+        part = np.linalg.norm(left, axis=2).min(axis=0)
+        kept.pop(int(part.argmax()))
+    return tuple(kept)

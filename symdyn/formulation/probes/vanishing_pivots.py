@@ -1,0 +1,230 @@
+"""Speeds that at some positions move nothing that the speeds after them do not move already, although every mass is positive.
+
+The mass matrix loses rank there, and the pivot of such a speed vanishes but for rounding: of Euler angles at gimbal lock that of
+the first one, which is about (distance in rad)^2 of its diagonal entry; the same of joints with no mass between them whose axes
+may become parallel. No position does that to the other speeds, and generated code need not ask.
+
+A motion without kinetic energy moves no link in a direction in which it has mass. So a speed is sound if at some link its
+velocity, and the part of it that the speeds after it do not explain, have the same size at every position; it may lock if these
+sizes change, or if at every single link the speeds after it always explain it, so that only several links together do not. Links
+with mass that have one freedom each are seen at once.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.model.orientation import EulerParameters
+from symdyn.spatial.inertia import ArticulatedInertia, Inertia
+from symdyn.spatial.vectors import cross, inner
+from symdyn.tape.evaluate import evaluate
+from symdyn.tape.node import is_zero
+from symdyn.tape.recorder import Recorder
+from symdyn.tape.tape import Tape
+
+if TYPE_CHECKING:
+    from symdyn.formulation.trees.tree import Tree
+
+# Positions that are compared; squares of velocities that differ by less of them are the same, those below ZERO^2 are none.
+POSITIONS, ALIKE, ZERO = 3, 1e-9, 1e-11
+# Digits by which inertias are told from none, in squares.
+DIGITS, NOTHING = 40, 1e-50
+
+
+def lockable(tree: Tree, solid: bool = False) -> dict[int, frozenset[int]]:
+    """Places of the generalized speeds whose pivot of the mass matrix vanishes at some positions, each with those of the speeds
+    after it that may then move what it moves.
+
+    solid   only those that then move no link that has a mass at all, and so no constraint between such links; else links have
+            mass in some directions only where they are points or thin rods
+    """
+    return _Search(tree, solid).lockable()
+
+
+def massless(tree: Tree, k: int) -> bool:
+    """Whether link k has no mass and no inertia of its own; with parameters of the default 0 at 0, with others at any value."""
+    return tree.added_to(k) is None and not any(part.any() for part in _filled(tree, k))
+
+
+def felt(tree: Tree, k: int, twist: np.ndarray) -> bool:
+    """Whether link k has mass in the direction of a twist (6,), by what is zero in both; parameters as for `massless`."""
+    omega, v = (np.array([not is_zero(e) for e in half]) for half in (twist[:3], twist[3:]))
+    heavy, first, turning = _filled(tree, k)
+    across = [(first[i] and omega[j]) or (first[j] and omega[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    return bool((heavy & v).any() or (turning & omega).any() or any(across))
+
+
+def _filled(tree: Tree, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the mass (1,), the first moment (3,) and the inertia (3, 3) of a link's own are not zero."""
+    inertia = tree.links[k].inertia
+    whole = np.array([inertia.m, *inertia.h, *inertia.I.ravel()], dtype=object)
+    nodes = Tape.of(Recorder(), whole=whole)
+    if _idle(tree).isdisjoint(leaf.args[1] for leaf in nodes.inputs):
+        filled = np.array([not is_zero(e) for e in whole])
+    else:
+        filled = abs(_Position(tree, 0, False).numbers(whole)[0]) > math.sqrt(NOTHING)
+    return filled[:1], filled[1:4], filled[4:].reshape(3, 3)
+
+
+def _idle(tree: Tree) -> set[str]:
+    """Parameters of the default 0."""
+    return {p.name for p, value in tree.model.defaults.items() if value == 0}
+
+
+def behind(tree: Tree, k: int, twist: np.ndarray, blocks: Callable[[int], tuple[np.ndarray, np.ndarray]]) -> Any:
+    """What the pivot of a joint is compared with whose link k has no mass: how large the terms are that it is the rest of.
+
+    twist    of link k, (6,); blocks: of a link the (3, 3) of turning and of shifting of its inertia, with what hangs on it
+    Twice the kinetic energy of the next links with mass, all joints between held, without the products of turning and shifting,
+    which may cancel the rest.
+    """
+    total: Any = 0
+    for child, link in enumerate(tree.links):
+        if link.parent == k:
+            omega = link.R.T @ twist[:3]
+            v = link.R.T @ (twist[3:] + cross(twist[:3], link.r))
+            if massless(tree, child):
+                total = total + behind(tree, child, np.concatenate([omega, v]), blocks)
+            else:
+                turning, shifting = blocks(child)
+                total = total + inner(omega, turning @ omega) + inner(v, shifting @ v)
+    return total
+
+
+def places(row: np.ndarray) -> frozenset[int]:
+    """Where a row is not zero by structure."""
+    return frozenset(k for k, e in enumerate(row) if not is_zero(e))
+
+
+class _Search:
+    """`alive`: speeds that a motion without kinetic energy may have, as far as is known; those of beams bend them."""
+
+    def __init__(self, tree: Tree, solid: bool) -> None:
+        self.tree, self.solid = tree, solid
+        self.moving: list[frozenset[int]] = []
+        for link in tree.links:
+            before = self.moving[link.parent] if link.parent >= 0 else frozenset()
+            self.moving.append(before.union(*[places(row) for row in tree.D[link.speeds]]))
+        bending = [places(tree.D[place]) for body in tree.flexible for place in body.speeds]
+        self.alive = set(range(tree.D.shape[1])).difference(*bending)
+        self.positions = [_Position(tree, k, solid) for k in range(POSITIONS)]
+
+    def lockable(self) -> dict[int, frozenset[int]]:
+        sound: set[int] = set()
+        changing: dict[int, frozenset[int]] = {}
+        explained: dict[int, frozenset[int]] = {}
+        decided: set[int] = set()
+        for k in range(len(self.tree.links)):
+            speeds = sorted(self.alive & self.moving[k])
+            asked = [p for p in speeds if p not in decided]
+            if massless(self.tree, k) or not asked:
+                continue
+            found = {p: self._sound(k, p, [c for c in speeds if c > p]) for p in asked}
+            sound.update(p for p in asked if found[p])
+            after = {p: frozenset(c for c in speeds if c > p) for p in asked}
+            changing.update({p: after[p] for p in asked if found[p] is False})
+            explained.update({p: after[p] for p in asked if found[p] is None and after[p]})
+            if len(asked) == len(speeds) and all(found.values()):
+                self.alive.difference_update(speeds)
+            decided |= sound
+            # A link that has mass in all directions, and is not moved, moves nothing that hangs on it, either.
+            if not decided.issuperset(asked) and len(self.positions[0].directions(k)) == 6:
+                decided.update(asked)
+        together = {} if self.solid else explained
+        return {p: after for p, after in {**together, **changing}.items() if p not in sound}
+
+    def _sound(self, k: int, p: int, after: Sequence[int]) -> bool | None:
+        """Whether speed p always moves link k otherwise than the speeds after it do; None where it never does."""
+        tree, link = self.tree, self.tree.links[k]
+        alone = not after and (link.parent < 0 or p not in self.moving[link.parent])
+        along = [any(not is_zero(e) and p in places(row) for e, row in zip(entries, tree.D[link.speeds], strict=True))
+                 for entries in link.S]
+        if alone and felt(tree, k, np.array(along, dtype=int)):
+            return True
+        squares = np.array([position.squares(k, p, after) for position in self.positions])
+        if (squares < ZERO**2).all(axis=0).any():
+            return None
+        return bool((squares > ALIKE).all() and (np.ptp(squares, axis=0) < ALIKE * squares[0]).all())
+
+
+class _Position:
+    """A tree at random values of everything that it depends on; links are evaluated when they are first asked for."""
+
+    def __init__(self, tree: Tree, seed: int, solid: bool) -> None:
+        self.tree, self.solid = tree, solid
+        self.stream = random.Random(seed)
+        self.values = dict.fromkeys(_idle(tree), 0.0)
+        for joint in tree.model.joints:
+            if isinstance(getattr(joint, "orientation", None), EulerParameters):
+                p = [self.stream.uniform(0.5, 1.5) for _ in range(4)]
+                self.values.update({q.name: e / math.hypot(*p) for q, e in zip(joint.coordinates[-4:], p, strict=True)})
+        self._twists: dict[int, dict[int, np.ndarray]] = {}
+        self._directions: dict[int, np.ndarray] = {}
+
+    def squares(self, k: int, p: int, after: Sequence[int]) -> tuple[float, float]:
+        """Of the velocity that speed p gives to link k, in directions in which it has mass; and of its part that velocities by
+        the speeds `after` do not explain. NaN where it is no real number."""
+        twists, directions = self.twists(k), self.directions(k)
+        felt = directions @ twists[p]
+        others = np.array([directions @ twists[c] for c in after]).reshape(len(after), len(felt)).T
+        if not np.isfinite(others).all() or not np.isfinite(felt).all():
+            return math.nan, math.nan
+        rest = felt - others @ np.linalg.lstsq(others, felt, rcond=ZERO)[0]
+        return float(felt @ felt), float(rest @ rest)
+
+    def twists(self, k: int) -> dict[int, np.ndarray]:
+        """Velocity of link k, at its origin, link axes, (6,), by each speed that moves it."""
+        if k not in self._twists:
+            link, D = self.tree.links[k], self.tree.D[list(self.tree.links[k].speeds)]
+            own = sorted(frozenset().union(*map(places, D)))
+            R, r, S, D = map(_floats, self.numbers(link.R, link.r, link.S, D[:, own]))
+            found = dict(zip(own, (S @ D).T, strict=True))
+            before = self.twists(link.parent) if link.parent >= 0 else {}
+            for c, (*omega, x, y, z) in before.items():
+                carried = np.concatenate([R.T @ omega, R.T @ (np.array([x, y, z]) + np.cross(omega, r))])
+                found[c] = found.get(c, 0) + carried
+            self._twists[k] = found
+        return self._twists[k]
+
+    def directions(self, k: int) -> np.ndarray:
+        """Those in which link k has mass, (n, 6), orthonormal."""
+        if self.solid:
+            return np.eye(6)
+        if k not in self._directions:
+            link, added = self.tree.links[k], self.tree.added_to(k)
+            m, h, I = self.numbers(np.array(link.inertia.m, dtype=object), link.inertia.h, link.inertia.I)
+            whole = ArticulatedInertia.rigid(Inertia(m[()], h, I)).matrix()
+            if added is not None:
+                whole = whole + ArticulatedInertia(*self.numbers(added.A, added.H, added.M)).matrix()
+            self._directions[k] = np.linalg.qr(_floats(_independent(whole)).T)[0].T
+        return self._directions[k]
+
+    def numbers(self, *arrays: np.ndarray) -> list[np.ndarray]:
+        """Arrays of nodes in numbers of 40 digits; parameters of the default 0 are 0."""
+        tape = Tape.of(Recorder(), **{str(k): array for k, array in enumerate(arrays)})
+        for leaf in tape.inputs:
+            self.values.setdefault(leaf.args[1], self.stream.uniform(0.5, 1.5))
+        return list(evaluate(tape, self.values, DIGITS).values())
+
+
+def _floats(values: np.ndarray) -> np.ndarray:
+    """NaN for what is no real number."""
+    found = [float(e) if isinstance(e, int) or hasattr(e, "_mpf_") else math.nan for e in values.ravel()]
+    return np.array(found).reshape(values.shape)
+
+
+def _independent(rows: np.ndarray) -> np.ndarray:
+    """What is left of the rows of a matrix, by Gram and Schmidt with all digits; without those that depend on others."""
+    basis: list[np.ndarray] = []
+    for row in rows:
+        rest = row
+        for b in basis:
+            rest = rest - b * (inner(b, rest) / inner(b, b))
+        if inner(rest, rest) > NOTHING * inner(row, row):
+            basis.append(rest / max(abs(e) for e in rest))
+    return np.array(basis, dtype=object).reshape(-1, rows.shape[1])

@@ -1,0 +1,1 @@
+"""Trees of links: their motion, mass matrix, forces and reactions, by recursions on the tape."""

@@ -1,0 +1,121 @@
+"""Many states at once beside one after the other, and beside Pinocchio: `symdyn bench batch`.
+
+All figures of one line come from one run; the contestants take turns, and of each the best timing counts.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+import symdyn as sd
+from symdyn.errors import SymdynError
+from symdyn.lab.figures import Figure, print_figures
+from symdyn.lab.peers.contest import random_state
+from symdyn.lab.peers.description import describe
+from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
+from symdyn.lab.peers.symdyn_peer import symdyn_contestant
+from symdyn.runtime.batches.states import UNIT, tables_of
+from symdyn.runtime.building.library import Frame
+from symdyn.runtime.module import Module
+from symdyn.timing.loops import best_times
+
+STATES = 2000
+REPEATS = 100
+PENDULUMS = 10_000
+SINGLE = 200
+# Of each piece the best timing counts, as of each of those that are alone.
+PIECES = 50
+ROUNDS = 5
+
+
+def chain() -> Iterator[Figure]:
+    """The right-hand side of seven links: states in one call, their entries side by side."""
+    system = sd.systems.get("spatial_chain", n=7)
+    equations = system.equations()
+    module = equations.compile(backend="c")
+    x = np.random.default_rng(3).uniform(-1, 1, (module.metadata.sizes.x, STATES)).T
+    rows = np.ascontiguousarray(x)
+    same = bool((module.rhs_batch(0.0, x) == module.evaluate("rhs", 0.0, rows)).all())
+    state = random_state(equations)
+
+    def many(f: Callable[[], Any]) -> Callable[[int], None]:
+        def run(n: int) -> None:
+            for _ in range(n):
+                f()
+
+        return run
+
+    batch_out, out = np.empty(x.shape[::-1]).T, np.empty(rows.shape)
+    at_once = _direct(module, x, batch_out)
+    evaluator: Any = module.unit("rhs").evaluator("rhs")
+    evaluator.set_params(module.parameters())
+    given = (evaluator.t, rows, evaluator.ud, evaluator.inputs, evaluator.p, evaluator.c, out)
+    frame = Frame(STATES, *[a.ctypes.data for a in given], 0, 1, 0, 0, 0)
+    runs = [many(at_once), many(lambda: evaluator.call(ctypes.byref(frame))), symdyn_contestant(equations, state).run,
+            many(lambda: module.rhs_batch(0.0, x, out=batch_out))]
+    try:
+        runs.append(PinocchioPeer().contestant(describe(system.check()), state).run)
+    except SymdynError as error:
+        yield f"Pinocchio is left out: {str(error).splitlines()[0]}", np.nan, "", ""
+    times = best_times(runs, REPEATS)
+    batch, one = times[0] / STATES, times[1] / STATES
+    yield "spatial_chain(7): states at once", module.batch_width, "", ""
+    yield "spatial_chain(7): a state among many", batch * 1e9, "ns", ""
+    yield "spatial_chain(7): a state, one after the other", one * 1e9, "ns", ""
+    yield "spatial_chain(7): many at once are quicker by", one / batch, "x", ">= 5"
+    yield "spatial_chain(7): than where each waits for the one before", times[2] / batch, "x", ""
+    yield "spatial_chain(7): a state among many, called from Python", times[3] / STATES * 1e9, "ns", ""
+    if len(times) > 4:
+        yield "spatial_chain(7): Pinocchio's ABA in C++", times[4] * 1e9, "ns", ""
+        yield "spatial_chain(7): many at once are quicker than Pinocchio by", times[4] / batch, "x", ">= 25"
+    yield "spatial_chain(7): the bits of one state", float(same), "", ">= 1"
+
+
+def _direct(module: Module, x: np.ndarray, out: np.ndarray) -> Callable[[], Any]:
+    """The compiled function behind rhs_batch without Python around it, as the others are called."""
+    unit: Any = module.unit(UNIT)
+    kept = [np.zeros((1, 1)), x, np.zeros((1, 0)), module.parameters()[None, :], out, np.zeros(len(x), dtype=np.intc)]
+    call, tables, steps = unit.function("rhs_batch"), tables_of(kept[:4]), (ctypes.c_long * 2)(1, len(x))
+    n, result, codes = ctypes.c_long(len(x)), ctypes.c_void_p(out.ctypes.data), ctypes.c_void_p(kept[5].ctypes.data)
+    return lambda: call(n, tables, result, steps, codes) and kept
+
+
+def pendulums() -> Iterator[Figure]:
+    """Double pendulums for 10 s, each with its own steps: all at once, and some of them one after the other."""
+    module = sd.systems.get("double_pendulum").embedding().compile(backend="c")
+    rng = np.random.default_rng(4)
+    q, u, span = rng.uniform(-1.5, 1.5, (PENDULUMS, 2)), rng.uniform(-1, 1, (PENDULUMS, 2)), np.array([0.0, 10.0])
+    inside, called, at_once = np.full(SINGLE, np.inf), np.full(SINGLE, np.inf), np.full(PIECES, np.inf)
+    same = True
+    many = module.simulate_batch(q, u, t=(0, 10), rtol=1e-8)
+    for _ in range(ROUNDS):
+        for k, (some_q, some_u) in enumerate(zip(np.split(q, PIECES), np.split(u, PIECES))):
+            at_once[k] = min(at_once[k], module.simulate_batch(some_q, some_u, t=(0, 10), rtol=1e-8).seconds)
+        for k in range(SINGLE):
+            begun = clock.perf_counter()
+            one = module.simulate(span, q[k], u[k], rtol=1e-8)
+            called[k] = min(called[k], clock.perf_counter() - begun)
+            inside[k] = min(inside[k], one.integrator_seconds or np.inf)
+            same &= bool((one.x[-1] == many.x[k, -1]).all())
+    steps = many.n_steps + many.n_rejected
+    alone, outer = (times.sum() / steps[:SINGLE].sum() for times in (inside, called))
+    among = at_once.sum() / steps.sum()
+    yield "double_pendulum: motions that reached 10 s", float(many.success.sum()), "", f">= {PENDULUMS}"
+    yield "double_pendulum: a step among many", among * 1e9, "ns", ""
+    yield "double_pendulum: a step, one motion after the other", alone * 1e9, "ns", ""
+    yield "double_pendulum: many at once are quicker by", alone / among, "x", ">= 4"
+    yield "double_pendulum: than simulate() in a loop by", outer / among, "x", ""
+    yield "double_pendulum: the bits of one motion", float(same), "", ">= 1"
+
+
+GROUPS = (chain, pendulums)
+
+
+def run(only: Sequence[str] | None = None) -> int:
+    """Print the figures, or those of some groups; returns the number of those that miss their bound."""
+    return print_figures(GROUPS, only)

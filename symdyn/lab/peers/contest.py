@@ -1,0 +1,111 @@
+"""One mechanism, every contestant: exact counts of operations, and times measured side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape
+from symdyn.lab.peers.casadi_peer import CasadiPeer
+from symdyn.lab.peers.contestant import State
+from symdyn.lab.peers.description import describe
+from symdyn.lab.peers.models import Bound, Case
+from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
+from symdyn.lab.peers.race import agree, race
+from symdyn.lab.peers.symdyn_peer import symdyn_contestant
+from symdyn.model.system import System
+from symdyn.tape.tape import Tape
+
+SEED = 20
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was measured of one mechanism.
+
+    formulation       of symdyn's equations; operations, prologue, chain: of its right-hand side
+    leanest           operations of the candidate with the fewest, of which the fastest was taken
+    times             contestant -> ns of one evaluation; casadi_operations: form -> count
+    difference        of the accelerations, relative to their norm, the largest between contestants
+    """
+
+    model: str
+    formulation: str
+    operations: int
+    leanest: int
+    prologue: int
+    chain: int
+    times: dict[str, float]
+    casadi_operations: dict[str, int]
+    difference: float
+    bound: Bound = field(default=Bound())
+
+    def over(self, slower: str, faster: str) -> float | None:
+        """Ratio of two contestants' times; None if one was not measured."""
+        if slower not in self.times or faster not in self.times:
+            return None
+        return self.times[slower] / self.times[faster]
+
+    def misses(self) -> list[str]:
+        """Bounds that are missed, in words; what was not measured misses nothing."""
+        casadi, pinocchio = self.over("symdyn", "casadi runtime"), self.over("pinocchio", "symdyn")
+        b, found = self.bound, []
+        if b.operations is not None and self.leanest > b.operations:
+            found.append(f"{self.leanest} operations > {b.operations}")
+        if b.ratio is not None and casadi is not None and casadi > b.ratio:
+            found.append(f"symdyn/CasADi {casadi:.2f} > {b.ratio:.2f}")
+        if b.pinocchio is not None and pinocchio is not None and pinocchio < b.pinocchio:
+            found.append(f"Pinocchio/symdyn {pinocchio:.1f} < {b.pinocchio:.1f}")
+        return found
+
+
+def fastest(system: System) -> Equations:
+    """symdyn's equations in the formulation that it would choose."""
+    make: Callable[[], Equations] = getattr(system, "equations", system.embedding)
+    return make()
+
+
+def contest(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], repeats: int,
+            make_equations: Callable[[System], Equations] = fastest) -> Row:
+    """Count and time symdyn and the peers on a mechanism.
+
+    Raises SymdynError if they do not compute the same accelerations at the state of the measurement.
+    """
+    system = case.make()
+    equations, description = make_equations(system), describe(system.check())
+    state = random_state(equations)
+    contestants, counts = [symdyn_contestant(equations, state)], {}
+    for peer in peers:
+        if isinstance(peer, CasadiPeer):
+            forms = peer.forms(description)
+            counts = {form.name: form.operations for form in forms}
+            contestants += [peer.contestant(form, description, state) for form in forms]
+        else:
+            contestants.append(peer.contestant(description, state))
+    difference = agree(contestants, name)
+    times = {who: seconds * 1e9 for who, seconds in race(contestants, repeats).items()}
+    tape = function_tape(equations, "rhs")
+    leanest = min([tape.operations, *[c.operations for c in equations.candidates]])
+    return Row(name, equations.formulation, tape.operations, leanest, sum(tape.count_prologue().values()),
+               tape.longest_chain(), times, counts, difference, case.bound)
+
+
+def random_state(equations: Equations) -> State:
+    """A state within 1 rad, 1 m and their rates; Euler parameters of unit norm.
+
+    A coordinate that the accelerations do not depend on, such as one along which nothing changes, would not make an
+    evaluation wait for the one before; the first that they depend on is fed.
+    """
+    symbols = equations.symbols
+    rng = np.random.default_rng(SEED)
+    q, u = (rng.uniform(-1, 1, len(group)) for group in (symbols.coordinates, symbols.speeds))
+    for group in equations.unit_groups:
+        places = [symbols.coordinates.index(s) for s in group]
+        q[places] /= np.linalg.norm(q[places])
+    accelerations = Tape.of(equations.recorder, u_dot=equations.quantity("rhs")[len(q):])
+    used = {leaf.args[1] for leaf in accelerations.inputs}
+    fed = next((k for k, s in enumerate(symbols.coordinates) if s.name in used), 0)
+    return State(q, u, fed)

@@ -1,0 +1,72 @@
+"""Pinocchio's articulated-body algorithm and its constrained dynamics in C++."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+
+import numpy as np
+
+from symdyn.bench.toolchain import build_cpp, include_flags, package_folder
+from symdyn.errors import SymdynError
+from symdyn.lab.peers.contestant import Contestant, State, address, unsorted
+from symdyn.lab.peers.description import Description
+from symdyn.lab.peers.sources import SOURCES
+
+_ERROR_SIZE = 1000
+
+
+class PinocchioPeer:
+    """The compiled algorithm. Raises MissingExtra, CompilerNotFound or CompileError, whose messages tell what to install."""
+
+    def __init__(self) -> None:
+        package_folder("pinocchio")
+        text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_aba.cpp"))
+        self.library = build_cpp("pinocchio_aba", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
+        self.library.aba_open.restype = ctypes.c_void_p
+
+    def contestant(self, description: Description, state: State) -> Contestant:
+        """The algorithm on a model in double precision, at a state."""
+        message = ctypes.create_string_buffer(_ERROR_SIZE)
+        values = description.values
+        opened = ctypes.c_void_p(self.library.aba_open(description.text.encode(), address(values), ctypes.c_long(len(values)),
+                                                       message, ctypes.c_long(_ERROR_SIZE)))
+        if not opened:
+            raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
+        q, u = state.q[list(description.q_order)], state.u[list(description.u_order)]
+        out, fed = np.zeros(len(u)), description.q_order.index(state.fed)
+
+        def run(n: int) -> None:
+            self.library.aba_loop(opened, ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(out))
+
+        return Contestant("pinocchio", run, lambda: unsorted(out, description.u_order))
+
+
+class PinocchioLoopPeer:
+    """The compiled constrained dynamics, for one loop closed at a point of the ground. Raises as PinocchioPeer does."""
+
+    def __init__(self) -> None:
+        package_folder("pinocchio")
+        text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_loop.cpp"))
+        self.library = build_cpp("pinocchio_loop", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
+        self.library.loop_open.restype = ctypes.c_void_p
+
+    def contestant(self, description: Description, state: State, body: int, point: Sequence[float],
+                   ground: Sequence[float]) -> Contestant:
+        """A planar mechanism whose `point` of a body, number of the joint that moves it, is held at `ground`."""
+        message = ctypes.create_string_buffer(_ERROR_SIZE)
+        values, places = description.values, np.array([*point, *ground], dtype=float)
+        opened = ctypes.c_void_p(self.library.loop_open(
+            description.text.encode(), address(values), ctypes.c_long(len(values)), ctypes.c_long(body), address(places[:3]),
+            address(places[3:]), message, ctypes.c_long(_ERROR_SIZE)))
+        if not opened:
+            raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
+        q, u = state.q[list(description.q_order)], state.u[list(description.u_order)]
+        out, force, fed = np.zeros(len(u)), np.zeros(3), description.q_order.index(state.fed)
+
+        def run(n: int) -> None:
+            self.library.loop_loop(opened, ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(out),
+                                   address(force))
+
+        # The force on the body is -C_r^T lam.
+        return Contestant("pinocchio", run, lambda: unsorted(out, description.u_order), lambda: -force[:2])

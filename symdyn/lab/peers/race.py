@@ -1,0 +1,44 @@
+"""Contestants side by side: that they compute the same, and their times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symdyn.errors import SymdynError
+from symdyn.lab.peers.contestant import Contestant
+from symdyn.timing.loops import best_times
+
+# Accelerations may differ by rounding times the condition number of the mass matrix; a wrong model differs by far more.
+AGREEMENT = 1e-7
+
+
+def agree(contestants: Sequence[Contestant], model: str) -> float:
+    """Largest difference of the contestants' accelerations from those of the first, relative to their norm.
+
+    The same of multipliers, of those that compute them. Raises SymdynError if they do not compute the same.
+    """
+    for contestant in contestants:
+        contestant.run(1)
+    worst = _difference([(c.name, c.accelerations()) for c in contestants], "accelerations", model)
+    return max(worst, _difference([(c.name, c.multipliers()) for c in contestants if c.multipliers], "multipliers", model))
+
+
+def _difference(results: Sequence[tuple[str, np.ndarray]], what: str, model: str) -> float:
+    worst = 0.0
+    for name, found in results[1:]:
+        first, wanted = results[0]
+        difference = float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        if not difference <= AGREEMENT:
+            raise SymdynError(f"{model}: {name} and {first} do not compute the same {what}, {found} and "
+                              f"{wanted}: they differ by {difference:.2g} of their norm, more than {AGREEMENT:.0e}; look for a "
+                              "difference between the models that they were given")
+        worst = max(worst, difference)
+    return worst
+
+
+def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, float]:
+    """Seconds of one evaluation of each contestant, the best of its timings; they take turns."""
+    times = best_times([contestant.run for contestant in contestants], repeats)
+    return {contestant.name: time for contestant, time in zip(contestants, times, strict=True)}

@@ -1,0 +1,33 @@
+"""symdyn's own compiled right-hand side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations
+from symdyn.lab.peers.contestant import Contestant, State
+from symdyn.timing.loops import compiled_loop
+
+
+def symdyn_contestant(equations: Equations, state: State) -> Contestant:
+    """The right-hand side of equations without extra states, at their default parameters, at a state."""
+    n_q = len(state.q)
+    loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed)
+    return Contestant("symdyn", loop.run, lambda: loop.evaluator.out[n_q:].copy())
+
+
+def with_multipliers(equations: Equations) -> Equations:
+    """The same equations with the quantity "rhs_lam": right-hand side and multipliers from one evaluation."""
+    there = equations.otherwise
+    quantities = {**equations.quantities, "rhs_lam": lambda: np.concatenate([equations.quantity(n) for n in ("rhs", "lam")])}
+    return replace(equations, quantities=quantities, otherwise=None if there is None else with_multipliers(there))
+
+
+def constrained_contestant(equations: Equations, state: State) -> Contestant:
+    """As symdyn_contestant, of equations `with_multipliers`, which are computed, too."""
+    n_q, n = len(state.q), len(state.q) + len(state.u)
+    loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed, "rhs_lam")
+    out = loop.evaluator.out
+    return Contestant("symdyn with multipliers", loop.run, lambda: out[n_q:n].copy(), lambda: out[n:].copy())

@@ -1,0 +1,118 @@
+"""`symdyn bench figures`: the figures of the pipeline, each beside what it should be."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time as clock
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+import symdyn as sd
+from symdyn.functions.tapes import function_tape
+from symdyn.lab.figures import Figure, print_figures
+from symdyn.pipeline import emit
+from symdyn.timing.loops import compile_time, evaluation_time
+
+
+def chain() -> Iterator[Figure]:
+    """Seven-link spatial chain, every parameter symbolic."""
+    sd.systems.get("spatial_chain", n=2).equations()
+    best = np.inf
+    for _ in range(3):
+        begun = clock.perf_counter()
+        equations = sd.systems.get("spatial_chain", n=7).equations()
+        emit(equations, "c", ("rhs",), standalone=False)
+        best = min(best, clock.perf_counter() - begun)
+    tape = function_tape(equations, "rhs")
+    yield "spatial_chain(7): describe, derive the candidates and emit", best, "s", "< 0.4"
+    yield "spatial_chain(7): compile", compile_time(equations), "s", "< 1.0"
+    yield "spatial_chain(7): operations of the right-hand side", tape.operations, "", "<= 1400"
+    yield "spatial_chain(7): operations of the prologue", sum(tape.count_prologue().values()), "", ""
+    yield "spatial_chain(7): longest chain of operations", tape.longest_chain(), "", ""
+    yield "spatial_chain(7): one compiled evaluation", evaluation_time(equations) * 1e6, "us", "< 0.35"
+
+
+def long_chain() -> Iterator[Figure]:
+    """A hundred links, by articulated bodies."""
+    begun = clock.perf_counter()
+    equations = sd.systems.get("spatial_chain", n=100).equations()
+    emit(equations, "c", ("rhs",), standalone=False)
+    yield "spatial_chain(100): describe, derive and emit", clock.perf_counter() - begun, "s", "< 10"
+    yield "spatial_chain(100): operations of the right-hand side", function_tape(equations, "rhs").operations, "", ""
+
+
+def pendulum() -> Iterator[Figure]:
+    """Double pendulum of uniform rods, 10 s, rtol = atol = 1e-9."""
+    module = sd.systems.get("double_pendulum").embedding().compile(backend="c")
+    runs = [module.simulate(t=(0, 10), q=[0, 0.1], u=[0, 0], rtol=1e-9) for _ in range(20)]
+    yield "double_pendulum: 10 s inside the integrator", min(r.integrator_seconds or r.seconds for r in runs) * 1e3, "ms", "< 1"
+    yield "double_pendulum: energy error over these 10 s", runs[0].energy_error(), "", ""
+    x, best = np.array([0.1, 0.2, 0.3, 0.4]), np.inf
+    for _ in range(10):
+        begun = clock.perf_counter()
+        for _ in range(20_000):
+            module.rhs(0.0, x)
+        best = min(best, (clock.perf_counter() - begun) / 20_000)
+    yield "double_pendulum: module.rhs called from Python", best * 1e6, "us", "< 2"
+    yield "cart_pole: module.rhs called from Python with an input", _call_with_input() * 1e6, "us", "< 2"
+
+
+def _call_with_input() -> float:
+    module = sd.systems.get("cart_pole").embedding().compile(backend="c")
+    x, given, best = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0]), np.inf
+    for _ in range(10):
+        begun = clock.perf_counter()
+        for _ in range(20_000):
+            module.rhs(0.0, x, None, given)
+        best = min(best, (clock.perf_counter() - begun) / 20_000)
+    return best
+
+
+def puma() -> Iterator[Figure]:
+    """PUMA 560 moving freely."""
+    module = sd.systems.get("puma560").embedding().compile(backend="c")
+    solution = module.simulate(t=(0, 10), rtol=1e-11)
+    yield "puma560: energy error over 10 s of free motion, rtol 1e-11", solution.energy_error(), "", "<= 1e-10"
+
+
+def stabilization() -> Iterator[Figure]:
+    """What Baumgarte's method with the gain that is chosen costs and leaves: a pendulum in x and y, 10 s, rtol = atol."""
+    module = sd.systems.get("pendulum_absolute").augmented().compile(backend="c")
+    for method, rtol in (("dop853", 1e-6), ("dop853", 1e-9), ("RK45", 1e-6), ("LSODA", 1e-6), ("LSODA", 1e-9)):
+        without, kept = (module.simulate((0, 10), rtol=rtol, atol=rtol, method=method, stabilization=way)
+                         for way in ("none", "baumgarte"))
+        what = f"Baumgarte, {method}, rtol {rtol:g}"
+        yield f"{what}: steps over those without", kept.n_steps / without.n_steps, "", "<= 1.25"
+        yield f"{what}: violation over rtol", float(np.abs(kept.constraint_violation).max()) / rtol, "", "<= 20"
+
+
+def start_up() -> Iterator[Figure]:
+    """Whole commands in new processes, nothing cached and then again."""
+    def seconds(code: str) -> float:
+        times = []
+        for _ in range(5):
+            begun = clock.perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True)
+            times.append(clock.perf_counter() - begun)
+        return min(times)
+
+    yield "import symdyn / import sympy", seconds("import symdyn") / seconds("import sympy"), "", "< 1.3"
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "SYMDYN_CACHE_DIR": f"{folder}/cache"}
+        for what, limit in (("first", "< 4"), ("second", "< 2")):
+            begun = clock.perf_counter()
+            subprocess.run([sys.executable, "-m", "symdyn", "simulate", "double_pendulum", "--output",
+                            f"{folder}/{what}"], env=environment, check=True, stdout=subprocess.DEVNULL)
+            yield f"symdyn simulate double_pendulum, {what} time", clock.perf_counter() - begun, "s", limit
+
+
+GROUPS = (chain, long_chain, pendulum, puma, stabilization, start_up)
+
+
+def run(only: Sequence[str] | None = None) -> int:
+    """Print the figures, or those of some groups; returns the number of those that miss their bound."""
+    return print_figures(GROUPS, only)

@@ -1,0 +1,1 @@
+"""Published mechanisms within their bounds: `symdyn bench published`."""

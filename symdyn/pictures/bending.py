@@ -1,0 +1,64 @@
+"""How flexible bodies bend in pictures: mode shapes times elastic coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symdyn.pictures.meshes import Part
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+
+@dataclass(frozen=True)
+class Bending:
+    """Displacements in body axes of points (n, 3), to second order in eta (n_t, n_eta).
+
+    shapes   (n, 3, n_eta), first derivatives by eta; second: (n, 3, n_eta, n_eta), second ones, the foreshortening
+    """
+
+    points: np.ndarray
+    shapes: np.ndarray
+    second: np.ndarray
+    eta: np.ndarray
+
+    def of(self, part: Part) -> Bending:
+        """The displacements of a part's vertices: those of the beam's points beside them."""
+        axis = int(np.ptp(self.points, axis=0).argmax())
+        order = np.argsort(self.points[:, axis])
+        along = self.points[order, axis]
+
+        def beside(values: np.ndarray) -> np.ndarray:
+            columns = values[order].reshape(len(order), -1).T
+            found = np.column_stack([np.interp(part.stations[:, axis], along, column) for column in columns])
+            return found.reshape(len(part.stations), *values.shape[1:])
+
+        return Bending(part.stations, beside(self.shapes), beside(self.second), self.eta)
+
+    def between(self, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> Bending:
+        """At other times: a share w (n, 1) of the way from the times a to the times b."""
+        return replace(self, eta=self.eta[a] * (1 - w) + self.eta[b] * w)
+
+    def displacements(self, index: int) -> np.ndarray:
+        """At one of the times, (n, 3)."""
+        eta = self.eta[index]
+        return np.asarray(self.shapes @ eta + self.second @ eta @ eta / 2)
+
+
+def bendings(solution: Solution) -> dict[int, Bending]:
+    """The flexible bodies of a motion, by their place among the bodies.
+
+    metadata.flexible lists them: `body` and `tip`, the names of the bodies at its ends; `stations` (n, 3), points of the
+    undeformed beam in the axes of `body`; `shapes` (n, 3, n_eta), their displacements by each of `coordinates`, the names of the
+    elastic coordinates, and `second` (n, 3, n_eta, n_eta), the second derivatives.
+    """
+    metadata = solution.module.metadata
+    found = {}
+    for record in metadata.flexible:
+        eta = np.column_stack([solution[name] for name in record["coordinates"]])
+        points, shapes, second = (np.array(record[name], dtype=float) for name in ("stations", "shapes", "second"))
+        found[metadata.bodies.index(record["body"])] = Bending(points, shapes, second, eta)
+    return found

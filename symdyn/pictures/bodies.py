@@ -1,0 +1,170 @@
+"""Draws the bodies of a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from symdyn.errors import ArgumentError
+from symdyn.pictures.drawing import Drawing
+from symdyn.pictures.scene import Scene
+from symdyn.pictures.style import MANY, colors_of
+from symdyn.real_numbers import NotReal, real
+from symdyn.shown import shown
+
+# Elevation and azimuth of the eye, degrees; on shapes it looks more from the side.
+VIEW = (22.0, -55.0)
+VIEW_OF_SOLIDS = (14.0, -58.0)
+# Of the axes' box before it is fitted.
+ZOOM = 0.79
+# What is drawn over all shapes.
+ABOVE = 1e6
+
+
+def make_axes(figure: Figure, place: Any, drawing: Drawing, view: Any = None) -> Any:
+    """Axes for a drawing; view: elevation and azimuth of the eye, degrees, of a drawing in space.
+
+    Raises ArgumentError for a view that is none.
+    """
+    elevation, azimuth = _view(view, drawing)
+    axes: Any = figure.add_subplot(place, projection="3d" if drawing.spatial else None)
+    limits = drawing.limits()
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])
+    axes.set_xlabel(f"{drawing.labels[0]} [m]")
+    axes.set_ylabel(f"{drawing.labels[1]} [m]")
+    if drawing.spatial:
+        axes.set_zlim(*limits[2])
+        axes.set_zlabel(f"{drawing.labels[2]} [m]")
+        axes.set_box_aspect(np.ptp(limits, axis=1), zoom=ZOOM)
+        axes.view_init(elev=elevation, azim=azimuth)
+        axes.tick_params(labelsize=8, pad=0)
+        axes.tick_params(axis="z", pad=3)
+        axes.zaxis.labelpad = 4
+        axes.xaxis.labelpad = axes.yaxis.labelpad = 8
+        _fill(axes, limits)
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.pane.set_facecolor("0.98")
+            axis.line.set_color("0.5")
+            axis._axinfo["grid"].update(color="0.88", linewidth=0.7)
+    else:
+        axes.set_aspect("equal")
+        axes.locator_params(axis="x", nbins=6)
+        axes.grid(True, color="0.92", linewidth=0.7)
+        axes.set_axisbelow(True)
+    return axes
+
+
+def _fill(axes: Any, limits: np.ndarray) -> None:
+    """Make the box as large as the labels around it leave room for; no labels for an axis that points at the eye."""
+    corners = np.array([[x, y, z] for x in limits[0] for y in limits[1] for z in limits[2]])
+    zoom = ZOOM
+    for _ in range(2):  # a nearer box is seen in a stronger perspective
+        view = axes.viewLim
+        spans = 2 * np.abs(flat(axes, corners) - (view.min + view.max) / 2).max(axis=0) / view.size
+        zoom *= float(min(0.7 / spans[0], 0.78 / spans[1]))
+        axes.set_box_aspect(np.ptp(limits, axis=1), zoom=zoom)
+    middle, halves = limits.mean(axis=1), np.diag(np.ptp(limits, axis=1) / 2)
+    lengths = [float(np.linalg.norm(np.diff(flat(axes, np.array([middle - half, middle + half])), axis=0))) for half in halves]
+    for axis, length in zip((axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
+        if length < 0.2 * max(lengths):
+            axis.set_ticks([])
+            axis.set_label_text("")
+        else:
+            axis.set_major_locator(MaxNLocator(max(3, round(5 * length / max(lengths))), steps=[1, 2, 2.5, 5, 10]))
+
+
+def height_of(axes: Any) -> tuple[float, float]:
+    """Where the box of axes of space begins and ends from below, in parts of their height."""
+    limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
+    heights = flat(axes, np.array([[x, y, z] for x in limits[0] for y in limits[1] for z in limits[2]]))[:, 1]
+    view = axes.viewLim
+    return float((heights.min() - view.y0) / view.height), float((heights.max() - view.y0) / view.height)
+
+
+def title(axes: Any, text: str, size: float) -> None:
+    """A title close above what is drawn."""
+    above = min(height_of(axes)[1] + 0.06, 0.97) if hasattr(axes, "zaxis") else None
+    axes.set_title(text, fontsize=size, y=above)
+
+
+def flat(axes: Any, points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) on the screen, (n, 2)."""
+    matrix = axes.get_proj()
+    there = points @ matrix[:, :3].T + matrix[:, 3]
+    return np.asarray(there[:, :2] / there[:, 3:])
+
+
+def _view(view: Any, drawing: Drawing) -> tuple[float, float]:
+    if view is None:
+        return VIEW if drawing.solids is None else VIEW_OF_SOLIDS
+    wrong = (f"view is {shown(view)}; pass (elevation, azimuth) of the eye in degrees, such as (20, -60); the elevation is "
+             "between -90 and 90")
+    try:
+        angles = real(view)
+    except NotReal as error:
+        raise ArgumentError(f"{wrong}: {error}") from None
+    if angles.shape != (2,) or not (np.isfinite(angles[1]) and abs(angles[0]) <= 90):
+        raise ArgumentError(wrong)
+    return float(angles[0]), float(angles[1])
+
+
+def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) -> None:
+    """Start and end of the motion, and the way of the centres of mass."""
+    axes = make_axes(figure, place, drawing, view)
+    n_b = len(drawing.lines)
+    colors = colors_of(n_b)
+    for k in range(n_b) if n_b <= 3 else [n_b - 1]:
+        axes.plot(*drawing.centres[:, k].T, color=colors[k], linewidth=0.6, alpha=0.55, zorder=ABOVE)
+    for index, alpha in ((0, 0.3), (-1, 1.0)):
+        show(make_artists(axes, drawing, alpha), drawing, index)
+    which = "centre" if n_b == 1 else "last centre" if n_b > 3 else "centres"
+    title(axes, f"start (pale), end, way of the {which} of mass", 9)
+
+
+def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
+    """Shapes, and empty curves for rails, arms, rods, bodies, sliders and centres of mass, in the order of `_points_at`."""
+    empty: list[list[float]] = [[]] * len(drawing.labels)
+    colors = colors_of(len(drawing.lines))
+    if len(drawing.pivots):
+        axes.plot(*drawing.pivots.T, linestyle="", marker="^", color="0.3", markersize=9, zorder=4)
+    style = {"alpha": alpha, "solid_capstyle": "round", "solid_joinstyle": "round"}
+    width = 4.0 if len(drawing.lines) <= MANY else 2.0
+    scenes = [Scene(drawing.solids, drawing.spatial, alpha)] if drawing.solids is not None else []
+    for scene in scenes:
+        axes.add_collection(scene, autolim=False)
+    return [*scenes,
+            axes.plot(*empty, color="0.6", linestyle=":", linewidth=1.2, alpha=alpha)[0],
+            axes.plot(*empty, color="0.4", linewidth=1.0, alpha=alpha)[0],
+            axes.plot(*empty, color="0.4", linewidth=0.6 * width, marker="o", markersize=0.8 * width, **style)[0],
+            *[axes.plot(*empty, color=c, linewidth=width, marker="o", markersize=width, **style)[0] for c in colors],
+            *[axes.plot(*empty, color=colors[k], linestyle="", marker="s", markersize=3.5 * width, alpha=alpha)[0]
+              for k in drawing.sliders],
+            axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0]]
+
+
+def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
+    """Place artists where the mechanism is at one of the times."""
+    scenes = [artist for artist in artists if isinstance(artist, Scene)]
+    for scene in scenes:
+        scene.place(index)
+    for artist, points in zip(artists[len(scenes):], _points_at(drawing, index), strict=True):
+        move(artist, points)
+
+
+def _points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
+    slides = [drawing.lines[k][:, places] for k, places in drawing.sliders.items()]
+    return [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides,
+                                         drawing.centres[:, drawing.bare])]
+
+
+def move(artist: Any, points: np.ndarray) -> None:
+    """Draw a curve through points, (n, 2 or 3)."""
+    if points.shape[1] == 3:
+        artist.set_data_3d(*points.T)
+    else:
+        artist.set_data(*points.T)

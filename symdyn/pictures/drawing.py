@@ -1,0 +1,133 @@
+"""A mechanism as lines and shapes over time, in the axes that are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symdyn.pictures.jointed import carriers, jointed_skeleton, placed_joints
+from symdyn.pictures.points import points_of
+from symdyn.pictures.skeleton import Skeleton, bare_skeleton, connect, guess_skeleton
+from symdyn.pictures.solids import Solids
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+_LEFT_OUT = 1e-9
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A mechanism as lines and shapes over time, in the axes that are shown.
+
+    lines      of each body, (n_t, n_points, 2 or 3); NaN where the pen is lifted, and for bodies that have shapes
+    arms       from each body's first point to its centre of mass, joined in one line; rails: from slider to slider;
+               rods: massless ones between two bodies
+    centres    centres of mass (n_t, n_b, 2 or 3); pivots: points that hold the mechanism to the ground, (n, 2 or 3)
+    sliders    the bodies that slide, and which points of their lines do; labels: of the axes
+    solids     shapes, if there are any; bare: the bodies without
+    """
+
+    lines: list[np.ndarray]
+    arms: np.ndarray
+    rails: np.ndarray
+    rods: np.ndarray
+    centres: np.ndarray
+    pivots: np.ndarray
+    sliders: Mapping[int, Sequence[int]]
+    labels: Sequence[str]
+    solids: Solids | None
+    bare: Sequence[int]
+
+    @property
+    def spatial(self) -> bool:
+        return len(self.labels) == 3
+
+    @classmethod
+    def of(cls, solution: Solution) -> Drawing | None:
+        """What can be drawn of a motion; None if the module gives no positions, or nothing moves."""
+        if "positions" not in solution.module.functions:
+            return None
+        centres = solution.rows("positions").reshape(len(solution.t), -1, 3)
+        if not centres.shape[1] or not np.isfinite(centres).all():
+            return None
+        skeleton, kept = _skeleton(solution, centres)
+        centres = centres[:, kept]
+        solids = Solids.of(solution)
+        tips = {record["tip"] for record in solution.module.metadata.flexible}
+        bare = [k for k, body in enumerate(kept) if solids is None or (
+            body not in solids.bodies and solution.module.metadata.bodies[body] not in tips)]
+        if solids is not None:
+            skeleton = _without(skeleton, bare)
+        everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
+                                     skeleton.pivots, solids.reach() if solids is not None else np.zeros((0, 3))])
+        ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
+        shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
+        if solids is not None:
+            shown = [0, 1] if solution.module.metadata.planar else [0, 1, 2]
+        if not shown:
+            return None
+        if len(shown) == 1:
+            shown = sorted({*shown, 1 if shown[0] != 1 else 0})
+        arms, rails, rods, centres, pivots, *lines = [points[..., shown] for points in (
+            skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, *skeleton.lines)]
+        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare)
+
+    def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
+        """The drawing at other times, by linear interpolation."""
+        order = np.argsort(t)
+        right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
+        a, b = order[right - 1], order[right]
+        w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
+        arms, rails, rods, centres, *lines = [points[a] * (1 - w) + points[b] * w for points in
+                                              (self.arms, self.rails, self.rods, self.centres, *self.lines)]
+        return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels,
+                       None if self.solids is None else self.solids.at(t, times), self.bare)
+
+    def limits(self) -> np.ndarray:
+        """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""
+        reach = self.solids.reach() if self.solids is not None else np.zeros((0, 3))
+        points = np.concatenate([*[line.reshape(-1, len(self.labels)) for line in self.lines], self.pivots,
+                                 self.centres.reshape(-1, len(self.labels)), reach[:, :len(self.labels)]])
+        low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+        longest = (high - low).max()
+        half = np.maximum((high - low) / 2, 0.15 * longest) + 0.06 * longest
+        return np.column_stack([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _without(skeleton: Skeleton, bare: Sequence[int]) -> Skeleton:
+    """The lines of the bodies that have no shapes; others keep their place, with nothing to draw."""
+    n_t = len(skeleton.arms)
+    nothing = np.full((n_t, 1, 3), np.nan)
+    lines = [line if k in bare else nothing for k, line in enumerate(skeleton.lines)]
+    return Skeleton(lines, connect([], n_t), skeleton.rails if bare else connect([], n_t), skeleton.rods, skeleton.pivots,
+                    {k: places for k, places in skeleton.sliders.items() if k in bare})
+
+
+def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[int]]:
+    """Lines of the bodies, and which bodies these are: all but massless carriers."""
+    module, n_t = solution.module, len(solution.t)
+    kept = list(range(centres.shape[1]))
+    if "frames" not in module.functions:
+        return bare_skeleton(centres), kept
+    frames = solution.frames.reshape(n_t, -1, 12)
+    origins, rotations = frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3)
+    if "joint_points" not in module.functions:
+        return guess_skeleton(origins, rotations, centres, _ends(solution, kept)), kept
+    kept = [k for k in kept if k not in carriers(module.metadata)]
+    joints = placed_joints(module.metadata, kept, solution.rows("joint_points").reshape(n_t, -1, 6))
+    ends = _ends(solution, kept)
+    return jointed_skeleton(joints, origins[:, kept], rotations[:, kept], centres[:, kept], ends), kept
+
+
+def _ends(solution: Solution, bodies: Sequence[int]) -> list[tuple[int, np.ndarray]]:
+    """Outputs that are positions on bodies: place among these, (n_t, 3)."""
+    found = []
+    for name, point in points_of(solution).items():
+        if point.quantity == "position" and point.body in bodies:
+            given = solution.outputs[name]
+            found.append((bodies.index(point.body), np.pad(given, ((0, 0), (0, 3 - given.shape[1])))))
+    return found

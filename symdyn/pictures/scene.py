@@ -1,0 +1,115 @@
+"""Draws the shapes of bodies into axes of a plane or of space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from symdyn.pictures.painter import Camera, cut, order, planes
+from symdyn.pictures.solids import Solids, Water
+
+# A plane system is seen along -z.
+_FROM_ABOVE = Camera(np.eye(4), np.array([0.0, 0.0, 1.0, 0.0]))
+_WATER_ALPHA = 0.38
+# Of a colour: what is left in the shade, and along edges.
+_SHADE, _EDGE = 0.5, 0.6
+
+
+class Scene(PolyCollection):
+    """Shapes at one time as polygons of the screen, in the order in which they hide each other.
+
+    Polygons are made anew whenever the axes are drawn: they follow the eye.
+    """
+
+    def __init__(self, solids: Solids, spatial: bool, alpha: float = 1.0) -> None:
+        super().__init__([], closed=True)
+        self._solids, self._spatial, self._opacity = solids, spatial, alpha
+        self._places = solids.vertices(0)
+        self.set_in_layout(False)
+        self.set_capstyle("round")
+        self.set_joinstyle("round")
+
+    def place(self, index: int) -> None:
+        """Show the shapes at one of the times."""
+        self._places = self._solids.vertices(index)
+        self.stale = True
+
+    def do_3d_projection(self) -> float:
+        """Make the polygons; axes of space call it before they draw."""
+        axes: Any = self.axes
+        self._paint(Camera.of(axes.get_proj()) if self._spatial else _FROM_ABOVE)
+        return 0.0
+
+    def draw(self, renderer: Any) -> None:
+        self.do_3d_projection()
+        super().draw(renderer)
+
+    def _paint(self, camera: Camera) -> None:
+        """Polygons below the water, the water, and those above it; the other way round for an eye under water."""
+        water = self._solids.water if self._spatial else None
+        level = water.level if water is not None else -np.inf
+        low, high = _Pieces(self._opacity), _Pieces(self._opacity)
+        light = _light(camera.toward(np.concatenate(self._places).mean(axis=0))) if self._places else np.zeros(3)
+        for k in order(self._solids.parts, self._places, camera):
+            part, places = self._solids.parts[k], self._places[k]
+            normals, offsets = planes(places, part.corners)
+            seen = np.append((camera.side(normals, offsets) > 0) & normals.any(axis=1), False)
+            faces, own = np.flatnonzero(seen), part.edges[:, 2:]
+            edges = np.where(part.creases, seen[own].any(axis=1) | (own < 0).all(axis=1), seen[own].sum(axis=1) == 1)
+            shaded = np.clip(np.array(part.color) * (_SHADE + (1 - _SHADE) * (1 + normals[faces] @ light) / 2)[:, None], 0, 1)
+            dark = np.array(part.color) * (_EDGE if len(part.faces) else 1.0)
+            flat, z = camera.project(places), places[:, 2]
+            whole = high if z.min() >= level else low if z.max() <= level else None
+            for vertices, color, width in (*((part.faces[k], color, 0.3) for k, color in zip(faces, shaded, strict=True)),
+                                           *((ends, dark, part.width) for ends in part.edges[edges, :2])):
+                if whole is not None:
+                    whole.add(flat[vertices], color, width)
+                    continue
+                heights = z[vertices]
+                if heights.min() >= level or heights.max() <= level:
+                    (high if heights.min() >= level else low).add(flat[vertices], color, width)
+                else:
+                    for pieces, points in zip((low, high), cut(places[vertices], level), strict=True):
+                        pieces.add(camera.project(points), color, width)
+        surface = _Pieces(self._opacity * _WATER_ALPHA)
+        if water is not None:
+            surface.add(camera.project(self._surface(water)), np.array(water.color), 0.8)
+        above = camera.eye[2] > level * camera.eye[3] if water is not None else True
+        together = (low, surface, high) if above else (high, surface, low)
+        self.set_verts([polygon for pieces in together for polygon in pieces.polygons], closed=True)
+        colors: Any = np.array([color for pieces in together for color in pieces.colors]).reshape(-1, 4)
+        self.set_facecolor(colors)
+        self.set_edgecolor(colors)
+        self.set_linewidth([width for pieces in together for width in pieces.widths])
+
+    def _surface(self, water: Water) -> np.ndarray:
+        """Corners of the water's rectangle, (4, 3)."""
+        axes: Any = self.axes
+        (x0, y0), (x1, y1) = water.reach if water.reach is not None else np.column_stack([axes.get_xlim(), axes.get_ylim()])
+        return np.array([[x0, y0, water.level], [x1, y0, water.level], [x1, y1, water.level], [x0, y1, water.level]])
+
+
+class _Pieces:
+    """Polygons of the screen with their colours and the widths of their edges."""
+
+    def __init__(self, alpha: float) -> None:
+        self.alpha = alpha
+        self.polygons: list[np.ndarray] = []
+        self.colors: list[tuple[float, ...]] = []
+        self.widths: list[float] = []
+
+    def add(self, polygon: np.ndarray, color: np.ndarray, width: float) -> None:
+        self.polygons.append(polygon)
+        self.colors.append((*color, self.alpha))
+        self.widths.append(width)
+
+
+def _light(toward: np.ndarray) -> np.ndarray:
+    """Unit vector to the light: above the eye, on its left."""
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    length = float(np.linalg.norm(right))
+    right = right / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+    light = toward - 0.6 * right + 0.8 * np.cross(toward, right)
+    return np.asarray(light / np.linalg.norm(light))

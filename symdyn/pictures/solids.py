@@ -1,0 +1,157 @@
+"""Shapes of bodies over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from symdyn.errors import ArgumentError
+from symdyn.pictures.bending import Bending, bendings
+from symdyn.pictures.meshes import Part, line, parts_of
+from symdyn.pictures.style import colors_of
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+_GROUND_COLOR = (0.6, 0.6, 0.6)
+_WATER_COLOR = "#4a90c4"
+# Times at which is looked how far shapes reach.
+_SAMPLES = 60
+
+
+@dataclass(frozen=True)
+class Water:
+    """A water surface: level, and its rectangle (2, 2) from lower to upper along x and y, or None for the whole picture."""
+
+    level: float
+    reach: np.ndarray | None
+    color: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Shapes of bodies over time.
+
+    parts       in body axes; origins (n_t, n_b + 1, 3) and rotations (n_t, n_b + 1, 3, 3), the last the ground's
+    bending     of each part, if it bends; bodies: those that have shapes
+    """
+
+    parts: Sequence[Part]
+    bending: Sequence[Bending | None]
+    water: Water | None
+    origins: np.ndarray
+    rotations: np.ndarray
+    bodies: frozenset[int]
+
+    @classmethod
+    def of(cls, solution: Solution) -> Solids | None:
+        """The shapes of a motion; None if its module has none. Raises ArgumentError for a colour that does not exist."""
+        module = solution.module
+        records = module.metadata.drawn
+        bent = bendings(solution)
+        if not (records or bent) or "frames" not in module.functions or not len(solution.t):
+            return None
+        frames = solution.rows("frames").reshape(len(solution.t), -1, 12)
+        if not np.isfinite(frames).all():
+            return None
+        still = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+        frames = np.concatenate([frames, np.broadcast_to(still, (len(frames), 1, 12))], axis=1)
+        names = [*module.metadata.bodies, "ground"]
+        own = [*colors_of(len(names) - 1), _GROUND_COLOR]
+        parts, bending, water = [], [], None
+        for record in _filled(solution, records):
+            body = names.index(record["body"])
+            if record["kind"] == "water":
+                water = _water(record, module.name)
+                continue
+            to = names.index(record["to"]) if record.get("to") is not None else None
+            color = to_rgb(own[body]) if record["color"] is None else _color(record["color"], module.name)
+            made = list(parts_of(record, body, color, to, body in bent))
+            parts += made
+            bending += [bent[body].of(part) if body in bent and part.to is None else None for part in made]
+        for body in bent:
+            if not any(part.body == body for part in parts):
+                parts.append(line(body, to_rgb(own[body]), bent[body].points, 3.0))
+                bending.append(bent[body].of(parts[-1]))
+        bodies = {part.body for part in parts}
+        return cls(parts, bending, water, frames[..., :3], frames[..., 3:].reshape(*frames.shape[:2], 3, 3), frozenset(bodies))
+
+    def at(self, t: np.ndarray, times: np.ndarray) -> Solids:
+        """The shapes at other times: origins between those of the two nearest times, rotations on the shortest way."""
+        order = np.argsort(t)
+        right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
+        a, b = order[right - 1], order[right]
+        w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
+        turned = part_way(self.rotations[a], self.rotations[b], w)
+        return replace(self, origins=self.origins[a] * (1 - w) + self.origins[b] * w, rotations=turned,
+                       bending=[None if one is None else one.between(a, b, w[:, :, 0]) for one in self.bending])
+
+    def vertices(self, index: int) -> list[np.ndarray]:
+        """The vertices of every part at one of the times, (n, 3) each, n-frame."""
+        found = []
+        for part, bending in zip(self.parts, self.bending, strict=True):
+            own = part.vertices if bending is None else part.vertices + bending.displacements(index)
+            placed = self.origins[index, part.body] + own @ self.rotations[index, part.body].T
+            if part.to is not None:
+                placed[-1] = self.origins[index, part.to] + self.rotations[index, part.to] @ part.vertices[-1]
+            found.append(placed)
+        return found
+
+    def reach(self) -> np.ndarray:
+        """Points that the picture must show, (n, 3)."""
+        some = np.unique(np.linspace(0, len(self.origins) - 1, _SAMPLES).astype(int))
+        points = [np.concatenate(self.vertices(int(k))) for k in some] if self.parts else []
+        if self.water is not None and self.water.reach is not None:
+            points.append(np.column_stack([self.water.reach, np.full(2, self.water.level)]))
+        return np.concatenate(points) if points else np.zeros((0, 3))
+
+
+def part_way(A: np.ndarray, B: np.ndarray, w: Any) -> np.ndarray:
+    """Rotations (..., 3, 3) a share w (..., 1) of the way from A to B, about the one axis of the turn between them."""
+    Q = np.swapaxes(A, -1, -2) @ B
+    twice = np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], axis=-1)
+    cosine = (np.trace(Q, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(np.linalg.norm(twice, axis=-1) / 2, cosine)[..., None]
+    # Near a half turn the differences vanish; the axis then is in the columns of the symmetric part.
+    halves = Q + np.swapaxes(Q, -1, -2) - 2 * cosine[..., None, None] * np.eye(3)
+    largest = np.linalg.norm(halves, axis=-2).argmax(axis=-1)
+    column = np.take_along_axis(halves, largest[..., None, None], axis=-1)[..., 0]
+    column = column * np.where((column * twice).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    axis = np.where(cosine[..., None] < -0.9, column, twice)
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    x, y, z = np.moveaxis(np.divide(axis, length, out=np.zeros_like(axis), where=length > 0), -1, 0)
+    zero = np.zeros_like(x)
+    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    turned = (w * angle)[..., None]
+    return np.asarray(A @ (np.eye(3) + np.sin(turned) * K + (1 - np.cos(turned)) * K @ K))
+
+
+def _filled(solution: Solution, records: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The records with the lengths that follow from the parameters of the run."""
+    if "drawn_lengths" not in solution.module.functions:
+        return list(records)
+    lengths = iter(solution.module.evaluate("drawn_lengths", solution.t[0], solution.x[0], solution.params,
+                                            solution.inputs[0]).ravel())
+    return [{**record, "values": {name: [[next(lengths) if e is None else e for e in row] for row in rows]
+                                  for name, rows in record["values"].items()}} for record in records]
+
+
+def _water(record: Mapping[str, Any], name: str) -> Water:
+    values, color = record["values"], _color(record["color"] or _WATER_COLOR, name)
+    if "size" not in values:
+        return Water(values["level"][0][0], None, color)
+    center, half = np.array(values["center"][0]), np.array(values["size"][0]) / 2
+    return Water(values["level"][0][0], np.array([center - half, center + half]), color)
+
+
+def _color(given: Any, name: str) -> tuple[float, float, float]:
+    try:
+        return to_rgb(given)
+    except ValueError:
+        raise ArgumentError(f"{name}: a shape has the colour {shown(given)}, which is none; pass '#rrggbb', a grey level such as "
+                            "'0.8', or a name such as 'orange' or 'steelblue'") from None

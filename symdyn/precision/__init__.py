@@ -1,0 +1,1 @@
+"""Tapes with more digits than floats have, and motions by them."""

@@ -1,0 +1,1 @@
+"""Many states and many motions at once."""

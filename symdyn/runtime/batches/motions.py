@@ -1,0 +1,297 @@
+"""Integrates many motions: on the processor's vectors with the C backend, each with its own steps, else one by one."""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
+from symdyn.runtime.batches.arguments import take_rows, together
+from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
+from symdyn.runtime.batches.validity import outside
+from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
+from symdyn.runtime.inputs.sampled import check_span
+from symdyn.runtime.integrating.charts import locked
+from symdyn.runtime.integrating.events import wanted
+from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.simulate import (
+    checked_method,
+    checked_positive,
+    checked_spacing,
+    checked_times,
+    checked_tolerances,
+)
+from symdyn.runtime.integrating.stops import describe_stop
+from symdyn.runtime.masses import negative_masses
+from symdyn.runtime.memory import demand
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Steps of every lane in one call: a fraction of a second, so that Ctrl-C is heard.
+PIECE = 5_000
+# Where the right-hand side jumps: so many calls in which no motion ends before those under way are looked at for chattering.
+PATIENCE = 4
+# The method of motions that are integrated at once.
+METHOD = "dop853"
+NO_VECTORS = "the C compiler has no vectors"
+TOLD = 3
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """starts (n, n_x), params (n, n_p), inputs (n, n_in), of each (1, ...) where nothing varies."""
+
+    n: int
+    starts: np.ndarray
+    params: np.ndarray
+    inputs: np.ndarray
+    times: np.ndarray
+    span: tuple[float, float]
+    rtol: float
+    atol: np.ndarray
+    max_step: float
+    first_step: float
+
+
+def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = None, *, z: Any = None, t: Any = None,
+                   inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
+                   first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
+                   events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
+                   extend: str = "error") -> BatchSolution:
+    """See Module.simulate_batch."""
+    metadata = module.metadata
+    checked_method(module, method)
+    chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
+    options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
+    has_events = bool(wanted(module, events).any())
+    initial = metadata.initial
+    groups = [take_rows(values, metadata.names(what), f"initial {what}", metadata.initial_values(what), module.name)
+              for what, values in (("q", q), ("u", u), ("z", z))]
+    by_time = varies_over_time(inputs)
+    fixed = input_rows(module, None if by_time else inputs, initial)
+    demand_rest(fixed, metadata.inputs, metadata.motions, module.name)
+    rows = {"q": groups[0], "u": groups[1], "z": groups[2], "params": parameter_rows(module, params), "inputs": fixed}
+    n = together(rows, module.name)
+    times, span = _times(module, t)
+    # The states that are kept, and starts, parameters, inputs and the report of each motion.
+    demand(n * (len(times) * metadata.sizes.x + metadata.sizes.x + 12), module.name,
+           f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
+           "sd.ensemble with a path, which keeps results on the disk")
+    n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
+    starts = np.concatenate([np.broadcast_to(g, (n_starts, g.shape[1])) for g in groups], axis=1)
+    along = take_inputs(inputs, metadata.inputs, initial, module.name, span, interpolation, extend,
+                        metadata.motions) if by_time else None
+    if along is not None:  # what does not fit is an error before any motion runs
+        check_span(along.samplers, span, module.name)
+    asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
+                   checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
+    note = why_one_by_one(module, has_events) or _why_these(by_time, options)
+    options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
+    if by_time:
+        options |= {"interpolation": interpolation, "extend": extend}
+    given = np.full((n, len(times), metadata.sizes.inputs), np.nan) if by_time and metadata.watches else fixed
+    varying = inputs if by_time else None
+    solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
+    if solution.messages:
+        told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
+        more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
+        warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
+    near = locked(module, times, solution.x, asked.rtol) if metadata.charts else []
+    for sentence in outside(module, times, solution.x, asked.params, given) + near:
+        warnings.warn(sentence, SimulationWarning, stacklevel=3)
+    return solution
+
+
+def _times(module: Module, t: Any) -> tuple[np.ndarray, tuple[float, float]]:
+    times, span, _ = checked_times(module, t, False)
+    pair = t is None or (isinstance(t, (tuple, list)) and len(t) == 2)
+    return (np.array([span[1]]) if pair else times), span
+
+
+def why_one_by_one(module: Module, events: bool = True) -> str:
+    """Why motions of a module are not integrated several at once; "" if they are. events: whether they are looked for."""
+    metadata = module.metadata
+    if module.backend != "c":
+        return f"one by one: the backend is {module.backend}"
+    if metadata.constraints:
+        return "one by one: the mechanism has constraints, which states are projected onto"
+    if metadata.unit_groups:
+        return "one by one: the mechanism has Euler parameters, which are normalised after every step"
+    if events and wanted(module, events).any():
+        return "one by one: the mechanism has events"
+    return "" if metadata.sizes.x else "one by one: the mechanism has no state"
+
+
+def many_at_once(module: Module, built: bool) -> str:
+    """How many states and motions are computed at once; built: whether the code for it is there."""
+    if module.backend != "c":
+        return f"rhs_batch by broadcasting, simulate_batch {why_one_by_one(module)}"
+    lanes = "as many as the processor's vectors have lanes (module.batch_width)"
+    if built:
+        lanes = f"{width(module)} on the processor's vectors" if width(module) > 1 else f"1, {NO_VECTORS}"
+    return f"rhs_batch {lanes}, simulate_batch {why_one_by_one(module) or 'likewise'}"
+
+
+def _why_these(by_time: bool, options: Mapping[str, Any]) -> str:
+    if by_time:
+        return "one by one: inputs vary over time"
+    return f"one by one: asked for with {', '.join(options)}" if options else ""
+
+
+# -- on vectors
+
+
+def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
+    unit: Any = module.unit(UNIT)
+    n, n_x = asked.n, module.metadata.sizes.x
+    x = np.full((n, len(asked.times), n_x), np.nan)
+    reports = np.zeros(n, dtype=np.dtype(RunReport))
+    reports["status"] = STATUS.STEP_LIMIT
+    states = np.full((n, 2, n_x), np.nan)
+    size = unit.function("batch_size")
+    size.restype = ctypes.c_long
+    memory = ctypes.create_string_buffer(size() + 64)
+    batch = ctypes.c_void_p((ctypes.addressof(memory) + 63) // 64 * 64)
+    span = np.array([*asked.span, asked.rtol, asked.first_step, asked.max_step])
+    real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
+    out = (ctypes.c_void_p * 2)(x.ctypes.data, states.ctypes.data)
+    params, wrong = _real(module, asked)
+    tables = tables_of([asked.starts, asked.inputs, params])
+    go = unit.function("batch_go")
+    go.restype = ctypes.c_long
+    begun = clock.perf_counter()
+    interrupted, done, waited = False, 0, 0
+    jumping = bool(module.metadata.switches)
+    try:
+        unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
+                                     ctypes.c_void_p(reports.ctypes.data))
+        while (now := go(batch, ctypes.c_long(PIECE))) < n and not (jumping and waited == PATIENCE):
+            done, waited = now, waited + 1 if now == done else 0
+    except KeyboardInterrupt:
+        interrupted = True
+    seconds = clock.perf_counter() - begun
+    late = np.flatnonzero(reports["status"] == STATUS.STEP_LIMIT)
+    if len(late) and not interrupted:
+        return _with_late(module, asked, x, reports, states, late, begun)
+    success = reports["status"] == STATUS.DONE
+    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
+    counts = _counts(reports)
+    solution = BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], width(module),
+                             "" if width(module) > 1 else NO_VECTORS, seconds)
+    if interrupted:
+        raise SimulationInterrupted(solution, f"{module.name}: interrupted after {int(success.sum())} of {n} motions")
+    return solution
+
+
+def _with_late(module: Module, asked: _Asked, x: np.ndarray, reports: np.ndarray, states: np.ndarray, late: np.ndarray,
+               begun: float) -> BatchSolution:
+    """Motions some of which take so many steps that they may chatter: these one by one, which finds that out."""
+    part = replace(asked, n=len(late), **{name: rows[late] if len(rows := getattr(asked, name)) > 1 else rows
+                                          for name in ("starts", "params", "inputs")})
+    single = _one_by_one(module, part, None, part.inputs, "", {"events": False})
+    success = reports["status"] == STATUS.DONE
+    unit: Any = module.unit(UNIT)
+    messages = {int(k): _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success) if k not in late}
+    messages |= {int(late[k]): message for k, message in single.messages.items()}
+    counts = _counts(reports)
+    x[late], success[late] = single.x, single.success
+    counts[late] = np.column_stack([single.n_steps, single.n_rejected])
+    note = (f"{len(late)} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and the right-hand side "
+            "jumps, so that they may chatter")
+    return BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
+                         width(module), note, clock.perf_counter() - begun)
+
+
+def _real(module: Module, asked: _Asked) -> tuple[np.ndarray, dict[int, str]]:
+    """The parameters, NaN in rows with masses that no body has, and what to say of these."""
+    wrong = negative_masses(module, asked.params)
+    if not wrong:
+        return asked.params, wrong
+    if len(asked.params) == 1:
+        raise ArgumentError(wrong[0])
+    params = asked.params.copy()
+    params[list(wrong)] = np.nan
+    return params, wrong
+
+
+def _counts(reports: np.ndarray) -> np.ndarray:
+    """Accepted steps and attempts given up, (n, 2)."""
+    return np.column_stack([reports["n_steps"], reports["n_rejected"]])
+
+
+def _message(unit: Any, row: np.ndarray, states: np.ndarray) -> str:
+    of, metadata = RunReport.from_buffer_copy(row.tobytes()), unit.metadata
+    if of.status == STATUS.STEP_LIMIT:
+        return f"{metadata.name}: not finished"
+    reason, bad = unit.reason(of.reason), of.bad_index
+    if of.status == STATUS.NO_CONSTANTS:
+        return f"{metadata.name}: {reason}; check the parameters"
+    failed = of.status in (STATUS.FIELD_FAILED, STATUS.STATE_NOT_FINITE)
+    x = states[int(failed)]
+    if of.status == STATUS.BAD_ARGUMENT:
+        wrong = [name for name, value in zip(metadata.x, x, strict=True) if not np.isfinite(value)]
+        return f"{metadata.name}: the start is not finite: {', '.join(wrong)}"
+    why = {STATUS.FIELD_FAILED: reason, STATUS.STEP_TOO_SMALL: f"the step became too small ({of.h:.3g} s) for the tolerances",
+           STATUS.STATE_NOT_FINITE: f"the derivative of {metadata.x[bad] if 0 <= bad < len(x) else 'the state'} is not finite"}
+    return describe_stop(metadata, of.t_fail if failed else of.t, x,
+                         why.get(of.status, f"the integrator does not go on (status {of.status})"))
+
+
+# -- one by one
+
+
+def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, note: str,
+                options: Mapping[str, Any]) -> BatchSolution:
+    """used: where the inputs at the times that are kept go, (n, n_t, n_in); left as it is where they do not vary."""
+    n, n_x, sizes = asked.n, module.metadata.sizes.x, module.metadata.sizes
+    x = np.full((n, len(asked.times), n_x), np.nan)
+    success, counts = np.zeros(n, dtype=bool), np.zeros((n, 2), dtype=int)
+    messages: dict[int, str] = {}
+    doubts: list[str] = []
+    times = asked.times if len(asked.times) > 1 else np.array(asked.span)
+    begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
+
+    def solution() -> BatchSolution:
+        return BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], 1, note,
+                             clock.perf_counter() - begun)
+
+    for k in range(n):
+        start, p, given = (a[k if len(a) > 1 else 0] for a in (asked.starts, asked.params, asked.inputs))
+        q, u, z = np.split(start, np.cumsum([sizes.q, sizes.u]))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SimulationWarning)
+                done = module.simulate(times, q, u, p, z=z, inputs=given if inputs is None else inputs, rtol=asked.rtol,
+                                       atol=asked.atol, max_step=asked.max_step, first_step=asked.first_step, **options)
+        except SimulationInterrupted:
+            for late in range(k, n):
+                messages[late] = f"{module.name}: not finished"
+            told = f"{module.name}: interrupted after {int(success.sum())} of {n} motions"
+            raise SimulationInterrupted(solution(), told) from None
+        except SymdynError as error:
+            messages[k] = str(error)
+            continue
+        success[k], counts[k] = done.success, (done.n_steps, done.n_rejected)
+        doubts += [f"{k}: {doubt}" for doubt in done.doubts]
+        if len(asked.times) > 1:
+            there = dict(zip(done.t.tolist(), done.x, strict=True))
+            x[k] = [there.get(t, nowhere) for t in times.tolist()]
+        elif done.success:  # at the end, or where an event ended the motion
+            x[k] = done.x[-1]
+        if used.ndim == 3:
+            kept = dict(zip(done.t.tolist(), done.inputs, strict=True))
+            used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]
+        if not done.success:
+            messages[k] = done.message
+    if doubts:
+        more = f"; and {len(doubts) - TOLD} more" if len(doubts) > TOLD else ""
+        warnings.warn(f"of {n} motions {'; '.join(doubts[:TOLD])}{more}", SimulationWarning, stacklevel=4)
+    return solution()

@@ -1,0 +1,1 @@
+"""From generated text to loaded code: compilers, the cache, libraries."""

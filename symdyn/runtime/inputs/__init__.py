@@ -1,0 +1,1 @@
+"""Inputs over time: numbers, tables, functions, sampled controllers, motions."""

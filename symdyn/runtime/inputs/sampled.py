@@ -1,0 +1,192 @@
+"""Sampled controllers: functions of time and state that are asked at instants, and whose values are held in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symdyn.arguments import OverTime
+from symdyn.errors import ArgumentError
+from symdyn.runtime.raised import called
+
+# Instants closer than this part of the shortest period are one.
+ONE_INSTANT = 1e-9
+# A period shorter than this part of the largest time cannot be told from rounding of time.
+RESOLVED = 1e-11
+
+
+@dataclass(frozen=True)
+class Sampled(OverTime):
+    """A controller that is asked at instants and whose value is held until the next one (zero-order hold).
+
+    function   f(t, x) -> the input's value, or one for each of several inputs; x = [q; u; z], (n_x,). In every simulation it
+               is called once for each instant, in the order of time, so that it may keep a memory of its own
+    period     between two instants, s
+    offset     from the start of the simulation to the first instant, s; until then inputs have their initial values
+    delay      from an instant to when its value takes effect, s: the time that computing takes; it may exceed the period
+
+    Pass it to `simulate`: inputs={F: sd.Sampled(f, period=0.01)}, inputs={(F, M): sd.Sampled(f, 0.01)} for an f that returns two
+    values, or inputs=sd.Sampled(f, 0.01) for all inputs. Steps of the integrator end at the instants. Raises ArgumentError for
+    what is no function, and for times that make no sense.
+    """
+
+    function: Callable[[float, np.ndarray], Any]
+    period: float
+    offset: float = 0.0
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ArgumentError(f"a sampled controller takes a function of (t, x) first, found {self.function!r}")
+        for what, least in (("period", "more than 0"), ("offset", "0 or more"), ("delay", "0 or more")):
+            value = getattr(self, what)
+            fits = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
+            if not fits or value < 0 or (what == "period" and value == 0):
+                raise ArgumentError(f"the {what} of a sampled controller must be a number of seconds, {least}, found {value!r}")
+
+
+class SampleRows(NamedTuple):
+    """What a controller has set: when its values took effect, t (n,), and the values (n,)."""
+
+    t: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """A controller with the places of the inputs that it sets, and how messages call it."""
+
+    sampled: Sampled
+    places: tuple[int, ...]
+    what: str
+
+    def values(self, t: float, x: np.ndarray) -> np.ndarray:
+        """What the function says, (n,). Raises InputRaised from what it raises, ArgumentError for what does not fit."""
+        given = called(self.sampled.function, t, x.copy(), self.what)
+        try:
+            values = np.asarray(given, dtype=float).reshape(-1)
+        except (TypeError, ValueError):
+            values = np.zeros(0)
+        if len(values) != len(self.places):
+            wanted = "a number" if len(self.places) == 1 else f"{len(self.places)} numbers"
+            needed = "needed is" if len(self.places) == 1 else "needed are"
+            raise ArgumentError(f"{self.what} returned {given!r} at t = {t:.6g}; {needed} {wanted}")
+        return values
+
+
+@dataclass(frozen=True)
+class Record:
+    """Inputs as they were held: from times (n,) on, values (n, n_in) at the places of inputs that controllers set; fresh
+    (n, n_in): those that were set then; ahead: the instant at which the latest piece was to end, s."""
+
+    times: np.ndarray
+    values: np.ndarray
+    fresh: np.ndarray
+    places: tuple[int, ...]
+    ahead: float
+
+    def rows(self, t: Any) -> np.ndarray:
+        """The inputs at times, (..., n_in), right at the places alone; at an instant those that take effect there."""
+        found: np.ndarray = self.values[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
+        return found
+
+    def put(self, t: Any, values: np.ndarray) -> np.ndarray:
+        """Inputs at times with what was held in place of the values (n_in,), or (n, n_in) or (1, n_in) for (n,) times."""
+        places, held = list(self.places), self.rows(t)
+        found = np.array(np.broadcast_to(values, held.shape))
+        found[..., places] = held[..., places]
+        return found
+
+    def of(self, place: int) -> SampleRows:
+        """What was set of one input."""
+        when = self.fresh[:, place]
+        return SampleRows(self.times[when], self.values[when, place])
+
+
+class Replay:
+    """Holds inputs as a record has them; close: instants that are nearer are one, s."""
+
+    close = 0.0
+
+    def __init__(self, record: Record) -> None:
+        self.record, self.close = record, 0.0
+
+    def at(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The inputs from t on, (n_in,)."""
+        return self.record.rows(t)
+
+    def after(self, t: float) -> float:
+        """The next instant, s; infinite if there is none."""
+        k = int(np.searchsorted(self.record.times, t, side="right"))
+        if k < len(self.record.times):
+            return float(self.record.times[k])
+        return self.record.ahead if t < self.record.ahead else np.inf
+
+
+class Sampling:
+    """Asks controllers at their instants, and records what is held; for one run.
+
+    constant   the inputs until a controller sets them, (n_in,); begin: the start of the run, s
+    close      instants that are nearer are one, s
+    """
+
+    def __init__(self, samplers: Sequence[Sampler], constant: np.ndarray, begin: float) -> None:
+        self.samplers, self.begin = samplers, begin
+        self.held = constant.copy()
+        self.counts = [0] * len(samplers)
+        self.waiting: list[tuple[float, tuple[int, ...], np.ndarray]] = []  # when, where, what takes effect
+        self.close = ONE_INSTANT * min(s.sampled.period for s in samplers)
+        self._times: list[float] = []
+        self._values: list[np.ndarray] = []
+        self._fresh: list[np.ndarray] = []
+
+    def at(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The inputs from t on, (n_in,), with those that are sampled at t in the state x. Raises as `Sampler.values`."""
+        fresh = np.zeros(len(self.held), dtype=bool)
+        try:
+            for k, sampler in enumerate(self.samplers):
+                instant = self._instant(k)
+                if instant <= t + self.close:
+                    self.waiting.append((instant + sampler.sampled.delay, sampler.places, sampler.values(t, x)))
+                    self.counts[k] += 1
+            for when, places, values in self.waiting:
+                if when <= t + self.close:
+                    self.held[list(places)] = values
+                    fresh[list(places)] = True
+            self.waiting = [w for w in self.waiting if w[0] > t + self.close]
+        finally:  # also where a controller ends the run: its steps, which a replay repeats, end here
+            self._times.append(t)
+            self._values.append(self.held.copy())
+            self._fresh.append(fresh)
+        return self.held.copy()
+
+    def after(self, t: float) -> float:
+        """The next instant at which a controller is asked, or a value takes effect, s."""
+        return min([*[self._instant(k) for k in range(len(self.samplers))], *[when for when, *_ in self.waiting]])
+
+    def _instant(self, k: int) -> float:
+        sampled = self.samplers[k].sampled
+        return self.begin + sampled.offset + self.counts[k] * sampled.period
+
+    @property
+    def record(self) -> Record:
+        """What was held so far."""
+        return Record(np.array(self._times), np.array(self._values).reshape(-1, len(self.held)),
+                      np.array(self._fresh).reshape(-1, len(self.held)),
+                      tuple(sorted({place for sampler in self.samplers for place in sampler.places})),
+                      self.after(self._times[-1] if self._times else self.begin))
+
+
+def check_span(samplers: Sequence[Sampler], span: tuple[float, float], owner: str) -> None:
+    """Raises ArgumentError where controllers cannot be sampled over a span."""
+    if samplers and span[1] < span[0]:
+        raise ArgumentError(f"{owner}: sampled controllers run forward in time, but t goes from {span[0]:g} to {span[1]:g} s; "
+                            "integrate forward, or pass the inputs as a function of t and x")
+    for sampler in samplers:
+        period, far = sampler.sampled.period, max(abs(span[0]), abs(span[1]))
+        if period < RESOLVED * far:
+            raise ArgumentError(f"{owner}: the period of {sampler.what}, {period:g} s, cannot be told from rounding at t = "
+                                f"{far:g} s; pass a longer one")

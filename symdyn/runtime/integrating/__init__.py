@@ -1,0 +1,1 @@
+"""Integration: the compiled methods and SciPy's, events, projection, why runs stop."""

@@ -1,0 +1,404 @@
+"""Events: times at which a quantity passes zero within steps of an integrator, and what happens there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn import panels
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.integrating.stabilization import Projector
+from symdyn.shown import LENGTH, name_of
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+EVENTS, RESETS, BOUNDS, RANGES = "events", "event_resets", "event_bounds", "event_ranges"
+# Events closer than this part of the span of the run happen at one time.
+AT_ONCE = 1e-14
+# So many resets, each within this part of the span after the one before: the motion comes to rest there, or chatters.
+CHATTER, MOST_RESETS = 1e-10, 5
+
+Between = Callable[[float], np.ndarray]
+
+
+class EventRows(NamedTuple):
+    """An event of a motion: when it happened, t (n,), and the states just before, x (n, n_x)."""
+
+    t: np.ndarray
+    x: np.ndarray
+
+
+class Happened(NamedTuple):
+    """One event: which, when, the states (n_x,) just before and just after, which differ by its reset."""
+
+    event: int
+    t: float
+    before: np.ndarray
+    after: np.ndarray
+
+
+class Carried(NamedTuple):
+    """What a run takes over from the one before it, at whose end it begins: sides of the quantities of events, (n_e,), 0 where
+    unknown; of those that have just vanished rates (n_e,), a second, NaN of all others, and what was left of them, (n_e,); reset:
+    whether the state was changed since.
+    """
+
+    sides: np.ndarray
+    rates: np.ndarray
+    left: np.ndarray
+    reset: bool
+
+
+def wanted(module: Module, asked: Any) -> np.ndarray:
+    """Which of the module's events are looked for, (n_e,) of bool; asked: True, False or names.
+
+    Raises ArgumentError for names that the mechanism has no event of.
+    """
+    names = [e.name for e in module.metadata.events]
+    if isinstance(asked, (bool, np.bool_)) or asked is None:
+        return np.full(len(names), asked is None or bool(asked))
+    chosen = [name_of(a) for a in ([asked] if isinstance(asked, str) or not isinstance(asked, Iterable) else asked)]
+    strange = [a for a in chosen if a not in names]
+    if strange:
+        raise ArgumentError(f"{module.name}: events {', '.join(name[:LENGTH] for name in strange[:8])} asked for; there are "
+                            f"{', '.join(names) or 'none'}; "
+                            "add one to the system with add_event")
+    return np.array([n in chosen for n in names], dtype=bool)
+
+
+def rows_of(module: Module, happened: Sequence[Happened], n_x: int) -> dict[str, EventRows]:
+    """Times and states by event."""
+    rows = {}
+    for k, event in enumerate(module.metadata.events):
+        own = [one for one in happened if one.event == k]
+        states = np.array([one.before[:n_x] for one in own]).reshape(len(own), n_x)
+        rows[event.name] = EventRows(np.array([one.t for one in own]), states)
+    return rows
+
+
+def ended(module: Module, k: int, t: float) -> str:
+    """What to say of a motion that an event has ended."""
+    return f"event {module.metadata.events[k].name} ended the motion at t = {t:.9g} s"
+
+
+def at_once(module: Module, happened: Sequence[Happened], near: float) -> str:
+    """What to say where resets are followed by the same event at once, again and again; near: such a time, s."""
+    last = happened[-1]
+    times = np.array([one.t for one in happened if module.metadata.events[one.event].reset])
+    gaps = np.abs(np.diff(times)) <= near
+    n = 1 + int(np.argmin(gaps[::-1]) if not gaps.all() else len(gaps))
+    name = module.metadata.events[last.event].name
+    return (f"{n} events, {name} the last, with hardly any time between: its reset leads back to it, or the motion "
+            "comes to rest there; give it stop=True, or a reset that lets the quantity leave zero")
+
+
+def not_known(module: Module, k: int) -> str:
+    """What to say where the quantity of an event is not a number."""
+    return f"event {module.metadata.events[k].name} cannot be evaluated: the result is not finite"
+
+
+def too_quick(module: Module, found: Sequence[tuple[int, float]]) -> str:
+    """What to warn of where quantities, with the time from when on, vary too quickly within steps; "" where none does."""
+    if not found:
+        return ""
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
+    return (f"{module.name}: zeros of events may be missed: {', '.join(names)} var{'y' if len(names) > 1 else 'ies'} so quickly "
+            f"within a step that {panels.MOST_DIVISIONS} divisions do not resolve it; give a max_step as short as its "
+            "shortest wave")
+
+
+def not_proved(module: Module, found: Sequence[tuple[int, float]], spacing: float) -> str:
+    """What to warn of where quantities may pass zero between their samples, with the time from when on; "" where none does, and
+    where the user has chosen the spacing of samples."""
+    if not found or spacing:
+        return ""
+    names = [f"{module.metadata.events[k].name} (from t = {t:.9g} s on)" for k, t in found]
+    return (f"{module.name}: zeros of events may be missed: {', '.join(names)} may pass zero and back between two samples, which "
+            f"{panels.MOST_PROOFS} divisions of a step do not rule out; give event_spacing, the time between samples, as short "
+            "as the shortest pulse that matters")
+
+
+def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], spacing: float) -> str:
+    """What to warn of where events depend on functions, about which nothing is known between samples: those of the user, the
+    inputs that are given by functions, and those that are not enclosed; "" where none does, and where the user has chosen the
+    spacing of samples."""
+    if look is None or spacing:
+        return ""
+    told = []
+    for record, wanted in zip(module.metadata.events, look, strict=True):
+        of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
+        of += [record.unproved] if record.unproved else []
+        told += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
+    if not told:
+        return ""
+    return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "
+            "not seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
+
+
+class Locator:
+    """Looks for events in the steps of a run: the algorithm is that of c/runtime/events.h.
+
+    p        parameters; look: which events, (n_e,) of bool; given: inputs at (t, x)
+    n_state  entries of x that are the mechanism's state; span: of the run, s; spacing: of samples at the most, s, 0: any
+    """
+
+    def __init__(self, module: Module, p: np.ndarray, look: np.ndarray, given: Callable[[float, np.ndarray], Any], n_state: int,
+                 span: float, spacing: float = 0.0) -> None:
+        self.module, self.p, self.look, self.given, self.n_state = module, p, look, given, n_state
+        self.records = module.metadata.events
+        self.direction = np.array([record.direction for record in self.records])
+        self.resets = np.array([len(record.reset) > 0 for record in self.records])
+        self.resolution = AT_ONCE * abs(span)
+        n_e = len(look)
+        self.side, self.left, self.now, self.leaving = np.zeros(n_e), np.zeros(n_e), np.zeros(n_e), np.zeros(n_e)
+        self.change = np.zeros(n_e)  # of the quantities in a small step before the latest event
+        self.kept = np.zeros(n_e, dtype=bool)  # whose side is known where the run goes on from another one
+        self.unresolved = np.zeros(n_e, dtype=bool)
+        self.starts = np.cumsum([0, *[len(record.reset) for record in self.records]])
+        self.latest, self.repeated = np.inf, 0  # of resets
+        self.fired: list[int] = []  # the events of the latest time
+        self.happened: list[Happened] = []
+        self.too_quick: list[tuple[int, float]] = []  # quantities that vary too quickly, and from when on
+        self.hidden: list[tuple[int, float]] = []  # those not proved to have no zeros between samples, and from when on
+        self.spacing = spacing
+        self.bounded = look & np.array([record.enclosed for record in self.records])
+        self.size: Any = 0.0  # of the entries of the state over the latest step
+        self.known = 0.0  # up to when the quantities are known
+        self.apart = module.unit(EVENTS).evaluator(EVENTS)
+        self.apart.set_params(p)
+        self.over = ""  # why the run ends at an event
+        self.failed = ""  # or fails at it
+
+    def values(self, t: float, x: np.ndarray) -> np.ndarray:
+        """What vanishes at the events, (n_e,); NaN where that is not known of one that is not looked for.
+
+        Raises EvaluationError where it is not known of one that is.
+        """
+        state, inputs = x[:self.n_state], self.given(t, x[:self.n_state])
+        try:
+            return self.module.evaluate(EVENTS, t, state, self.p, inputs)
+        except EvaluationError as error:
+            if error.__cause__ is not None:  # which the user's function raised: there is nothing of the others, either
+                raise
+            values = self.apart.each(t, state, inputs)
+        lost = self.look & ~np.isfinite(values)
+        if lost.any():
+            raise EvaluationError(not_known(self.module, int(lost.argmax())))
+        return values
+
+    def carry(self, carried: Carried, step: float) -> None:
+        """Go on from another run; step: that of `begin`."""
+        vanished = np.isfinite(carried.rates)
+        self.fired = np.flatnonzero(vanished).tolist()
+        self.change = step * np.where(vanished, carried.rates, 0.0)
+        self.side, self.left = np.where(vanished, np.sign(self.change), carried.sides), carried.left
+        self.kept = ~vanished & (self.side != 0) & (not carried.reset)
+
+    def begin(self, t: float, x: np.ndarray, xd: np.ndarray, step: float, after_reset: bool = False) -> None:
+        """At the start of the run and after a reset: note on which side of zero every quantity is, or, at zero, which it goes to
+        within a small step, with sign (0: that is not known yet).
+
+        Zero counts where a quantity goes on in the direction of its event, of what has just vanished only where its reset has
+        stopped it.
+        """
+        self.now = value = self.values(t, x)
+        change = self.values(t + step, x + step * xd) - value
+        fired = np.isin(np.arange(len(value)), self.fired)
+        # What has just vanished counts as zero, whatever rounding has left of it, unless a reset has moved it from there.
+        left = 2 * np.abs(self.left) + np.abs(change)
+        self.size = np.abs(x)
+        at_zero = (np.abs(value) <= self._noise(t, x)) | (fired & (np.abs(value) <= left))
+        stopped = after_reset & self.resets & (np.abs(change) <= 1e-6 * np.abs(self.change))
+        leaving = np.where(fired, self.side * stopped, np.where(self.side != self.direction, self.direction, 0))
+        self.leaving = np.where(at_zero & ~self.kept, leaving, 0.0)
+        self.side = np.where(self.kept, self.side, np.sign(np.where(at_zero, change, value)))
+        self.kept[:] = False
+        self.known = t
+
+    def first(self, t_old: float, t_new: float, between: Between) -> float | None:
+        """The time of the first events in a step, after `known`, which are noted; between(s): the state within it. None: there
+        is none."""
+        left, ends, divisions, proofs = self.known, [t_new], 0, 0
+        self.size = np.maximum(np.abs(between(t_old)), np.abs(between(t_new)))
+        most = panels.FEW_DIVISIONS if self.unresolved.any() else panels.MOST_DIVISIONS
+        while ends:
+            right = ends[-1]
+            middle, width = 0.5 * (left + right), abs(right - left)
+            divisible = width > max(2 * self.resolution, 16 * np.finfo(float).eps * abs(right))
+            if divisible and 0 < self.spacing < panels.WIDEST * width:
+                ends.append(middle)
+                continue
+            try:
+                samples, states = self._samples(left, right, between)
+            except EvaluationError:
+                if not divisible or width < panels.EVALUATED * abs(t_new - t_old):
+                    raise
+                ends.append(middle)
+                continue
+            end = states[panels.N - 2]
+            wavy = self._undecided(samples, right, end) if divisible else None
+            if wavy is not None and divisions < most:
+                divisions += 1
+                ends.append(middle)
+                continue
+            if wavy is not None and not self.unresolved[wavy]:
+                self.unresolved[wavy] = True
+                self.too_quick.append((wavy, left))
+            hidden = self._unproved(left, right, samples, [between(left), *states]) if divisible and wavy is None else None
+            if hidden is not None:
+                known = hidden in [k for k, _ in self.hidden]
+                if proofs < (panels.FEW_DIVISIONS if known else panels.MOST_PROOFS):
+                    proofs += 1
+                    ends.append(middle)
+                    continue
+                if not known:
+                    self.hidden.append((hidden, left))
+            roots = self._roots(left, right, samples, between)
+            if roots:
+                return self._note(roots, t_old, t_new, between)
+            now = samples[panels.N - 1]
+            self.side = np.where(now != 0, np.sign(now), self.side)
+            self.now, self.known, left = now, right, right
+            ends.pop()
+        return None
+
+    def after(self, t: float, x: np.ndarray) -> np.ndarray | None:
+        """The state that the motion goes on from, on the constraints, whatever keeps steps there; None if no event changed it.
+
+        Raises ProjectionFailed where the constraints do not allow what the resets ask for.
+        """
+        changed = [k for k in self.fired if self.records[k].reset]
+        if not changed:
+            return None
+        projector = Projector(self.module, self.p)
+        state = projector(t, x)
+        becomes = self.module.evaluate(RESETS, t, state[:self.n_state], self.p, self.given(t, state[:self.n_state]))
+        for k in changed:
+            state[list(self.records[k].reset)] = becomes[self.starts[k]:self.starts[k + 1]]
+        return projector.keeping(t, state, [place for k in changed for place in self.records[k].reset])
+
+    def goes_on(self, after: np.ndarray) -> None:
+        """Note the state after the resets of the latest events."""
+        n = len(self.fired)
+        self.happened[-n:] = [happened._replace(after=after) for happened in self.happened[-n:]]
+
+    def _samples(self, left: float, right: float, between: Between) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The quantities on a panel, (N + 1, n_e), see symdyn.panels, and the states there but at its start."""
+        times = left + panels.NODES * (right - left)
+        times[panels.N - 1] = right
+        states = [between(float(s)) for s in times[1:]]
+        inputs = [self.given(float(s), x[:self.n_state]) for s, x in zip(times[1:], states, strict=True)]
+        try:
+            values = self.module.evaluate(EVENTS, times[1:], np.array(states)[:, :self.n_state], self.p, np.array(inputs))
+        except EvaluationError:  # of one that is not looked for, perhaps
+            values = np.array([self.values(float(s), x) for s, x in zip(times[1:], states, strict=True)])
+        return np.vstack([self.now, values]), states
+
+    def _noise(self, t: float, x: np.ndarray) -> np.ndarray:
+        """What the quantities change by with the rounding of t and of a state within the latest step."""
+        eps = np.finfo(float).eps
+        nearby = x + eps * panels.roundings(len(x)) * self.size
+        return np.abs(self.values(t + 2 * eps * t, nearby) - self.values(t, x))
+
+    def _rounding(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The same where quantities are resolved: of those that are bounded no less than they vary by within the rounding, and
+        with that of their own operations."""
+        noise = self._noise(t, x)
+        if not self.bounded.any():
+            return noise
+        eps, state = np.finfo(float).eps, x[:self.n_state]
+        given = np.asarray(self.given(t, state), dtype=float)
+        at = np.concatenate([[t], state, given])
+        radius = eps * np.concatenate([[2 * abs(t)], panels.DENSE * self.size[:self.n_state], panels.DENSE * np.abs(given)])
+        jets = np.zeros((len(at), 6))
+        jets[:, 0], jets[:, 1] = at - radius, at + radius
+        ranges = self._bounds(RANGES, t, state, given, jets)
+        return np.where(self.bounded, np.maximum(noise, ranges[:, 1] - ranges[:, 0]), noise)
+
+    def _bounds(self, name: str, t: float, state: np.ndarray, given: np.ndarray, jets: np.ndarray) -> np.ndarray:
+        """BOUNDS or RANGES of the quantities from bounds of t, the state and the inputs, (1 + n_x + n_in, 6)."""
+        leaves = self.module.metadata.event_leaves
+        return self.module.evaluate(name, t, state, self.p, given, jets[list(leaves)].ravel())
+
+    def _undecided(self, samples: np.ndarray, right: float, end: np.ndarray) -> int | None:
+        """The first quantity that may have zeros on a panel which the signs at its ends do not show."""
+        wavy = self.look & panels.undecided(samples)
+        if not wavy.any():
+            return None
+        try:
+            noise = self._rounding(right, end)
+        except EvaluationError:
+            return int(wavy.argmax())
+        wavy &= panels.size(samples) > panels.NOISE * noise
+        return int(wavy.argmax()) if wavy.any() else None
+
+    def _unproved(self, left: float, right: float, samples: np.ndarray, states: Sequence[np.ndarray]) -> int | None:
+        """The first quantity that may have zeros between the samples of a panel."""
+        if not self.bounded.any():
+            return None
+        times = left + panels.NODES * (right - left)
+        times[panels.N - 1] = right
+        rows = np.array([np.concatenate([x[:self.n_state], self.given(float(s), x[:self.n_state])])
+                         for s, x in zip(times, states, strict=True)])
+        try:
+            bounds = self._bounds(BOUNDS, right, rows[0, :self.n_state], rows[0, self.n_state:], panels.jets(left, right, rows))
+            doubtful = self.bounded & panels.unproved(samples, bounds)
+            most = np.abs(samples[:panels.N]).max(axis=0)
+            if doubtful.any():
+                doubtful &= most > panels.NOISE * self._rounding(right, states[panels.N - 1])
+        except EvaluationError:
+            doubtful = self.bounded
+        return int(doubtful.argmax()) if doubtful.any() else None
+
+    def _roots(self, left: float, right: float, samples: np.ndarray, between: Between) -> dict[int, float]:
+        """Events on a panel on which every quantity is monotone or has no zero, with their times."""
+        now = np.sign(samples[panels.N - 1])
+        self.side = np.where(self.side == 0, now, self.side)
+        leaves = self.look & (self.side != 0) & (self.side == self.leaving)
+        self.leaving = np.where((self.side != 0) & ~leaves, 0.0, self.leaving)
+        passed = self.look & ~leaves & (self.side != 0) & (now != self.side) & np.isin(self.direction * self.side, (0, -1))
+        roots = {int(k): self._root(int(k), left, right, between) for k in np.flatnonzero(passed)}
+        return roots | {int(k): left for k in np.flatnonzero(leaves)}
+
+    def _root(self, k: int, left: float, right: float, between: Between) -> float:
+        """The zero of one quantity, which leaves its side between left and right."""
+        from scipy.optimize import brentq
+
+        def value(s: float) -> float:
+            return float(self.values(s, between(s))[k]) * self.side[k]
+
+        a, b = left, right
+        while value(a) <= 0:  # it begins at its zero: the quantity comes back to it after a while, or at once
+            if abs(b - a) <= self.resolution:
+                return left
+            middle = 0.5 * (a + b)
+            a, b = (middle, b) if value(middle) > 0 else (a, middle)
+        return float(brentq(value, a, b, xtol=max(4e-16 * abs(b), 1e-300), rtol=1e-15)) if value(b) < 0 else b
+
+    def _note(self, roots: dict[int, float], t_old: float, t_new: float, between: Between) -> float:
+        t = min(roots.values(), key=lambda s: abs(s - t_old))
+        before = between(t)
+        self.left = self.values(t, before)
+        self.known = t
+        events = [k for k, s in roots.items() if abs(s - t) <= self.resolution]
+        # Again at once, although its reset sends it away from zero: it goes less far than is resolved.
+        no_time = abs(t - self.latest) <= self.resolution
+        fresh = [k for k in events if self.leaving[k] == 0 or self.leaving[k] != self.side[k]]
+        again = no_time and any(self.resets[k] for k in fresh if k in self.fired)
+        self.fired, self.now = events, self.left
+        self.side[fresh], self.leaving[events] = -self.side[fresh], 0.0
+        self.happened += [Happened(k, t, before, before) for k in events]
+        if any(self.records[k].reset for k in events):
+            near = abs(t - self.latest) <= CHATTER / AT_ONCE * self.resolution
+            self.repeated, self.latest = MOST_RESETS if again else self.repeated + 1 if near else 1, t
+            earlier = t - min(1e-6 * abs(t_new - t_old), abs(t - t_old)) * np.sign(t_new - t_old)
+            self.change = self.left - self.values(earlier, between(earlier))
+        stopping = [k for k in events if self.records[k].stop]
+        if stopping:
+            self.over = ended(self.module, stopping[0], t)
+        elif self.repeated >= MOST_RESETS:
+            self.failed = at_once(self.module, self.happened, CHATTER / AT_ONCE * self.resolution)
+        return t

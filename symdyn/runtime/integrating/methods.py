@@ -1,0 +1,101 @@
+"""The compiled methods of integration by name, what each needs and does not do, and the units that hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from symdyn.backend.right_side import METHOD
+from symdyn.errors import ArgumentError
+from symdyn.runtime.integrating.outcome import Request
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+DEFAULT, SERIES = METHOD, "taylor"
+# What doubles cannot resolve is not asked for: with less, no step would ever be good enough.
+SMALLEST_RTOL = 1e-15
+
+
+@dataclass(frozen=True)
+class CompiledMethod:
+    """A method of the C backend.
+
+    needs    functions that the module must have
+    unfit    why it does not take a module or a request, with what to use instead; empty if it does
+    kinked   what tolerances are multiplied by where functions of inputs may have kinks, which its estimate of errors underrates
+    """
+
+    name: str
+    needs: tuple[str, ...] = ()
+    unfit: Callable[[Module, Request], str] = lambda module, request: ""
+    kinked: float = 1.0
+
+
+def _constrained(module: Module, request: Request) -> str:
+    """Steps that are projected onto constraints are not symmetric: energy would drift as with any other method."""
+    names = module.metadata.constraints
+    if not names:
+        return ""
+    return (f"it keeps energy by its symmetry, which corrections back onto constraints ({', '.join(names[:3])}"
+            f"{', ...' if len(names) > 3 else ''}) take away; use method='dop853', which is projected, with a tight rtol, or "
+            "coordinates that need no constraints")
+
+
+def _switching(module: Module, so: str) -> str:
+    """Why steps of high order go wrong without a sign of it, and what follows, `so`; empty if the right-hand side is smooth."""
+    reason = module.metadata.not_smooth
+    return f"{reason}, {so}; use method='{DEFAULT}'" if reason else ""
+
+
+def _not_expanded(module: Module, request: Request) -> str:
+    """Recurrences need a right-hand side, and inputs, that are smooth along a step."""
+    if request.inputs.function is not None or request.inputs.pieces is not None:
+        return f"inputs that vary have no Taylor series; use method='{DEFAULT}', or write them as expressions of the time t"
+    return _switching(module, "and has no Taylor series there")
+
+
+def _not_collocated(module: Module, request: Request) -> str:
+    """Constant steps do not end at kinks and see few of them; tables have kinks at their times, functions are smooth if they are
+    declared to be."""
+    if request.inputs.has_kinks:
+        return (f"inputs by a table have a kink at each of its times, which constant steps go across; use method='{DEFAULT}', "
+                "a smooth function of t and x, sd.Smooth(function), or expressions of the time t")
+    if request.inputs.may_have_kinks:
+        return (f"an input by a function may jump or have kinks, which constant steps go across; use method='{DEFAULT}', 'bs54', "
+                "'radau' or 'radau5', whose steps get shorter there, or declare a function that is smooth along the motion: "
+                "sd.Smooth(function)")
+    return _constrained(module, request) or _switching(module, "where it may have kinks, which constant steps go across")
+
+
+COMPILED = {m.name: m for m in (
+    CompiledMethod(DEFAULT), CompiledMethod("bs54"), CompiledMethod("gauss", unfit=_not_collocated),
+    CompiledMethod(SERIES, unfit=_not_expanded),
+    # Of its estimate only 10 r^(1/4) counts, r as rtol: at kinks errors were up to 25 times those of DEFAULT, with r/100 not.
+    CompiledMethod("radau", ("jacobian_x",), kinked=0.01), CompiledMethod("radau5", ("jacobian_x",), kinked=0.01),
+)}
+
+
+def with_own_tolerances(request: Request, method: str) -> Request:
+    """The request with the tolerances that a compiled method needs for its inputs."""
+    part = COMPILED[method].kinked if request.inputs.may_have_kinks else 1.0
+    return request if part == 1.0 else replace(request, rtol=max(part * request.rtol, SMALLEST_RTOL), atol=part * request.atol)
+
+
+def is_compiled(method: object) -> bool:
+    return isinstance(method, str) and method in COMPILED
+
+
+def check_compiled(module: Module, request: Request, method: str) -> None:
+    """Raises ArgumentError where a compiled method does not fit, with the reason and what to use instead."""
+    if module.backend != "c":
+        instead = "'Radau'" if method.startswith("radau") else "'DOP853'"
+        raise ArgumentError(f"{module.name}: the compiled integrator {shown(method)} needs the C backend; this module "
+                            f"runs on {module.backend}. Use method={instead} of SciPy, or compile(backend='c')")
+    record = COMPILED[method]
+    missing = [n for n in record.needs if n not in module.metadata.functions]
+    why = f"its equations have no {', '.join(missing)}; use method='{DEFAULT}'" if missing else record.unfit(module, request)
+    if why:
+        raise ArgumentError(f"{module.name}: method {shown(method)} does not fit: {why}")

@@ -1,0 +1,83 @@
+"""What a simulation is asked for, and what an integrator gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.inputs.sampled import Record
+from symdyn.runtime.integrating.events import Carried, Happened
+from symdyn.runtime.integrating.stabilization import Corrections, Stabilization
+
+
+@dataclass(frozen=True)
+class Request:
+    """A simulation to do; times None: store every step. max_step and first_step 0: chosen by the integrator.
+
+    n_state   entries of x0 that are the mechanism's state; one more may be the work of the loads
+    look      which of the module's events are looked for, (n_e,) of bool; None: the module has none
+    stabilization   what keeps the state on its constraints
+    carried   of events, where the run goes on from the end of another one
+    event_spacing   of the samples of events at the most, s; 0: as they vary
+    """
+
+    span: tuple[float, float]
+    times: np.ndarray | None
+    x0: np.ndarray
+    p: np.ndarray
+    inputs: Inputs
+    rtol: float
+    atol: np.ndarray
+    max_step: float
+    first_step: float
+    max_steps: int | None
+    n_state: int
+    stabilization: Stabilization = field(default_factory=Stabilization)
+    look: np.ndarray | None = None
+    carried: Carried | None = None
+    event_spacing: float = 0.0
+
+    @property
+    def field_p(self) -> np.ndarray:
+        """Parameters of the right-hand side: Baumgarte's gain is one more."""
+        return np.append(self.p, self.stabilization.gain) if self.stabilization.way == "baumgarte" else self.p
+
+    def with_work(self) -> Request:
+        """The same with one more state, the work of the loads, under the largest absolute tolerance."""
+        return replace(self, x0=np.append(self.x0, 0.0), atol=np.append(self.atol, self.atol.max(initial=self.rtol)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was computed: t (n_t,), x (n_t, n_x), whether the end was reached, and if not when, where and why.
+
+    happened   events in order, see runtime.events
+    doubts     what to warn of in a run that went on; warned: what was warned of on the way
+    cause      what a function of the user raised, if that ended the run
+    no_series  why the right-hand side, which can be evaluated, has no Taylor series where the run stopped, if that ended it
+    next_step  length of the step that would be tried next, s; 0: not known
+    record     inputs as controllers held them; None: without controllers
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    success: bool
+    message: str
+    interrupted: bool
+    n_steps: int
+    n_rejected: int
+    n_evaluations: int
+    seconds: float | None = None
+    corrections: Corrections = field(default_factory=Corrections)
+    happened: Sequence[Happened] = ()
+    n_jacobians: int = 0
+    n_factorizations: int = 0
+    doubts: Sequence[str] = ()
+    warned: Sequence[str] = ()
+    cause: BaseException | None = None
+    no_series: str = ""
+    next_step: float = 0.0
+    record: Record | None = None

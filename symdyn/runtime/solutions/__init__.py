@@ -1,0 +1,1 @@
+"""A computed motion and what is made of it."""

@@ -1,0 +1,434 @@
+"""Solution: a computed motion; time first. Energy and outputs are evaluated when asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import difflib
+import json
+import os
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.arguments import fixed
+from symdyn.backend.metadata import Sizes
+from symdyn.counting import counted
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.constraints import names, position_residual, rank, unique, velocity_residual
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.inputs.sampled import SampleRows
+from symdyn.runtime.integrating.events import EventRows, rows_of
+from symdyn.runtime.integrating.outcome import Outcome
+from symdyn.runtime.paths import as_path, writing
+from symdyn.runtime.solutions.energy_balance import reset_energy
+from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
+from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    import sympy as sp
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.figure import Figure
+
+    from symdyn.given import BodyOrName, JointOrName, PathName, Times
+    from symdyn.runtime.module import Module
+
+# With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
+REST = 1e-10
+
+
+class Solution:
+    """A motion.
+
+    t (n_t,), x (n_t, n_x), q (n_t, n_q), u (n_t, n_u), z (n_t, n_z); y is x transposed, as SciPy has it
+    success, message    whether the end was reached, and if not when, where and why
+    doubts   sentences that were warned of in a run that went on, such as zeros of events that may be missed
+    cause    the exception by which a function of the user ended the motion, with its traceback; else None
+    n_steps, n_rejected, nfev   of the integrator; njev, nlu: Jacobians and factorizations of implicit methods
+    seconds, integrator_seconds   wall time of the call, and inside compiled code
+    tolerances    relative, and the largest absolute one, if they are known
+    method, why   of integration, and why it was chosen, if it was (method="auto")
+    events    name -> times t (n,) and states just before x (n, n_x) of the system's events
+    corrections   of projections onto the constraints: the largest of position and speed, how many, how much work
+    """
+
+    def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
+                 seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "",
+                 repeat: Callable[[np.ndarray], np.ndarray] | None = None) -> None:
+        self.module = module
+        self._repeat = repeat
+        self.t = outcome.t
+        self.x = outcome.x[:, :-1] if work else outcome.x
+        self._work = outcome.x[:, -1] if work else None
+        self.success, self.message, self.cause = outcome.success, outcome.message, outcome.cause
+        self.doubts = (*outcome.warned, *outcome.doubts)
+        self.n_steps, self.n_rejected, self.nfev = outcome.n_steps, outcome.n_rejected, outcome.n_evaluations
+        self.njev, self.nlu = outcome.n_jacobians, outcome.n_factorizations
+        self.integrator_seconds = outcome.seconds
+        self.seconds = seconds
+        self.params, self.method, self.backend, self.why = fixed(params), method, module.backend, why
+        self.corrections, self.tolerances = outcome.corrections, tolerances
+        self._inputs = inputs
+        # A function of the user may depend on what changes after the run, such as the variable of a loop: it is called here.
+        self._input_rows = np.broadcast_to(inputs.rows(self.t, self.x), (len(self.t), len(inputs.constant)))
+        self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata.sizes.x)
+        self._happened = list(outcome.happened)
+        self._n_c = len(names(module))
+
+    def __call__(self, t: Times) -> np.ndarray:
+        """States at any times of the motion, (n_x,) for a time, (..., n_x) for an array of times in any order, s.
+
+        The motion is integrated once more, by the same steps, with these as its output times: the states are as exact as those at
+        the output times of the run, and rows of the solution are met to the last bit. Pass all times at once: every call takes as
+        long as the run. At the time of an event the state is that before it, as in the run.
+        Raises ArgumentError for times outside of the motion and for motions that were not integrated by `simulate`.
+        """
+        if self._repeat is None:
+            raise ArgumentError(f"{self.module.name}: states at any time need a motion that simulate has integrated; this one "
+                                f"holds {len(self.t)} times, in sol.t")
+        try:
+            asked = np.asarray(t, dtype=float)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{self.module.name}: t must be a time or an array of times, found {t!r}") from None
+        first, last = float(self.t.min(initial=np.inf)), float(self.t.max(initial=-np.inf))
+        outside = asked[~((asked >= first) & (asked <= last))]
+        if outside.size:
+            if len(self.t) == 0:
+                raise ArgumentError(f"{self.module.name}: the motion holds no time at all: {self.message}")
+            raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
+                                f"its state was asked for at t = {outside.flat[0]:.9g} s")
+        times, places = np.unique(asked, return_inverse=True)
+        found = self._repeat(times)[:, :self._sizes.x]
+        return found[places.reshape(asked.shape)]
+
+    def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
+        """One coordinate, speed, extra state, input or output over time, by name or symbol, (n_t, ...); "lam" for all
+        multipliers, the name of a constraint, with or without lam_ before it, for its multiplier.
+
+        Raises ArgumentError for an unknown name.
+        """
+        name = name_of(name)
+        metadata = self.module.metadata
+        if name in metadata.x:
+            return self.x[:, metadata.x.index(name)]
+        if name in metadata.inputs:
+            return self.inputs[:, metadata.inputs.index(name)]
+        if name in self.outputs:
+            return self.outputs[name]
+        constraints = names(self.module)
+        if self._n_c and name == "lam":
+            return self.lam
+        if name in constraints or name.removeprefix("lam_") in constraints:
+            return self.lam[:, constraints.index(name if name in constraints else name.removeprefix("lam_"))]
+        known = [*metadata.x, *metadata.inputs, *self.outputs, *(["lam", *constraints] if self._n_c else ())]
+        near = difflib.get_close_matches(name, known, 3)
+        raise ArgumentError(f"{self.module.name}: the solution has no {shown(name)}; "
+                            + (f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(known)}"))
+
+    @property
+    def y(self) -> np.ndarray:
+        """(n_x, n_t)"""
+        return self.x.T
+
+    @property
+    def status(self) -> int:
+        """0: reached the end, -1: stopped early, as in SciPy."""
+        return 0 if self.success else -1
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.x[:, :self._sizes.q]
+
+    @property
+    def u(self) -> np.ndarray:
+        return self.x[:, self._sizes.q:self._sizes.q + self._sizes.u]
+
+    @property
+    def z(self) -> np.ndarray:
+        return self.x[:, self._sizes.q + self._sizes.u:]
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        """Kinetic plus potential energy, (n_t,), J."""
+        return self.energies.sum(axis=1)
+
+    @cached_property
+    def energies(self) -> np.ndarray:
+        """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not tell it."""
+        if "energy" not in self.module.functions:
+            raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not tell the energy; compute it "
+                                "from sol.q and sol.u, or describe the mechanism by bodies and joints")
+        return self._rows("energy")
+
+    def energy_at(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Kinetic plus potential energy at times (n,) and states (n, n_x), with the motion's parameters and inputs, (n,), J."""
+        rows = self.module.evaluate("energy", t, x, self.params, self._inputs.rows(t, x))
+        return np.array(rows.reshape(len(t), -1).sum(axis=1))
+
+    @cached_property
+    def reset_energy(self) -> dict[str, np.ndarray]:
+        """Energy that resets of events have added since the start, (n_t,), J, by the event's name, "a + b" for events at one
+        time; negative where it is lost, as in impacts. Empty without such events.
+
+        Raises ArgumentError for equations by hand, as `energies` does.
+        """
+        return reset_energy(self, self._happened) if len(self.energies) else {}
+
+    @property
+    def energy_balance(self) -> dict[str, np.ndarray]:
+        """Parts of the energy balance since the start, each (n_t,), J: "change" of kinetic and potential energy; "work" of the
+        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "error", the change less all others.
+
+        Raises ArgumentError as `work` does.
+        """
+        change = self.energy - self.energy[0]
+        parts = {"work": self.work, **{f"reset of {name}": rows for name, rows in self.reset_energy.items()}}
+        return {"change": change, **parts, "error": change - sum(parts.values())}
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work of all loads but gravity and springs since the start, (n_t,), J.
+
+        Raises ArgumentError if the simulation was not asked for it and there are such loads.
+        """
+        if self._work is not None:
+            return self._work
+        if self.module.metadata.conservative:
+            return np.zeros(len(self.t))
+        raise ArgumentError(f"{self.module.name} has loads that do work; pass work=True to simulate")
+
+    @property
+    def has_work(self) -> bool:
+        """Whether the work of the loads was integrated along with the motion."""
+        return self._work is not None
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """The inputs at every time, (n_t, n_in), as they were when the run ended; at an instant of a sampled controller those
+        that take effect there; not a number where a function of the user raises."""
+        return self._input_rows
+
+    @property
+    def samples(self) -> dict[str, SampleRows]:
+        """Input name -> what its sampled controller set: when the values took effect, t (n,), and the values (n,)."""
+        record, known = self._inputs.record, self.module.metadata.inputs
+        return {} if record is None else {name: record.of(k) for k, name in enumerate(known) if record.fresh[:, k].any()}
+
+    @cached_property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """The user's named outputs, each (n_t, ...)."""
+        if not self.module.metadata.outputs:
+            return {}
+        return self.module.split_outputs(self._rows("outputs"))
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """Origin and rotation (row by row) of every body's frame, n-frame, (n_t, n_b, 12)."""
+        return self._rows("frames")
+
+    # -- constraints
+
+    @cached_property
+    def lam(self) -> np.ndarray:
+        """Multipliers of the constraints, (n_t, n_c), the least ones where they are not unique; the force is -C_r^T lam.
+
+        No columns without constraints; not a number where they cannot be computed.
+        """
+        return self.rows("lam") if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
+    def constraint_violation(self) -> np.ndarray:
+        """Residuals of the constraints relative to the mechanism's length, (n_t, n_c)."""
+        return position_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
+    def velocity_violation(self) -> np.ndarray:
+        """Residuals C_dot of the constraints relative to the largest speed of the motion, (n_t, n_c)."""
+        return velocity_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
+
+    @cached_property
+    def rank(self) -> np.ndarray:
+        """Number of independent constraints, (n_t,); see Module.rank."""
+        return rank(self.module, self.t, self.x, self.params) if self._n_c else np.zeros(len(self.t), dtype=int)
+
+    @cached_property
+    def unique_reactions(self) -> dict[str, np.ndarray]:
+        """Joint name -> whether the motion determines its reaction, (n_t,) of bool; where redundant constraints share it, it is
+        that of the multipliers of least norm."""
+        return unique_reactions(self)
+
+    @cached_property
+    def unique(self) -> np.ndarray:
+        """Which multipliers the motion determines, (n_t, n_c) of bool; see Module.unique."""
+        return unique(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0), dtype=bool)
+
+    @cached_property
+    def reactions(self) -> dict[str, np.ndarray]:
+        """Joint name -> force (N) and moment (N m) on the child body about the joint's point on it, n-frame, (n_t, 6).
+
+        A reaction is what the joint holds by its shape. What acts along its speeds is none: joint forces (drives, springs and
+        dampers in the joint), gears (sd.Gear), and constraints by expression. What holds a coordinate that is given by an
+        expression, prescribed or dependent (coordinate=2*p), is a reaction. `cut_loads` has both.
+        """
+        return reactions(self)
+
+    def reaction(self, joint: JointOrName, frame: BodyOrName = "inertial") -> np.ndarray:
+        """Force and moment of one joint, by name or as the joint, (n_t, 6), in the axes of a frame, as `reactions`.
+
+        frame   "inertial" (the n-frame), "ground" (the n-frame, or the ground that moves), "parent", "child", or a body
+        Raises ArgumentError for another joint or frame.
+        """
+        return in_frame(self, self.reactions, joint, frame)
+
+    @cached_property
+    def cut_loads(self) -> dict[str, np.ndarray]:
+        """Joint name -> all that passes through the joint to its child, as force (N) and moment (N m) about the joint's point on
+        the child, n-frame, (n_t, 6): the reaction, and the joint forces (drives, springs, dampers), gears and constraints that
+        act along the joint's speeds. It does not depend on how a drive or a gear is described. Loads between two bodies
+        (add_spring_damper, add_torque with reaction) pass outside of their joint."""
+        return reactions(self, "cut_loads")
+
+    def cut_load(self, joint: JointOrName, frame: BodyOrName = "inertial") -> np.ndarray:
+        """All that passes through one joint, by name or as the joint, (n_t, 6), in the axes of a frame; see `cut_loads`.
+
+        frame   as for `reaction`
+        Raises ArgumentError for another joint or frame.
+        """
+        return in_frame(self, self.cut_loads, joint, frame)
+
+    def energy_error(self) -> float:
+        """Largest |change of energy - work of the loads - what resets of events added| over the larger of kinetic energy and
+        range of potential energy; where both are rounding errors, of a mechanism at rest, over its potential energy. See
+        `energy_balance` for the parts.
+
+        Raises ArgumentError as `work` does.
+        """
+        scale, _ = self.energy_scale
+        return float(np.abs(self.energy_balance["error"]).max() / scale) if scale > 0 else 0.0
+
+    @property
+    def energy_scale(self) -> tuple[float, bool]:
+        """What errors of energy are measured by, J, see `energy_error`; and whether the mechanism rests."""
+        kinetic, potential = self.energies.T
+        moving, whole = float(max(kinetic.max(), np.ptp(potential))), float(np.abs(potential).max())
+        rests = moving < REST * whole
+        return whole if rests else moving, rests
+
+    # -- pictures and files
+
+    def plot(self, path: PathName | None = None, view: Sequence[float] | None = None) -> Figure:
+        """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given.
+
+        view   (elevation, azimuth) of the eye on the mechanism, degrees
+        """
+        from symdyn.pictures import plot
+
+        return plot(self, path, view)
+
+    def picture(self, t: Times | PathName | None = None, path: PathName | None = None,
+                view: Sequence[float] | Sequence[Sequence[float]] | None = None) -> Figure:
+        """The mechanism at one time or several (default: start and end), side by side; returns the matplotlib figure, and saves
+        it if a path is given, which may also stand alone: picture("rest.png").
+
+        view   as for `plot`, or one for each picture
+        Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
+        """
+        from symdyn.pictures import picture
+
+        if path is None and isinstance(t, (str, os.PathLike)):
+            t, path = None, t
+        return picture(self, t, path, view)
+
+    def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
+                view: Sequence[float] | None = None) -> FuncAnimation:
+        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`."""
+        from symdyn.pictures import animate
+
+        return animate(self, path, fps, speed, view)
+
+    def report(self, path: PathName) -> Path:
+        """Write one HTML file that tells all about the run: parameters, start, curves, extremes, energy, pictures, and what
+        was generated. It opens without a network; returns its path.
+
+        Raises ArgumentError for another ending than .html, MissingExtra without matplotlib.
+        """
+        from symdyn.runtime.solutions.report import write_report
+
+        return write_report(self, path)
+
+    def save(self, path: PathName) -> Path:
+        """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs, outputs and multipliers in columns).
+
+        Raises ArgumentError for another ending.
+        """
+        path = as_path(path, "where to save the motion", "run.npz")
+        if path.suffix not in (".npz", ".csv"):
+            raise ArgumentError(f"cannot save to {path.name}: the ending must be .npz or .csv")
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            (self._save_arrays if path.suffix == ".npz" else self._save_columns)(path)
+        return path
+
+    def _save_arrays(self, path: Path) -> None:
+        about = {"name": self.module.name, "x": self.module.metadata.x, "inputs": self.module.metadata.inputs,
+                 "parameters": self.module.metadata.parameters, "units": self.module.metadata.units,
+                 "method": self.method, "backend": self.backend, "success": self.success, "message": self.message}
+        arrays: dict[str, Any] = {f"output_{name}": rows for name, rows in self.outputs.items()}
+        if "energy" in self.module.functions:
+            arrays["energy"] = self.energy
+        if self.module.metadata.inputs:
+            arrays["inputs"] = self.inputs
+        if self._n_c:
+            about["constraints"] = names(self.module)
+            arrays |= {"lam": self.lam, "constraint_violation": self.constraint_violation,
+                       "velocity_violation": self.velocity_violation}
+        arrays |= {f"reaction_{name}": rows for name, rows in self.reactions.items()}
+        np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
+                 about=np.array(json.dumps(about)), **arrays)
+
+    def _save_columns(self, path: Path) -> None:
+        titles = ["t", *self.module.metadata.x, *self.module.metadata.inputs]
+        columns = [self.t, *self.x.T, *self.inputs.T]
+        for name, rows in self.outputs.items():
+            flat = rows.reshape(len(self.t), int(np.prod(rows.shape[1:])))
+            titles += [name] if flat.shape[1] == 1 else [f"{name}_{k + 1}" for k in range(flat.shape[1])]
+            columns += list(flat.T)
+        titles += [f"lam_{name}" for name in names(self.module)]
+        columns += list(self.lam.T)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(titles)
+            writer.writerows([[repr(float(v)) for v in row] for row in zip(*columns, strict=True)])
+
+    @property
+    def _sizes(self) -> Sizes:
+        return self.module.metadata.sizes
+
+    def rows(self, name: str) -> np.ndarray:
+        """A function of the module at every time, (n_t, ...); not a number where it cannot be evaluated."""
+        try:
+            return self._rows(name)
+        except EvaluationError:
+            return self._single_rows(name)
+
+    def _single_rows(self, name: str) -> np.ndarray:
+        found = np.full((len(self.t), *self.module.shape(name)), np.nan)
+        inputs = self.inputs
+        for k, (t, x) in enumerate(zip(self.t, self.x, strict=True)):
+            with contextlib.suppress(EvaluationError):
+                found[k] = self.module.evaluate(name, t, x, self.params, inputs[k])
+        return found
+
+    def _rows(self, name: str) -> np.ndarray:
+        if len(self.t) == 0:
+            return np.zeros((0, *self.module.shape(name)))
+        return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(
+            len(self.t), *self.module.shape(name))
+
+    def __repr__(self) -> str:
+        end = f" to t = {self.t[-1]:.6g} s" if len(self.t) else ""
+        return (f"<Solution of {self.module.name}: {counted(len(self.t), 'time')}{end}, {counted(self.n_steps, 'step')}, "
+                f"{self.method} on {self.backend}: {self.message}>")

@@ -1,0 +1,172 @@
+"""What a report of one run tells in tables: facts, parameters, start, extremes, energy, constraints, what loads look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.runtime.solutions.validity import WATCHES, watched
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+WHERE = {"c": "compiled C", "numpy": "NumPy"}
+# An energy balance worse than this is marked.
+DOUBTFUL = 1e-6
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The balance of a run, J: work of the loads (input less dissipation), what resets of events added by event, change of
+    energy, the largest difference of what was added and the change on the way; this relative to the larger of kinetic energy
+    and range of potential energy, of a mechanism at rest to its energy; rows over time: work and resets, change."""
+
+    work: float
+    resets: dict[str, float]
+    change: float
+    difference: float
+    relative: float
+    rests: bool
+    rows: np.ndarray
+
+    @property
+    def doubtful(self) -> bool:
+        return not self.relative <= DOUBTFUL
+
+
+def number(value: Any) -> str:
+    """Six digits."""
+    return f"{float(value):.6g}".replace("-", "\N{MINUS SIGN}") if np.isfinite(value) else "not a number"
+
+
+def facts(solution: Solution) -> list[tuple[str, str]]:
+    """How the run was computed: pairs of title and text."""
+    rows = [("Formulation", str(solution.module.metadata.formulation)),
+            ("Computed by", f"{solution.method} on {WHERE.get(solution.backend, solution.backend)}")]
+    if len(solution.t):
+        rows.append(("Span", f"t = {number(solution.t[0])} s to {number(solution.t[-1])} s, {len(solution.t)} times"))
+    if solution.tolerances is not None:
+        rows.append(("Tolerances", f"relative {solution.tolerances[0]:.3g}, absolute {solution.tolerances[1]:.3g}"))
+    rows += [("Steps", f"{solution.n_steps}, and {solution.n_rejected} rejected"), ("Evaluations", str(solution.nfev))]
+    if solution.njev:
+        rows.append(("Jacobians", f"{solution.njev}, and {solution.nlu} factorizations"))
+    inside = solution.integrator_seconds
+    rows.append(("Time", _seconds(solution.seconds)
+                 + (f", of which {_seconds(inside)} inside the integrator" if inside is not None else "")))
+    sizes = solution.module.metadata.sizes
+    counts = [(len(solution.module.metadata.bodies), "body", "bodies"), (sizes.q, "coordinate", "coordinates"),
+              (sizes.u, "speed", "speeds"), (sizes.z, "extra state", "extra states"), (sizes.inputs, "input", "inputs"),
+              (sizes.p, "parameter", "parameters")]
+    return [*rows, ("Model", ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in counts if n))]
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.3g} s" if time >= 1 else f"{1e3 * time:.3g} ms"
+
+
+def unit(text: str) -> str:
+    """A unit with raised figures."""
+    return text.replace("^2", "\N{SUPERSCRIPT TWO}").replace("^3", "\N{SUPERSCRIPT THREE}")
+
+
+def parameters(solution: Solution) -> list[dict[str, Any]]:
+    """Every parameter with its value, unit, default, and whether the value differs from it."""
+    metadata = solution.module.metadata
+    rows = []
+    for name, value, default in zip(metadata.parameters, solution.params, metadata.defaults, strict=True):
+        given = default if default is not None and np.isfinite(default) else None
+        rows.append({"name": name, "value": number(value), "unit": unit(metadata.units.get(name, "")),
+                     "default": "none" if given is None else number(given), "changed": given is None or float(value) != given})
+    return rows
+
+
+def start(solution: Solution) -> list[dict[str, str]]:
+    """The state that the run begins with."""
+    if not len(solution.t):
+        return []
+    metadata = solution.module.metadata
+    return [{"name": name, "value": number(value), "unit": unit(metadata.units.get(name, ""))}
+            for name, value in zip(metadata.x, solution.x[0], strict=True)]
+
+
+def extremes(solution: Solution) -> list[dict[str, str]]:
+    """Least and largest value with their times, mean and standard deviation over time of all coordinates, speeds, states, inputs
+    and outputs."""
+    rows: list[dict[str, str]] = []
+    if not len(solution.t):
+        return rows
+    for kind, name, unit, values in _curves(solution):
+        if not np.isfinite(values).all():
+            continue
+        low, high = int(values.argmin()), int(values.argmax())
+        mean = _mean(solution.t, values)
+        rows.append({"kind": kind, "name": name, "unit": unit, "least": number(values[low]), "t_least": number(solution.t[low]),
+                     "most": number(values[high]), "t_most": number(solution.t[high]), "mean": number(mean),
+                     "deviation": number(np.sqrt(_mean(solution.t, (values - mean)**2)))})
+    return rows
+
+
+def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
+    """Kind, name, unit and values (n_t,) of everything that is one number over time."""
+    from symdyn.pictures.points import points_of
+
+    metadata = solution.module.metadata
+    for kind, group, columns in (("coordinate", "q", solution.q), ("speed", "u", solution.u), ("state", "z", solution.z),
+                                 ("input", "inputs", solution.inputs)):
+        for name, values in zip(metadata.names(group), columns.T, strict=True):
+            yield kind, name, unit(metadata.units.get(name, "")), values
+    points = points_of(solution)
+    for name, rows in solution.outputs.items():
+        if rows.ndim <= 2:
+            flat = rows.reshape(len(solution.t), -1)
+            point = points.get(name)
+            for k, values in enumerate(flat.T):
+                told = metadata.output_units.get(name, "") if point is None else point.unit
+                place = "" if flat.shape[1] == 1 else f" {'xyz'[k]}" if told else f"[{k}]"
+                yield "output", name + place, unit(told), values
+
+
+def _mean(t: np.ndarray, values: np.ndarray) -> float:
+    """Mean over time; between the times the values go straight."""
+    if len(t) < 2:
+        return float(values.mean())
+    return float(((values[1:] + values[:-1]) / 2 * np.diff(t)).sum() / (t[-1] - t[0]))
+
+
+def energy(solution: Solution) -> Energy | None:
+    """The balance, where energy is known and the work of the loads is (a run with work=True, or loads that do none)."""
+    known = solution.has_work or solution.module.metadata.conservative
+    if not known or "energy" not in solution.module.functions or not len(solution.t):
+        return None
+    balance = solution.energy_balance
+    change, error = balance["change"], balance["error"]
+    resets = {name: float(rows[-1]) for name, rows in solution.reset_energy.items()}
+    return Energy(float(solution.work[-1]), resets, float(change[-1]), float(np.abs(error).max()), solution.energy_error(),
+                  solution.energy_scale[1], np.column_stack([change - error, change]))
+
+
+def constraints(solution: Solution) -> list[dict[str, str]]:
+    """How well every constraint is kept: its largest residual, relative to the mechanism's length, and of its rate."""
+    names = solution.module.metadata.constraints
+    if not names or not len(solution.t):
+        return []
+    off, rate = (np.abs(rows).max(axis=0) for rows in (solution.constraint_violation, solution.velocity_violation))
+    return [{"name": name, "position": f"{a:.2g}", "velocity": f"{b:.2g}"} for name, a, b in zip(names, off, rate, strict=True)]
+
+
+def watches(solution: Solution) -> list[dict[str, Any]]:
+    """What loads want to be looked at: range of each value, its limits, and what it means if it leaves them."""
+    module = solution.module
+    if not module.metadata.watches or not len(solution.t):
+        return []
+    return [{"label": value.label, "least": number(value.low), "most": number(value.high),
+             "limits": _limits(value.least, value.most), "outside": value.outside, "message": value.message}
+            for value in watched(module, solution.rows(WATCHES))]
+
+
+def _limits(least: float, most: float) -> str:
+    ends = [f"from {number(least)}"] if np.isfinite(least) else []
+    return " ".join([*ends, *([f"to {number(most)}"] if np.isfinite(most) else [])]) or "none"

@@ -1,0 +1,410 @@
+"""Linearization: what a user gets of the linear equations about a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn.arguments import take
+from symdyn.errors import ArgumentError, MissingExtra, SymdynError
+from symdyn.runtime.consistent import NotConsistent, check_start, consistent, normalised, number
+from symdyn.runtime.masses import real_parameters
+from symdyn.shown import shown
+from symdyn.statics.analysis import WORDS, Analysis, held_note
+from symdyn.statics.equilibrium import Equilibrium, given_inputs
+from symdyn.statics.gimbal import demand_no_lock
+from symdyn.statics.manifold import Manifold, in_motion
+from symdyn.statics.modes import Modes
+from symdyn.statics.selection import Selection, holding, listed, select
+from symdyn.statics.sensitivity import Sensitivity, of_eigenvalue, shift
+from symdyn.statics.singular import singular_configuration
+from symdyn.statics.steady import Steadiness, steadiness
+from symdyn.statics.terms import Place, coordinate_names, rest
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+    from symdyn.statics.regulator import Regulator
+    from symdyn.statics.stability import Stability
+
+
+class StateSpace(NamedTuple):
+    """y' = C x' + D in', x'_dot = A x' + B in'."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+
+
+class Linearization:
+    """The linear equations about a state on the manifold of the constraints.
+
+    x'_dot = A x' + B in',  y' = C_out x' + D in'   with x' = [eta; zeta; z']: changes of the independent displacements (n_d,),
+    of the independent speeds (n_s,) and of the extra states. Velocity constraints bind speeds only: n_s is less than n_d then.
+    A, B, C_out and D are the derivative of the flow on the manifold, at rest and along any motion. Where a motion (sd.motions)
+    stands in constraints, what depends on the independent ones follows its value, rate and acceleration, which is in B and D, for
+    changes of the three that belong together. The same by forces:
+    M zeta_dot + C zeta + K eta + ... = F_in in'    M, C (n_s, n_s), K (n_s, n_d); where speeds are rates of coordinates and
+    nothing but positions is constrained, eta_dot = zeta, and this is M eta_ddot + C eta_dot + K eta = F_in in'
+    G   (n_d, n_d): eta_dot = ... - G eta; zero where speeds are rates of coordinates, and at rest
+    Z   (n_u, n_d): v = Z eta of what moves along all speeds
+
+    coordinates   names of eta: of coordinates, of speeds that are no rates (turning about that axis)
+    states        names of x'; outputs: names of y', entries of vectors by number; held: names of what is held
+    """
+
+    def __init__(self, manifold: Manifold, equilibrium: Equilibrium | None) -> None:
+        self._manifold = manifold
+        self._analysis = Analysis(manifold)
+        self.equilibrium = equilibrium
+        place = manifold.place
+        self.module = place.module
+        self.t, self.x, self.params, self.inputs = place.t, place.x, place.p, place.inputs
+        self.ud, self.lam = place.ud, place.lam
+        self.M, self.C, self.K, self.G = manifold.M, manifold.C, manifold.K, manifold.G
+        self.F_in, self.Z = manifold.F_in, manifold.Z_v
+        self.coordinates = manifold.labels
+        self.states = (*manifold.labels, *manifold.speed_labels, *manifold.state_labels)
+        self.held = manifold.selection.held
+
+    @cached_property
+    def state_space(self) -> StateSpace:
+        """(A, B, C, D); C and D have no rows without outputs.
+
+        Raises ArgumentError where the constraints do not let the mechanism follow changes of a motion (sd.motions).
+        """
+        self._manifold.demand_followed()
+        return StateSpace(*self._manifold.matrices, *self._manifold.output_matrices())
+
+    def tangent(self) -> np.ndarray:
+        """x' of the whole state = T [eta; zeta; z'], (n_x, m), with the inputs as they are."""
+        return self._manifold.tangent()
+
+    @property
+    def A(self) -> np.ndarray:
+        return self._manifold.matrices[0]
+
+    @property
+    def B(self) -> np.ndarray:
+        return self.state_space.B
+
+    @property
+    def C_out(self) -> np.ndarray:
+        return self.state_space.C
+
+    @property
+    def D(self) -> np.ndarray:
+        return self.state_space.D
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the rows of C_out and D."""
+        names: list[str] = []
+        for name, shape in self.module.metadata.outputs:
+            names += [name + (f"[{', '.join(map(str, index))}]" if index else "") for index in np.ndindex(*shape)]
+        return tuple(names)
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second."""
+        known = self.module.metadata.units
+        displaced = {label: known.get(label, known.get(self.module.metadata.u[k], "").removesuffix("/s") or "")
+                     for label, k in zip(self.coordinates, self._manifold.displacements, strict=True)}
+        others = {n: known.get(n, "") for n in (*self.states[len(self.coordinates):], *self.module.metadata.inputs)}
+        points = self.module.metadata.output_units
+        return {**others, **displaced, **{n: points.get(n.partition("[")[0], "") for n in self.outputs}}
+
+    @cached_property
+    def steadiness(self) -> Steadiness:
+        """Whether these equations are constant along the motion: kind "rest" or "steady motion", or "" and the reason."""
+        return steadiness(self._manifold)
+
+    def _demand_steady(self, what: str) -> None:
+        """Raises ArgumentError where eigenvalues decide nothing."""
+        singular = singular_configuration(self._manifold.place, self._manifold.selection)
+        if singular:
+            raise ArgumentError(f"{self.module.name}: {what} requested at a {singular}; move the mechanism away from it")
+        demand_no_lock(self._manifold.place, what)
+        if not self.steadiness.kind:
+            raise ArgumentError(f"{self.module.name}: {what} requested at a state that is neither at rest nor in steady motion: "
+                                f"{self.steadiness.reason}. Eigenvalues decide nothing there; linearize at an equilibrium, or "
+                                "use module.stability(...), which follows a periodic motion")
+
+    @cached_property
+    def eigenvalues(self) -> np.ndarray:
+        """Of A, by size, (m,) complex, 1/s. Raises ArgumentError where A is not constant along the motion."""
+        self._demand_steady("eigenvalues were")
+        return self._analysis.eigenvalues
+
+    @cached_property
+    def _modes(self) -> Modes:
+        self._demand_steady("modes were")
+        return self._analysis.modes(f"{self.module.name}: modes")
+
+    @property
+    def verdict(self) -> str:
+        """"stable", "neutral", "drifts", "unstable" or "not decided", by the eigenvalues; "" if nothing is free to move.
+
+        Raises ArgumentError where A is not constant along the motion.
+        """
+        self._demand_steady("a verdict was")
+        return self._analysis.verdict
+
+    def stability(self) -> Stability:
+        """The verdict with its evidence, also where A is not constant along the motion; see Module.stability."""
+        from symdyn.statics.stability import of_manifold
+
+        return of_manifold(self._manifold)
+
+    def modes(self) -> Modes:
+        """Natural frequencies, damping ratios, periods, shapes; prints as a table. See symdyn.statics.modes.
+
+        Raises ArgumentError where A is not constant along the motion.
+        """
+        return self._modes
+
+    # -- control
+
+    def lqr(self, Q: Any, R: Any) -> Regulator:
+        """The gain K of in' = -K x' with the least integral of x'^T Q x' + in'^T R in' from any start.
+
+        Q   weights of the states x' (see `states`): a matrix (m, m), its diagonal (m,), or numbers by name or symbol, 0 where
+            left out; symmetric and positive semidefinite
+        R   weights of the inputs, (k, k), (k,), symmetric and positive definite; by name or symbol those that have one are
+            driven, the others are disturbances and stay as they are. In order: of all inputs but motions (sd.motions)
+        Under constraints, and with held coordinates, the states are the independent ones that the linearization has. The result
+        is also the function of (t, x) that applies the gain to the mechanism: inputs=linear.lqr(Q, R), or
+        inputs=sd.Sampled(linear.lqr(Q, R), period=0.01); with other inputs that are given by name, inputs={F: regulator[F], ...}.
+
+        Raises ArgumentError for weights that are not definite, with the direction; where the equations are not stabilizable, with
+        the mode that no input reaches; where Q gives no weight to a mode that neither decays nor grows; and where A is not
+        constant along the motion. See symdyn.statics.regulator.Regulator, also for the source.
+        """
+        from symdyn.statics.regulator import lqr
+
+        self._demand_steady("a regulator was")
+        return lqr(self, Q, R)
+
+    def deviation(self, t: float, x: Any) -> np.ndarray:
+        """x' (m,), how far a state x = [q; u; z] of the mechanism (in order, or by name or symbol) is from the motion linearized
+        about, at the time t: of independent displacements, independent speeds and free extra states, to first order.
+
+        At rest the motion is the state itself; along steady motion coordinates go on at constant rates. Raises ArgumentError
+        where they do not (a wheel that rolls in a circle).
+        """
+        place, manifold = self._manifold.place, self._manifold
+        metadata = self.module.metadata
+        state = take(x, metadata.x, "x", metadata.initial_values("x"), self.module.name)
+        n_q, n_u, *_ = place.sizes
+        rates = place.balance[place.parts["q_dot"]]
+        if rates.any():
+            bent = place.balance[place.parts["q_ddot"]]
+            k = int(np.argmax(np.abs(bent)))
+            if abs(bent[k]) > 1e-9 * float(np.abs(rates).max()) * max(1.0, float(np.abs(rates).max())):
+                raise ArgumentError(f"{self.module.name}: the motion linearized about is no straight one: {metadata.q[k]} "
+                                    f"accelerates by {bent[k]:.4g} a second; apply the gain K to changes of your own")
+        off = state - place.x
+        off[:n_q] -= rates * (t - self.t)
+        v = np.linalg.lstsq(place.N, off[:n_q], rcond=None)[0]
+        return np.concatenate([v[manifold.displacements], off[n_q:n_q + n_u][manifold.speeds], off[n_q + n_u:][manifold.states]])
+
+    def to_scipy(self) -> Any:
+        """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs."""
+        from scipy.signal import StateSpace as ScipyStateSpace
+
+        return ScipyStateSpace(self.A, self.B, *self._observed()[:2])
+
+    def to_control(self) -> Any:
+        """The equations as a control.StateSpace of python-control, with names of states, inputs and outputs; with the states as
+        its outputs where the system has no outputs. Raises MissingExtra where python-control is not installed."""
+        try:
+            import control
+        except ImportError:
+            raise MissingExtra("linear.to_control() needs the package control: pip install 'symdyn[control]'") from None
+        C, D, outputs = self._observed()
+        return control.ss(self.A, self.B, C, D, states=list(self.states), inputs=list(self.module.metadata.inputs),
+                          outputs=list(outputs), name=self.module.name)
+
+    def _observed(self) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+        """C, D and names of the outputs, or of the states without outputs."""
+        if self.outputs:
+            return self.C_out, self.D, self.outputs
+        return np.eye(len(self.states)), np.zeros(self.B.shape), tuple(f"y_{n}" for n in self.states)
+
+    def derivative(self, mode: Any, parameter: Any) -> Sensitivity:
+        """Exact derivatives of a mode's eigenvalue, frequency and damping by a parameter.
+
+        mode        number or name in `modes()`; parameter: name or symbol
+        About an Equilibrium its shift with the parameter counts, and that of what was solved for; at another state the state
+        stays. Raises ArgumentError for double eigenvalues, and where what this needs is not constant: turning Euler parameters,
+        motion under constraints, part of an orientation that is kept.
+        """
+        manifold = self._manifold
+        place, selection = manifold.place, manifold.selection
+        owner = self.module.name
+        named = listed(parameter, self.module.metadata.parameters, "parameter", owner)
+        if len(named) != 1:
+            raise ArgumentError(f"{owner}: parameter must be one name or symbol, found {shown(parameter)}")
+        (name,) = named
+        if not self.steadiness.kind or self.G.any():
+            raise ArgumentError(f"{owner}: derivatives of eigenvalues hold at a state of rest or of steady motion; linearize at "
+                                "an equilibrium")
+        rows = manifold.held.positions
+        if (np.count_nonzero(rows, axis=1) > 1).any() and not _fixed_space(rows):
+            raise ArgumentError(f"{owner}: derivatives of eigenvalues with a part of an orientation kept are not available; fix "
+                                "all of its coordinates, or none")
+        if not all(self.module.metadata.holonomic or [True]):
+            raise ArgumentError(f"{owner}: derivatives of eigenvalues are not available with constraints of velocities")
+        if manifold.Z_u is not manifold.Z_v or manifold.W.any():
+            raise ArgumentError(f"{owner}: derivatives of eigenvalues along a motion under constraints are not available; they "
+                                "hold at a state of rest")
+        changes = {name: 1.0}
+        if self.equilibrium is not None:
+            changes |= shift(place, selection, name)
+        return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
+
+    def _labelled_states(self) -> tuple[str, ...]:
+        """Names of x' with units; a displacement along a speed that is no rate of a coordinate is marked."""
+        units = self.module.metadata.units
+        speeds = self.module.metadata.u
+        result = []
+        for label, k in zip(self.coordinates, self._manifold.displacements, strict=True):
+            if label == speeds[k]:
+                result.append(f"displacement along {label} [{units.get(label, '').removesuffix('/s') or '1'}]")
+            else:
+                result.append(f"{label} [{units.get(label) or '1'}]")
+        return (*result, *[f"{n} [{units.get(n) or '1'}]" for n in self.states[len(self.coordinates):]])
+
+    def __repr__(self) -> str:
+        about = "an equilibrium" if self.equilibrium is not None else "a state"
+        held = f", held: {', '.join(self.held)}" if self.held else ""
+        return f"<Linearization of {self.module.name} about {about}: {', '.join(self.coordinates)}{held}; {self._judgement()}>"
+
+    def _judgement(self) -> str:
+        """The verdict, or why there is none, in words; raises nothing."""
+        try:
+            return self.verdict or WORDS[""]
+        except (SymdynError, np.linalg.LinAlgError) as error:
+            return f"no verdict: {str(error).removeprefix(f'{self.module.name}: ')}"
+
+    def describe(self) -> str:
+        """A, B, C_out and D with names and units of rows and columns, what is held, and what the eigenvalues say, as tables."""
+        inputs = tuple(self.module.metadata.inputs)
+        lines = [f"{self.module.name}: linear equations, {len(self.states)} states, {len(inputs)} inputs; an entry of A and B "
+                 "has the unit of its row by that of its column and s, of C_out and D by that of its column"]
+        states = self._labelled_states()
+        others = [(f"{n} [{self.units.get(n) or '1'}]" for n in names) for names in (inputs, self.outputs)]
+        ins, outs = (tuple(each) for each in others)
+        A = np.where(np.abs(self.A) <= self._analysis.noise.A.rounding, 0.0, self.A)
+        lines += _table("A", A, states, states)
+        try:
+            _, B, C_out, D = self.state_space
+            lines += [*_table("B", B, states, ins), *_table("C_out", C_out, outs, states), *_table("D", D, outs, ins)]
+        except ArgumentError as error:  # no linear equations by the inputs
+            lines.append(str(error).removeprefix(f"{self.module.name}: "))
+        lines += held_note(self._manifold)
+        singular = singular_configuration(self._manifold.place, self._manifold.selection)
+        if singular:
+            return "\n".join([*lines, singular])
+        if self.steadiness.kind:
+            verdict = f"{self._analysis.verdict}, " if self._analysis.verdict else ""
+            return "\n".join([*lines, f"{self.steadiness.kind}: {verdict}{self._analysis.reason()}"])
+        return "\n".join([*lines, f"no state of rest or of steady motion: {self.steadiness.reason}"])
+
+
+def _table(name: str, matrix: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """A matrix with labels of rows and columns; nothing where it has no entries."""
+    if not matrix.size:
+        return []
+    width, widths = max(map(len, rows)), [max(11, len(label)) for label in columns]
+    lines = [f"{name:<{width}}  " + "  ".join(f"{label:>{w}}" for label, w in zip(columns, widths, strict=True))]
+    for row, values in zip(rows, matrix + 0.0, strict=True):
+        numbers = "  ".join(f"{value:>{w}.5g}" for value, w in zip(values, widths, strict=True))
+        lines.append(f"{row:<{width}}  {numbers}")
+    return lines
+
+
+def linearize(module: Module, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
+              fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
+    """See Module.linearize."""
+    if isinstance(at, Equilibrium):
+        passed = [n for n, v in (("params", params), ("t", t), ("inputs", inputs), ("free", free), ("fixed", fixed))
+                 if v is not None]
+        if passed:
+            raise ArgumentError(f"{module.name}: {', '.join(passed)} given with an equilibrium, which has its own; leave them "
+                                "out, or pass at=equilibrium.x")
+        if at.module is not module:
+            raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; linearize with its own")
+        place = at.place if hold is None else in_motion(at.place, holding(at.selection, hold))
+        return Linearization(Manifold(place, holding(at.selection, hold), _independent(module, coordinates)), at)
+    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    return Linearization(Manifold(place, selection, _independent(module, coordinates)), None)
+
+
+def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,
+             hold: Any, guess: bool = False) -> tuple[Place, Selection]:
+    """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints.
+
+    guess   the state may be moved onto the constraints
+    """
+    place = _place(module, at, params, t, inputs)
+    selection = holding(select(module, free, fixed, None), hold)
+    x = selection.apply(place.x)
+    if guess and place.sizes[3]:
+        kept = [n for n in selection.values if n in module.metadata.q or n in module.metadata.u]
+        n_q, n_u, *_ = place.sizes
+        q, u = consistent(place.bound, x[:n_q], x[n_q:n_q + n_u], place.p, place.t, kept)
+        x = np.concatenate([q, u, x[len(q) + len(u):]])
+    try:
+        check_start(place.bound, place.t, x, place.p)
+    except NotConsistent as error:
+        result = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
+        raise ArgumentError(f"{result}; linear equations exist at states that fulfil the constraints: take "
+                            "q, u = module.consistent(q, u, params), and pass (q, u)") from None
+    return in_motion(place.at(x=x), selection), selection
+
+
+def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int] | tuple[list[int], list[int]] | None:
+    """Places of independent displacements; where rates are named, too, of independent displacements and speeds."""
+    if coordinates is None:
+        return None
+    labels, speeds = list(coordinate_names(module.metadata)), list(module.metadata.u)
+    names = listed(coordinates, [*labels, *speeds], "coordinates", module.name)
+    displaced = [labels.index(n) for n in names if n in labels]
+    rates = [speeds.index(n) for n in names if n not in labels]
+    return (displaced, rates) if displaced and rates else displaced or rates
+
+
+def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
+    """The state that `at` stands for; without accelerations."""
+    metadata = module.metadata
+    if hasattr(at, "t") and hasattr(at, "x") and np.ndim(at.t) == 1:
+        return _of_solution(module, at, params, t, inputs)
+    time = 0.0 if t is None else number(t, "a finite number of seconds as t", module.name)
+    if at is None:
+        at = {}
+    if isinstance(at, tuple) and len(at) == 2 and np.ndim(at[0]) == 1:
+        at = np.concatenate([take(at[0], metadata.q, "q", {}, module.name), take(at[1], metadata.u, "u", {}, module.name),
+                             list(metadata.initial_values("z").values())])
+    x = take(at, metadata.x, "at", metadata.initial_values("x"), module.name)
+    free = given_inputs(module, inputs)
+    return rest(module, time, normalised(module, x), real_parameters(module, params), free)
+
+
+def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
+    if t is None or params is not None or inputs is not None:
+        raise ArgumentError(f"{module.name}: at a solution pass the time t alone; parameters and inputs are those of the motion")
+    time = number(t, "a finite number of seconds as t", module.name)
+    if not len(at.t) or not at.t[0] <= time <= at.t[-1]:
+        raise ArgumentError(f"{module.name}: t = {time:g} s is not in the solution, from {at.t[0]:g} to {at.t[-1]:g} s")
+    k = int(np.argmin(np.abs(at.t - time)))
+    return rest(module, float(at.t[k]), at.x[k].copy(), module.parameters(at.params), np.asarray(at.inputs[k], dtype=float))
+
+
+def _fixed_space(rows: np.ndarray) -> bool:
+    """Whether what the rows keep is the same at every state: certain speeds as a whole."""
+    used = rows.any(axis=0)
+    return bool(np.linalg.matrix_rank(rows) == int(used.sum()))

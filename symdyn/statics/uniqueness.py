@@ -1,0 +1,162 @@
+"""Whether an equilibrium is the only one near its state: whether there is a stiffness in every direction.
+
+The stiffness along a direction is a sum over all loads. Where it is zero within rounding it either vanishes, since no load acts
+along the direction, or it is lost in the digits of larger terms that cancel (1e-6 N/m next to 1e12 N/m). What every single load
+contributes decides between the two: the exact derivative of the stiffness by a parameter, times the parameter, holds none of
+the terms of other loads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from symdyn.errors import EquilibriumNotUnique
+from symdyn.statics.noise import ENTRIES, EPSILON, SAFETY, SAMPLES, rounded
+from symdyn.statics.search import Search, Trial
+from symdyn.statics.sensitivity import second
+from symdyn.statics.spectrum import ZERO
+from symdyn.statics.terms import RANK, Place, coordinate_names, multiplier, null_space
+
+# Where parameters or inputs are solved for, less than this part of the largest stiffness, scaled, counts as none.
+LEAST = 1e-9
+_STIFFNESSES = {"rad/s": "N m", "m/s": "N/m"}
+
+
+def demand_stiffness(search: Search) -> None:
+    """Raises EquilibriumNotUnique for a direction along which there is no stiffness, or none that the digits prove."""
+    trial, module = search.best, search.module
+    place, columns = trial.place, search.columns
+    _, n_u, _, n_c = place.sizes
+    states = trial.selection.states
+    inner = place.by_z[n_u + n_c:][states][:, states]
+    drifting = bool(states) and np.linalg.matrix_rank(inner) < len(states)
+    lost: list[str] = []
+    if trial.selection.conditions or drifting:  # all unknowns take part, as many as equations, seen by the scaled derivative
+        J = search.scaled(trial)[1]
+        labels = [*_direction_names(trial), *[module.metadata.z[k] for k in states], *trial.selection.unknown]
+        _, values, Vt = np.linalg.svd(J)
+        loose = Vt[len(values):] if len(values) < J.shape[1] else Vt[values <= LEAST * values.max(initial=0.0)]
+        if not trial.selection.conditions:  # extra states that nothing brings back may be anything
+            _, sizes, Wt = np.linalg.svd(loose[:, :trial.directions.shape[1]], full_matrices=False)
+            loose = Wt[sizes > 1e-6]
+        lost = [_lost_in_trim(search, direction) for direction in loose]
+    else:
+        Z = null_space(np.vstack([place.C_r, trial.selection.rows(place)]) * columns)
+        K, error = _stiffness(place, columns, states)
+        left, loose = (each @ Z.T for each in _without_stiffness(Z.T @ K @ Z, np.abs(Z.T) @ error @ np.abs(Z)))
+        labels = list(coordinate_names(module.metadata))
+        lost = [_lost(place, states, columns * u, columns * v, labels.index(_first(v, labels)),
+                      float(np.abs(u) @ error @ np.abs(v)), float(np.abs(u) @ np.abs(K) @ np.abs(v)))
+                for u, v in zip(left, loose, strict=True)]
+    if not len(loose):
+        return
+    remedy = (f"; fix it, as by fixed={{{', '.join(f'{_first(d, labels)!r}: ...' for d in loose)}}}, or add a load that holds it"
+              + (f"; or begin with other values of {', '.join(trial.selection.unknown)}, in params or inputs: where they are "
+                 "zero they may have no effect" if trial.selection.unknown else ""))
+    if any(lost):
+        parts = [f"along {_described(direction, labels)} {found}" for direction, found in zip(loose, lost, strict=True) if found]
+        none = [_described(direction, labels) for direction, found in zip(loose, lost, strict=True) if not found]
+        parts += [f"there is no stiffness along {each}" for each in none]
+        raise EquilibriumNotUnique(f"{module.name}: whether the equilibrium is unique is not decided by the digits: "
+                                   f"{'; '.join(parts)}{remedy}, or bring the sizes closer together")
+    raise EquilibriumNotUnique(f"{module.name}: the equilibrium is not unique: there is no stiffness along "
+                               + " and along ".join(_described(direction, labels) for direction in loose) + remedy)
+
+
+def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """K of all speeds, (n_u, n_u), scaled, with what extra states do at rest, and how much of its entries rounding may be."""
+    def at(here: Place) -> np.ndarray:
+        forces, rates = here.parts["forces"], here.parts["z_dot"]
+        K = here.by_v[forces]
+        if states:
+            inner = here.by_z[rates][states][:, states]
+            K = K - here.by_z[forces][:, states] @ np.linalg.solve(inner, here.by_v[rates][states])
+        return np.asarray(K * np.outer(columns, columns))
+
+    K, stream = at(place), np.random.default_rng(11)
+    change = np.max([np.abs(at(rounded(place, stream)) - K) for _ in range(SAMPLES)], axis=0)
+    return K, SAFETY * change + ENTRIES * EPSILON * np.abs(K)
+
+
+def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left and right directions (k, n) along which K is zero but for rounding."""
+    if not len(K):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    rows, sums = np.abs(K).max(axis=1), np.abs(K).max(axis=0)
+    rows, sums = (1 / np.sqrt(np.where(v > 0, v, 1.0)) for v in (rows, sums))
+    U, values, Vt = np.linalg.svd(K * np.outer(rows, sums))
+    noise = np.einsum("ik,ij,kj->k", np.abs(U), error * np.outer(rows, sums), np.abs(Vt)) + EPSILON * values.max(initial=0.0)
+    loose = values <= ZERO * noise
+    left, right = (each / np.maximum(np.linalg.norm(each, axis=1, keepdims=True), 1e-300)
+                   for each in (U.T[loose] * rows, Vt[loose] * sums))
+    return left, right
+
+
+def _lost(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, leader: int, error: float, terms: float) -> str:
+    """What loads contribute to a stiffness u^T K v that is zero within `error`, in words; "" where they contribute nothing.
+
+    u, v    (n_u,) left and right direction; leader: the coordinate by whose displacement sizes are given
+    terms   size of the terms of the stiffness
+    """
+    found = [each for each in (_contribution(place, states, u, v, k) for k in range(len(place.p) + len(place.inputs))) if each]
+    if not found:
+        return ""
+    unit = _STIFFNESSES.get(place.module.metadata.units.get(place.module.metadata.u[leader], ""), "(N, m)")
+    by = abs(u[leader] * v[leader]) or float(np.abs(u).max() * np.abs(v).max())
+    most, together = max(abs(each) for each in found) / by, abs(sum(found)) / by
+    return (f"loads make a stiffness of {together:.3g} {unit} in sums of terms of {max(terms / by, most):.3g} {unit}, known to "
+            f"{max(error / by, EPSILON * most):.1g} {unit} only")
+
+
+def _lost_in_trim(search: Search, direction: np.ndarray) -> str:
+    """The same for a direction among scaled unknowns, (n,), by the stiffness along its displacements."""
+    trial, place, columns = search.best, search.best.place, search.columns
+    n = trial.directions.shape[1]
+    v = trial.directions @ (search.widths(trial)[:n] * direction[:n])
+    if not v.any():
+        return ""
+    terms = np.abs(place.by_v[:len(v)] * np.outer(columns, columns)).max(initial=0.0) * float(np.sum((v / columns)**2))
+    return _lost(place, [], v, v, int(np.argmax(np.abs(v / columns))), LEAST * terms, terms)
+
+
+def _contribution(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, k: int) -> float:
+    """What the load of parameter (or input) k contributes to u^T K v, with its part in the multipliers; 0 within rounding."""
+    metadata = place.module.metadata
+    name = (*metadata.parameters, *metadata.inputs)[k]
+    value = float(np.concatenate([place.p, place.inputs])[k])
+    _, n_u, n_z, n_c = place.sizes
+    if not value:
+        return 0.0
+    changes = {name: 1.0}
+    if n_c:
+        by = place.by([name])[:n_u, 0]
+        lam = np.linalg.lstsq(place.C_r.T, -by, rcond=RANK)[0] * place.scale
+        changes |= {multiplier(j): float(each) for j, each in enumerate(lam) if each}
+    forces, rates = place.parts["forces"], place.parts["z_dot"]
+    z_of_v, u_z = np.zeros((n_z, n_u)), np.zeros(n_z)
+    if states:
+        inner = place.by_z[rates][states][:, states]
+        z_of_v[states] = -np.linalg.solve(inner, place.by_v[rates][states])
+        u_z[states] = -np.linalg.solve(inner.T, place.by_z[forces][:, states].T @ u)
+    none = np.zeros(n_u)
+    columns = [second(place, changes, unit, none, none, z_of_v @ unit, np.zeros(n_c)) for unit in np.eye(n_u)]
+    change = np.array(columns).T  # of the statics by v, by the parameter
+    weights = np.concatenate([u, np.zeros(n_c), u_z])
+    found = float(weights @ change @ v)
+    return value * found if abs(found) > ZERO * EPSILON * float(np.abs(weights) @ np.abs(change) @ np.abs(v)) else 0.0
+
+
+def _direction_names(trial: Trial) -> list[str]:
+    labels = coordinate_names(trial.place.module.metadata)
+    return [labels[int(np.argmax(np.abs(column)))] for column in trial.directions.T]
+
+
+def _described(direction: np.ndarray, labels: list[str]) -> str:
+    """Coordinates of a direction by their shares of its square, the largest first."""
+    shares = direction**2 / np.sum(direction**2)
+    order = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= 0.05]
+    return ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in order)
+
+
+def _first(direction: np.ndarray, labels: list[str]) -> str:
+    return labels[int(np.argmax(np.abs(direction)))]

@@ -1,0 +1,1 @@
+"""Times of compiled code, measured in loops and taken in turns."""

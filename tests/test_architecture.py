@@ -1,0 +1,90 @@
+"""The direction of imports, as docs/architecture.md has it, held over every file of the package."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import symdyn
+
+PACKAGE = Path(symdyn.__file__).parent
+PAGE = Path(__file__).parents[1] / "docs" / "architecture.md"
+
+
+def _section(title: str) -> str:
+    text = PAGE.read_text(encoding="utf-8")
+    return text.split(f"## {title}\n")[1].split("\n## ")[0]
+
+
+def layers() -> dict[str, int]:
+    """Packages and modules of the first level, by the number of their row in the table."""
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \|", _section("Who may import whom"), re.MULTILINE)
+    return {name: int(number) for number, names in rows for name in re.findall(r"`(\w+)`", names)}
+
+
+def upward() -> set[str]:
+    """Files that may import what comes after them, inside functions."""
+    return set(re.findall(r"^- `([\w/.]+)`", _section("Who may import whom"), re.MULTILINE))
+
+
+def files() -> Iterator[tuple[str, str, ast.Module]]:
+    """Path in the package, name of the first level, syntax tree."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        inside = path.relative_to(PACKAGE)
+        if inside.parts[0] not in ("__init__.py", "__main__.py"):
+            yield inside.as_posix(), inside.parts[0].removesuffix(".py"), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(node: ast.AST) -> list[str]:
+    """Names of the first level that a statement imports; nothing for `import symdyn` itself."""
+    if isinstance(node, ast.ImportFrom) and node.module == "symdyn":
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("symdyn."):
+        return [(node.module or "").split(".")[1]]
+    if isinstance(node, ast.Import):
+        return [alias.name.split(".")[1] for alias in node.names if alias.name.startswith("symdyn.")]
+    return []
+
+
+def for_types(tree: ast.Module) -> set[ast.AST]:
+    """Statements that only type checkers read."""
+    guards = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    return {inner for guard in guards for inner in ast.walk(guard)}
+
+
+def test_every_package_has_one_row() -> None:
+    here = {p.name.removesuffix(".py") for p in PACKAGE.iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()}
+    assert set(layers()) == here - {"__init__", "__main__", "templates"}
+
+
+def test_imports_go_down_the_table() -> None:
+    """At the top of a file only what stands in an earlier row; inside functions of the listed files also what comes later."""
+    rows, allowed = layers(), upward()
+    wrong, used = [], set()
+    for path, own, tree in files():
+        top, types = set(tree.body), for_types(tree)
+        for node in ast.walk(tree):
+            for name in imported(node) if node not in types else ():
+                if name != own and rows[name] >= rows[own]:
+                    used.add(path)
+                    if node in top or path not in allowed:
+                        wrong.append(f"{path}, line {node.lineno}: {name}")  # type: ignore[attr-defined]
+    assert not wrong, "\n".join(wrong)
+    assert allowed == used, allowed - used
+
+
+def test_public_names_are_for_what_stands_on_them() -> None:
+    """Up to the stress tests, the package itself is imported for its version and its folder alone."""
+    rows = layers()
+    for path, own, tree in files():
+        if rows[own] <= rows["comparison"]:
+            names = [n for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in ("symdyn", "sd")]
+            assert all(n.attr in ("__version__", "__file__") for n in names), path
+
+
+def test_only_the_command_line_runs_the_laboratory() -> None:
+    outside = [f"{path} imports symdyn.{name}" for path, own, tree in files() if own not in ("lab", "cli")
+               for node in ast.walk(tree) for name in imported(node) if name == "lab"]
+    assert not outside
