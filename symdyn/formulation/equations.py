@@ -143,8 +143,8 @@ class Equations:
         simplify   False: as it was derived, in any time that this takes
         form       "shortest": of all others, entry by entry; "polynomial" in sines and cosines; "fourier": sums of sines and
                    cosines of sums of angles; "factored"; "speeds", "parameters", "angles": gathered by these; "nested"
-        intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning), constants
-                   of the mechanism first, then sines and cosines, then what stands in several places
+        intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning, unit),
+                   constants of the mechanism first, then sines and cosines, then what stands in several places
         What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
         for an unknown form, for one that is too large, and if the quantity is so long that the time is over before it is
         multiplied into one expression.
@@ -177,13 +177,15 @@ class Equations:
 
     def _in_intermediates(self, name: str) -> Any:
         """The quantity in named intermediates, and these."""
+        from symdyn.analytic.units import symbol_units
         from symdyn.exact.ring import TooLarge
         from symdyn.report.named import with_intermediates
 
         key = (name, "intermediates")
         if key not in self._printed:
             try:
-                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves())
+                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves(),
+                                                        symbol_units(self))
             except (TooLarge, ZeroDivisionError) as error:
                 raise SymdynError(f"{self.name}: {name} is too large for named intermediates: {error}; print its steps with "
                                   f"latex({name!r}, intermediates=True)") from None

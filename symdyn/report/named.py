@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import sympy as sp
 
 from symdyn.exact.arrange import Arranger, Letter, Monomial, Polynomial, integer, multiplied, stripped, total
+from symdyn.exact.dimensions import Dimension, text, units_of_expressions
 from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.walk import Exact
 from symdyn.model.symbols import symbols_of
@@ -25,15 +26,20 @@ CONSTANT, TURN, PRODUCT = "constant of the mechanism", "{} of {}", "stands in se
 
 
 class Step(NamedTuple):
-    """An intermediate: its symbol, what it is in terms of those before and of the user's symbols, what it means."""
+    """An intermediate: its symbol, what it is in terms of those before and of the user's symbols, what it means, and its unit;
+    "?" where that is not known."""
 
     symbol: sp.Symbol
     expression: sp.Expr
     meaning: str
+    unit: str = "?"
 
 
-def with_intermediates(output: Output, symbols: Mapping[Node, sp.Expr]) -> tuple[Any, list[Step]]:
+def with_intermediates(output: Output, symbols: Mapping[Node, sp.Expr], units: Mapping[sp.Basic, Dimension | None] | None = None,
+                       ) -> tuple[Any, list[Step]]:
     """An output of a tape as SymPy in named intermediates, and these in an order to read.
+
+    units   of the symbols
 
     Raises TooLarge beyond the bound on terms, UnsupportedExpression for what has no explicit form."""
     exact = Exact(output.entries, positive=not_negative(symbols))
@@ -60,10 +66,21 @@ def with_intermediates(output: Output, symbols: Mapping[Node, sp.Expr]) -> tuple
              for f, symbol in short.symbols.items()]
     products, entries = _repeated([short.short(e) for e in entries], _names("p", free))
     steps += [*turns, *[Step(symbol, e, PRODUCT) for symbol, e in products]]
+    steps = _with_units(steps, units or {})
     if output.shape == ():
         return entries[0], steps
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
     return sp.Matrix(rows, columns, entries), steps
+
+
+def _with_units(steps: list[Step], units: Mapping[sp.Basic, Dimension | None]) -> list[Step]:
+    """The intermediates with their units, which follow from those before."""
+    known = dict(units)
+    result = []
+    for step in steps:
+        known[step.symbol], = units_of_expressions([step.expression], known)
+        result.append(step._replace(unit=text(known[step.symbol])))
+    return result
 
 
 def _repeated(entries: list[sp.Expr], names: Iterator[sp.Symbol]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:

@@ -94,3 +94,11 @@ def test_expressions():
     choice = sp.Piecewise((l, m > 1), (2 * l, True))
     found = units_of_expressions([m * l**2, sp.sqrt(m**2 * l), 2 * m, sp.Integer(3), k * m, choice], units)
     assert [text(d) for d in found] == ["kg m^2", "kg m^1/2", "kg", "1", "?", "m"]
+
+
+def test_named_intermediates_carry_their_units():
+    eq = sd.systems.get("four_bar").augmented()
+    _, steps = eq.explicit("k_tilde", intermediates=True)
+    units = {step.meaning.split(" ")[0]: step.unit for step in steps}
+    assert units["constant"] == "kg m^2" and units["sine"] == "1" and "?" not in {step.unit for step in steps}
+    assert {step.unit for step in steps if "q3_dot" in str(step.expression)} == {"1/s^2"}
