@@ -10,6 +10,7 @@ Source: Cox, Little, O'Shea, Ideals, Varieties, and Algorithms, chapters 3 and 6
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -107,9 +108,11 @@ def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, val
 
     fixed    coordinates, which are held there; inputs and extra states; or speeds, of a steady motion: by symbol or name, numbers
              or expressions in parameters. Speeds and inputs that are left out are zero
-    values   numbers for parameters, by symbol or name
+    values   numbers for parameters, by symbol or name; decimal ones stand for the decimals that they are printed as
     Raises SymdynError where the conditions are no polynomials, or not solved in closed form or in time: with the reason.
     """
+    if isinstance(values, Mapping):
+        values = {key: _decimal(value) for key, value in values.items()}
     state = State(equations, fixed, (), values)
     search = _Search(state)
     seconds = max(equations.simplify_seconds, 1.0)
@@ -156,7 +159,8 @@ class _Search:
         states = [symbol for z, symbol in zip(m.z, s.states, strict=True) if z not in state.values]
         self.unknown: list[sp.Symbol] = [*self.coordinates, *states, *multipliers.values()]
         # In their shortest form sums of angles stand as such, so that they become base angles.
-        self.entries = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
+        found = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
+        self.entries = [e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)}) for e in found]
         nodes, symbols = recorded(self.entries)
         self.leaves = {symbol: leaf for leaf, symbol in symbols.items()}
         self.unknown_leaves = {leaf for leaf, symbol in symbols.items() if symbol in self.unknown}
@@ -164,6 +168,7 @@ class _Search:
         self.writer = Writer(exact, symbols)
         self.assumed: dict[sp.Expr, None] = {}
         self.needed: dict[sp.Expr, None] = {}
+        self._split: dict[sp.Expr, list[sp.Expr]] = {}
         self.pairs: dict[int, tuple[sp.Symbol, sp.Symbol]] = {}
         self.letters: dict[int, sp.Expr] = {}
         self._name_letters()
@@ -259,29 +264,28 @@ class _Search:
     def _next(self, case: _Case) -> list[_Case] | None:
         """The cases that a case falls into; None where nothing is left to be zero."""
         left: list[sp.Expr] = []
-        for e in case.left:
-            e = self._reduced(e)
+        for e in dict.fromkeys(map(self._reduced, case.left)):
             if e == 0 or (not e.free_symbols & self._names and (_proved(e) or _vanishes(e))):
                 continue
             if not e.free_symbols & self._names:
                 self.needed.setdefault(sp.factor(e))
                 return []
-            factors = self._factors(e)
-            if len(factors) > 1:
-                others = tuple(o for o in case.left if o is not e)
-                rest = [o for o in others if self._reduced(o) != e]
-                return [_Case((f, *rest), case.found, case.angles, case.conditions) for f in factors]
-            left += factors
+            left.append(e)
         if not left:
             return None
-        left = list(dict.fromkeys(left))
-        case = _Case(tuple(left), case.found, case.angles, case.conditions)
-        for e in sorted(left, key=lambda e: (len(self._unknowns(e)), sp.count_ops(e))):
+        # The simplest first: what it gives makes the others shorter.
+        left.sort(key=lambda e: (len(self._unknowns(e)), sp.count_ops(e)))
+        for k, e in enumerate(left):
+            factors = self._factors(e)
+            rest = (*left[:k], *left[k + 1:])
+            if len(factors) > 1:
+                return [_Case((f, *rest), case.found, case.angles, case.conditions) for f in factors]
+            left[k] = e = factors[0]
+            case = _Case((e, *rest), case.found, case.angles, case.conditions)
             unknowns = self._unknowns(e)
-            if len(unknowns) == 1:
-                found = self._single(case, e, unknowns[0])
-                if found is not None:
-                    return found
+            found = self._single(case, e, unknowns[0]) if len(unknowns) == 1 else None
+            if found is not None:
+                return found
             linear = self._linear(case, e)
             if linear is not None:
                 return [linear]
@@ -289,14 +293,15 @@ class _Search:
 
     def _factors(self, e: sp.Expr) -> list[sp.Expr]:
         """Factors that hold unknowns, each once; those in parameters are taken not to be zero."""
-        _, found = sp.factor_list(e)
-        own = []
-        for f, _ in found:
-            if f.free_symbols & self._names:
-                own.append(f)
-            else:
-                self._assume(f)
-        return own
+        if e not in self._split:
+            own = []
+            for f, _ in sp.factor_list(e)[1]:
+                if f.free_symbols & self._names:
+                    own.append(f)
+                else:
+                    self._assume(f)
+            self._split[e] = own
+        return self._split[e]
 
     def _assume(self, e: sp.Expr) -> None:
         """Take an expression in parameters not to be zero."""
@@ -453,6 +458,11 @@ class _Search:
         if not proved and any(not e.free_symbols and not _vanishes(e) for e in residuals):
             return None
         return EquilibriumPoint(ordered, tuple(free), tuple(dict.fromkeys(case.conditions)), proved)
+
+
+def _decimal(value: Any) -> Any:
+    """A decimal number as a fraction of integers; 0.1 is 1/10. Anything else as it is."""
+    return sp.Rational(str(value)) if isinstance(value, (float, sp.Float)) and math.isfinite(value) else value
 
 
 def _proved(e: sp.Expr) -> bool:

@@ -24,8 +24,10 @@ from symdyn.errors import ArgumentError, SymdynError
 from symdyn.exact.prove import decide, drawn_state
 from symdyn.exact.ring import TooLarge
 from symdyn.exact.shortest import written
+from symdyn.exact.taken import recorded
 from symdyn.formulation.linearization import multiplier_names
 from symdyn.model.symbols import Timed, symbols_of, time
+from symdyn.report.limit import TimeUp, within
 from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import vector, zeros
 from symdyn.tape.evaluate import evaluate
@@ -38,8 +40,9 @@ if TYPE_CHECKING:
     from symdyn.analytic.stability import Characteristic
     from symdyn.formulation.equations import Equations
 
-# Terms that a product may have in an entry; digits of the numbers by which dependent speeds are chosen.
-BOUND, DIGITS = 200_000, 30
+# Terms that a product may have in an entry, seconds in which a matrix is written; digits of the numbers by which dependent speeds
+# are chosen.
+BOUND, SECONDS, DIGITS = 200_000, 10.0, 30
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,11 +93,21 @@ class Linearized:
         return self._written[name]
 
     def write(self, entries: Iterable[Any]) -> list[sp.Expr]:
-        """Nodes as SymPy. Raises SymdynError for what is too large."""
+        """Nodes as SymPy. Raises SymdynError for what is too large, or takes too long."""
         try:
-            return written(list(entries), self.symbols, bound=BOUND)
-        except TooLarge as error:
-            raise SymdynError(f"{self.name}: {error}; put numbers in place of parameters with linear.with_values") from None
+            return within(SECONDS, lambda: self._shortest(list(entries)))
+        except (TooLarge, TimeUp) as error:
+            reason = str(error) or f"it is not written out within {SECONDS:g} s"
+            raise SymdynError(f"{self.name}: {reason}; put numbers in place of parameters with linear.with_values, or hold "
+                              "coordinates") from None
+
+    def _shortest(self, entries: list[Any]) -> list[sp.Expr]:
+        found = written(entries, self.symbols, bound=BOUND)
+        if any(value.has(sp.acos, sp.asin, sp.atan, sp.atan2) for value in self.about.values()):
+            # What became of sines of these angles is combined.
+            nodes, symbols = recorded([sp.expand_trig(e) for e in found])
+            found = written(nodes, symbols, bound=BOUND)
+        return found
 
     @property
     def conditions(self) -> tuple[sp.Eq, ...]:
