@@ -239,7 +239,7 @@ class _Search:
 
     def proof(self, c: _Candidate) -> Proof:
         claims = self.claims(c)
-        pairs = [(a, b) for a, b in zip(claims[::2], claims[1::2], strict=True) if isinstance(a, Node) or isinstance(b, Node)]
+        pairs = list(zip(claims[::2], claims[1::2], strict=True))
         return decide(self.m.recorder, pairs, self.symbols, unit_vectors=self.units, bound=BOUND)
 
     def _numbers(self, entries: Sequence[Any]) -> list[Any]:
@@ -256,7 +256,7 @@ class _Search:
         values = iter(self._numbers([e for row in slopes for e in row]))
         still = [max([abs(next(values)) for _ in row]) < SAME for row in slopes]
         return tuple(q for q, row, zero in zip(self.equations.symbols.coordinates, slopes, still, strict=True)
-                     if zero and decide(m.recorder, [(e, 0) for e in row if isinstance(e, Node)], self.symbols,
+                     if zero and decide(m.recorder, [(e, 0) for e in row], self.symbols,
                                         unit_vectors=self.units, bound=BOUND).proved)
 
     def why_no_energy(self, energy: _Candidate) -> str:

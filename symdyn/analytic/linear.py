@@ -377,7 +377,7 @@ class _Linearization:
     def _demand_rest(self) -> None:
         """Raises SymdynError where coordinates move at zero speeds."""
         rates = self.m.at(self.equations.quantity("rates").ravel(), self.values)
-        if not decide(self.m.recorder, [(e, 0) for e in rates if isinstance(e, Node)], self.symbols).proved:
+        if not decide(self.m.recorder, [(e, 0) for e in rates], self.symbols).proved:
             raise SymdynError(f"{self.equations.name}: linear equations were requested at a state where coordinates move by a "
                               "given motion; use module.linearize(at)")
 

@@ -133,3 +133,12 @@ def test_loads_that_depend_on_reactions_are_rejected():
     system.add_joint_force(rail, -mu * sd.reaction("rail")[1])
     with pytest.raises(SymdynError, match=r"conserved quantities were requested, but .* depends on accelerations or reactions"):
         system.embedding().conserved()
+
+
+def test_decimal_numbers_decide_nothing():
+    found = sd.systems.get("bicycle").augmented().conserved(undriven=True)
+    assert "energy: not decided, the sides differ by no more than the rounding of decimal numbers" in str(found)
+    driven = sd.systems.get("floating_crane").recursive()
+    assert "energy" in str(driven.conserved())
+    mixed = sd.systems.get("bicycle").augmented().conserved()
+    assert "energy: loads without potential, or prescribed motions, change T + V" in str(mixed)

@@ -151,3 +151,21 @@ def test_time_is_bounded():
     eq = sd.systems.get("four_bar").augmented()
     with pytest.raises(SymdynError, match=r"were not found within 1 s; pass numbers for parameters with values=\.\.\."):
         dataclasses.replace(eq, simplify_seconds=1.0).equilibria(values=eq.symbols.defaults)
+
+
+def test_bounds_on_cases_and_angles(monkeypatch):
+    q = sd.coordinates("q")
+    system = sd.System("rod", gravity=[0, -g])
+    rod = system.add_body("rod", mass=m, com=[l, 0])
+    joint = system.add_joint(sd.Revolute("pivot", system.ground, rod, coordinate=q))
+    system.add_joint_force(joint, k * sp.sin(q + Omega))
+    with pytest.raises(SymdynError, match="2 angles that are no sums of each other depend on 1 coordinates; put numbers"):
+        system.embedding().equilibria()
+    monkeypatch.setattr("symdyn.analytic.equilibria.CASES", 2)
+    with pytest.raises(SymdynError, match="equilibria in closed form have more than 2 cases; fix coordinates"):
+        sd.systems.get("double_pendulum").embedding().equilibria()
+
+
+def test_decimal_numbers_stand_for_themselves():
+    found = sliders(lambda x, y: k * x - x**3, lambda x, y: -y).equilibria(values={k: 0.25})
+    assert sorted(told(found)) == ["x = -1/2, y = 0", "x = 0, y = 0", "x = 1/2, y = 0"]

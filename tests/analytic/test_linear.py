@@ -275,3 +275,30 @@ def test_what_has_no_constant_linear_equations():
 
 def chain_values(linear):
     return dict.fromkeys(linear.symbols.values(), 1)
+
+
+def test_bounds_on_what_is_written(monkeypatch):
+    eq = sd.systems.get("double_pendulum").embedding()
+    monkeypatch.setattr("symdyn.analytic.linear.BOUND", 1)
+    with pytest.raises(SymdynError, match=r"above the bound of 1; put numbers in place of parameters with linear\.with_values"):
+        _ = eq.linearized({"q1": Omega, "q2": Omega}).K
+    monkeypatch.setattr("symdyn.analytic.linear.SECONDS", 0.0)
+    with pytest.raises(SymdynError, match="it is not written out within 0 s; put numbers in place of parameters"):
+        _ = eq.linearized().K
+
+
+def test_motions_in_constraints_and_in_quasi_velocities():
+    x, z = sd.coordinates("x"), sd.motions("z")
+    system = sd.System("follower")
+    block = system.add_body("block", mass=m)
+    system.add_joint(sd.Prismatic("rail", system.ground, block, axis=[1, 0, 0], coordinate=x))
+    system.add_constraint(x - z)
+    with pytest.raises(SymdynError, match="but inputs stand in its constraints; use module"):
+        system.augmented().linearized()
+    system = sd.System("ball")
+    body = system.add_body("body", mass=m, inertia=[A, A, A])
+    system.add_joint(sd.Spherical("joint", system.ground, body, orientation=sd.EulerAngles("ZYX", speeds="body")))
+    eq = system.recursive()
+    eq._recorded["rates"] = eq.quantity("rates") + 1
+    with pytest.raises(SymdynError, match="requested at a state where coordinates move by a given motion"):
+        eq.linearized()
