@@ -236,8 +236,12 @@ class State:
 
     def __init__(self, equations: Equations, about: Any, hold: Any, parameters: Mapping[Any, Any] | None = None) -> None:
         """parameters: values for them, by symbol or name. Raises ArgumentError, and SymdynError for a steady motion under
-        constraints or in quasi-velocities."""
+        constraints or in quasi-velocities, and for loads that depend on multipliers."""
         self.equations, self.m = equations, Mechanics(equations)
+        if equations.constraints and equations.implicit_loads:
+            raise SymdynError(f"{equations.name}: its state was requested in symbols, but {', '.join(equations.implicit_loads)} "
+                              "depends on accelerations, multipliers or reactions under constraints; use module.linearize(at) "
+                              "or module.equilibrium()")
         self.symbols: dict[Node, Any] = {leaf: s for leaf, s in equations.printed_leaves().items() if leaf.mask == PARAMETER}
         self.about = self._taken(about)
         self.held = self._held(hold)

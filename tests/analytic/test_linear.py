@@ -302,3 +302,15 @@ def test_motions_in_constraints_and_in_quasi_velocities():
     eq._recorded["rates"] = eq.quantity("rates") + 1
     with pytest.raises(SymdynError, match="requested at a state where coordinates move by a given motion"):
         eq.linearized()
+
+
+def test_loads_that_depend_on_multipliers():
+    x, y = sd.coordinates("x y")
+    system = sd.System("bead", gravity=[0, -g])
+    slide, bead = system.add_body("slide"), system.add_body("bead", mass=m)
+    rail = system.add_joint(sd.Prismatic("x", system.ground, slide, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("y", slide, bead, axis=[0, 1], coordinate=y))
+    system.add_constraint(y - k * x, name="wire")
+    system.add_joint_force(rail, -c * sd.multiplier("wire"))
+    with pytest.raises(SymdynError, match="depends on accelerations, multipliers or reactions under constraints; use module"):
+        system.augmented().linearized()
