@@ -151,6 +151,9 @@ class _Search:
         s = self.equations.symbols
         r, C, z_dot = m.statics()
         fixed = {leaf for leaf in state.values if leaf in m.q}
+        if fixed and not m.plain:
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested with coordinates that are held, "
+                              "but its speeds are quasi-velocities; leave speeds='body' out, or use module.equilibria(fixed=...)")
         rows = [e for e, q in zip(r, m.q, strict=True) if q not in fixed] if m.plain else list(r)
         entries = [e for e in m.at([*rows, *C, *z_dot], state.put()) if not is_zero(e)]
         multipliers = {leaf: sp.Symbol(f"lambda{k + 1}") for k, leaf in enumerate(state.multipliers)}

@@ -169,3 +169,17 @@ def test_bounds_on_cases_and_angles(monkeypatch):
 def test_decimal_numbers_stand_for_themselves():
     found = sliders(lambda x, y: k * x - x**3, lambda x, y: -y).equilibria(values={k: 0.25})
     assert sorted(told(found)) == ["x = -1/2, y = 0", "x = 0, y = 0", "x = 1/2, y = 0"]
+
+
+def test_quasi_velocities():
+    """The positions at rest of a body that hangs, without the singular ones of its angles."""
+    system = sd.System("buoy", gravity=[0, 0, -g])
+    body = system.add_body("buoy", mass=m, inertia=[A, A, A], com=[0, 0, -l])
+    system.add_joint(sd.Spherical("pivot", system.ground, body, orientation=sd.EulerAngles("ZYX", speeds="body")))
+    eq = system.recursive()
+    found = eq.equilibria()
+    z, y, x = eq.symbols.coordinates
+    assert {(p.values[y], p.values[x]) for p in found} == {(0, 0), (sp.pi, sp.pi), (0, sp.pi), (sp.pi, 0)}
+    assert all(p.free == (z,) for p in found)
+    with pytest.raises(SymdynError, match="that are held, but its speeds are quasi-velocities; leave speeds='body' out"):
+        eq.equilibria({y: 0})
