@@ -18,7 +18,7 @@ import sympy as sp
 from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.exact.arrange import Arranger, Letter, Polynomial, Sum, Tree, total
 from symdyn.exact.represent import Basis, Letters, better_basis, contracted, divided, fourier, plain, with_tangents
-from symdyn.exact.ring import BOUND, Value
+from symdyn.exact.ring import BOUND, TooLarge, Value
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Atom, Exact
 from symdyn.shown import shown
@@ -33,6 +33,8 @@ _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
 # nested, in the two shortest representations, and of more than LONG terms in one.
 WORSE, SHORT, LONG = 1.5, 25, 150
+# Terms that all entries together may have to be arranged, which takes less than ten seconds.
+TERMS = 20_000
 # Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
 MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before SymPy
@@ -301,8 +303,11 @@ def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str =
     if form not in FORMS:
         raise SymdynError(f"the form {shown(form)} was asked for; there are {', '.join(FORMS)}")
     exact = Exact(entries, BOUND if bound is None else bound, unit_vectors, positive=not_negative(symbols))
+    terms = sum(len(value.num) for value in exact.values)
+    if terms > TERMS:
+        raise TooLarge(f"it has {terms:,} terms, above the bound of {TERMS:,} for printing")
     writer = Writer(exact, symbols, form)
-    sizes = _sizes(entries) if form == "shortest" else {}
+    sizes = written_out(entries) if form == "shortest" else {}
     known: dict[str, sp.Expr] = {}
     result = []
     for entry, value in zip(entries, exact.values):
@@ -342,7 +347,7 @@ def not_negative(symbols: Mapping[Node, sp.Expr]) -> set[Node]:
     return {leaf for leaf, symbol in symbols.items() if symbol.is_nonnegative}
 
 
-def _sizes(entries: Sequence[Any]) -> dict[Node, int]:
+def written_out(entries: Sequence[Any]) -> dict[Node, int]:
     """Operations of each step written out."""
     sizes: dict[Node, int] = {}
     for node in reachable(entries):

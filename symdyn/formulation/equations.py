@@ -22,6 +22,8 @@ from symdyn.tape.tape import Tape
 
 # Seconds for an explicit form where less, or nothing, is left for its simplification.
 _EXPANDED = 1.0
+# A quantity of more operations is not written out where it is too large for exact algebra.
+_UNREADABLE = 50_000
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -146,8 +148,8 @@ class Equations:
         intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning, unit),
                    constants of the mechanism first, then sines and cosines, then what stands in several places
         What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
-        for an unknown form, for one that is too large, and if the quantity is so long that the time is over before it is
-        multiplied into one expression.
+        for an unknown form, for one that is too large, for a quantity that is too large to be read, and if the quantity is so
+        long that the time is over before it is multiplied into one expression.
         """
         text(name, "the name of a quantity", "M_tilde")
         if flag(intermediates, "intermediates"):
@@ -157,7 +159,7 @@ class Equations:
         key = (name, text(form, "the form", "fourier"))
         if key not in self._printed:
             from symdyn.exact.ring import TooLarge
-            from symdyn.exact.shortest import explicit
+            from symdyn.exact.shortest import explicit, written_out
             from symdyn.report.limit import TimeUp, within
 
             output = self.tape(name).outputs[name]
@@ -171,6 +173,14 @@ class Equations:
                     raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {reason}; print its steps "
                                       f"with latex({name!r}, intermediates=True), or as derived with explicit({name!r}, "
                                       "simplify=False)") from None
+                sizes = written_out(output.entries)
+                operations = sum(sizes.get(e, 0) for e in output.entries if isinstance(e, Node))
+                if isinstance(error, TooLarge) and operations > _UNREADABLE:
+                    raise SymdynError(
+                        f"{self.name}: {name} is too large to be read: {error}, and {operations:,} operations as it was derived; "
+                        f"ask for named intermediates with explicit({name!r}, intermediates=True), print its steps with "
+                        f"latex({name!r}, intermediates=True), evaluate it with lambdify({name!r}), or take it as derived with "
+                        f"explicit({name!r}, simplify=False)") from None
                 left = self.simplify_seconds - (clock.monotonic() - begin)
                 self._printed[key] = self._simplified(name, limit, left)
         return self._printed[key]
@@ -184,12 +194,18 @@ class Equations:
         key = (name, "intermediates")
         if key not in self._printed:
             try:
-                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves(),
-                                                        symbol_units(self))
+                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves(), self.recorder.names,
+                                                        self._base(), symbol_units(self))
             except (TooLarge, ZeroDivisionError) as error:
                 raise SymdynError(f"{self.name}: {name} is too large for named intermediates: {error}; print its steps with "
                                   f"latex({name!r}, intermediates=True)") from None
         return self._printed[key]
+
+    def _base(self) -> dict[str, Any]:
+        """Base parameters by name, nodes and numbers; none where there are no rigid bodies."""
+        if self.identification is None or "base_parameters" not in self.quantities:
+            return {}
+        return dict(zip(self.identification.base.names, self.quantity("base_parameters").tolist(), strict=True))
 
     def _simplified(self, name: str, limit: float, left: float) -> Any:
         """By SymPy's methods, within the seconds that are left; the expression itself within a limit."""

@@ -27,13 +27,45 @@ def test_put_together_they_are_the_quantity(name, quantity):
 def test_constants_come_first_and_are_named_once():
     value, steps = sd.systems.get("four_bar").augmented().explicit("k_tilde", intermediates=True)
     assert [(str(s.symbol), s.meaning) for s in steps[:4]] == [
-        ("h_1", "constant of the mechanism"), ("h_2", "constant of the mechanism"), ("h_3", "constant of the mechanism"),
-        ("s_{2}", "sine of q2")]
+        ("h_1", "constant of the mechanism: h_x_bar2*l1, of the base parameters"),
+        ("h_2", "constant of the mechanism: h_x_bar3*l1, of the base parameters"),
+        ("h_3", "constant of the mechanism: h_x_bar3*l2, of the base parameters"), ("s_{2}", "sine of q2")]
     assert {str(s.expression) for s in steps[:3]} == {"l1*(l2*m3 + lc2*m2)", "l1*lc3*m3", "l2*lc3*m3"}
     assert sp.count_ops(value) < 30
 
 
-@pytest.mark.parametrize(("name", "quantity", "most"), [("n_link_pendulum", "M_tilde", 300), ("puma560", "M_tilde", 600)])
+def test_a_sum_of_base_parameters_is_called_so():
+    _, steps = sd.systems.two_link_arm().embedding().explicit("M_tilde", intermediates=True)
+    assert str(steps[0].expression) == "I1 + I2 + lc1**2*m1 + m2*(l1**2 + lc2**2)"
+    assert steps[0].meaning == "constant of the mechanism: I_zz_link1 + I_zz_link2, of the base parameters"
+
+
+def test_more_than_a_page_is_given_in_the_steps_of_the_derivation():
+    eq = sd.systems.puma560().embedding()
+    value, steps = eq.explicit("k_tilde", intermediates=True)
+    meanings = [step.meaning for step in steps]
+    assert {"inertia of link 5, zz", "angular velocity of link 3, x", "cosine of q3"} <= set(meanings)
+    known = symbols_of(eq.explicit("bias", simplify=False))
+    for step in steps:
+        assert symbols_of(step.expression) <= known, step
+        known.add(step.symbol)
+    for step in reversed(steps):
+        value = value.xreplace({step.symbol: step.expression})
+    assert sd.prove(value, eq.explicit("k_tilde", simplify=False))
+
+
+def test_what_is_too_large_to_be_read_has_intermediates():
+    eq = sd.systems.get("spatial_chain").embedding()
+    with pytest.raises(SymdynError, match=r"k_tilde is too large to be read: it has 59,165 terms, above the bound of 20,000 for "
+                                          r"printing, and 389,500 operations as it was derived; ask for named intermediates with "
+                                          r"explicit\('k_tilde', intermediates=True\)"):
+        _ = eq.k_tilde
+    value, steps = eq.explicit("k_tilde", intermediates=True)
+    assert sp.count_ops(value) + sum(sp.count_ops(step.expression) for step in steps) < 1000
+
+
+@pytest.mark.parametrize(("name", "quantity", "most"), [("n_link_pendulum", "M_tilde", 300), ("puma560", "M_tilde", 600),
+                                                        ("puma560", "k_tilde", 1500)])
 def test_long_ones_fit_a_page(name, quantity, most):
     value, steps = sd.systems.get(name).embedding().explicit(quantity, intermediates=True)
     assert sp.count_ops(value) + sum(sp.count_ops(step.expression) for step in steps) < most
