@@ -124,8 +124,13 @@ def _typeset(rows: Sequence[tuple[str, Any]], shorthand: bool, width: int, raw: 
     for k, (name, value) in enumerate(rows):
         printed = short.short(value) if short else value
         left = name if k < raw or not name else name_latex(name)
-        lines += _matrix(left, name, printed, width) if isinstance(printed, sp.MatrixBase) else _sum(left, printed, width)
+        lines += matrix_lines(left, name, printed, width)
     return Typeset(tuple(lines), short.legend if short else ())
+
+
+def matrix_lines(left: str, name: str, value: Any, width: int) -> list[str]:
+    """Lines "left &= value" of a matrix or an expression; of a matrix that is too wide the longest entries stand below it."""
+    return _matrix(left, name, value, width) if isinstance(value, sp.MatrixBase) else _sum(left, value, width)
 
 
 def _matrix(left: str, name: str, value: Any, width: int) -> list[str]:

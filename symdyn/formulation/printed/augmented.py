@@ -108,9 +108,9 @@ class AugmentedEquations(MotionEquations):
         return tuple(sp.Eq(row, 0, evaluate=False) for row in rows)
 
     def _repr_latex_(self) -> str:
-        from symdyn.report.printing import augmented_latex
+        from symdyn.report.notebook import augmented_page
 
-        return augmented_latex(self)
+        return augmented_page(self)
 
 
 def _without_common_factor(terms: list[sp.Expr]) -> list[sp.Expr]:

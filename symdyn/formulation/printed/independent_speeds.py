@@ -166,6 +166,6 @@ class MotionEquations(Equations):
         return explain(self, quantity, *index, simplify=simplify)
 
     def _repr_latex_(self) -> str:
-        from symdyn.report.printing import equation_latex
+        from symdyn.report.notebook import equation_page
 
-        return equation_latex(self)
+        return equation_page(self)

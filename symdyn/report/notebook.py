@@ -1,0 +1,242 @@
+r"""Equations on a notebook's page: matrices where they fit a line, else in named intermediates, else link by link.
+
+One line of matrices if it fits; up to two pages quantity by quantity, first in their shortest form, then in named intermediates;
+above two pages the recursion from link to link, in letters, with what belongs to each link.
+Source of the recursion: Featherstone, Rigid Body Dynamics Algorithms, section 5.3 (Newton-Euler in spatial vectors, in the
+coordinates of the links).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.errors import SymdynError, UnsupportedExpression
+from symdyn.exact.ring import TooLarge
+from symdyn.exact.shortest import written, written_out
+from symdyn.formulation.provenance import OfBodies
+from symdyn.formulation.tree import GROUND, Link, Tree
+from symdyn.model.record import joint_speeds
+from symdyn.report.latex import columns, letters, matrix_lines
+from symdyn.report.named import Step, with_intermediates
+from symdyn.report.notation import name_latex
+from symdyn.tape.node import Node, is_zero
+from symdyn.tape.tape import Output
+
+if TYPE_CHECKING:
+    from symdyn.formulation.printed.augmented import AugmentedEquations
+    from symdyn.formulation.printed.independent_speeds import MotionEquations
+
+# Letters in a line of a notebook; lines of two pages.
+WIDTH, LINES = 95, 100
+# Operations as derived up to which the shortest form is tried; operations as derived of what is written at all in a recursion.
+SHORT, SMALL = 1500, 3000
+_STRUT = r"\\[2pt]"
+
+
+def equation_page(equations: MotionEquations) -> str:
+    """M_tilde u_dot + k_tilde = F_tilde."""
+    if _operations(equations, ("M_tilde", "k_tilde", "F_tilde")) <= SHORT:
+        parts = [equations.M_tilde, equations.accelerations, equations.k_tilde, equations.F_tilde]
+        if sum(map(_wide, parts)) + 8 <= WIDTH:
+            M, a, k, F = map(sp.latex, parts)
+            return _display([f"{M} {a} + {k} = {F}"])
+    return _display(_lines(equations, r"\tilde{\mathbf{M}}\,\dot{\mathbf{u}} + \tilde{\mathbf{k}} = \tilde{\mathbf{F}}",
+                           ("M_tilde", "k_tilde", "F_tilde")))
+
+
+def augmented_page(equations: AugmentedEquations) -> str:
+    """[[M, C_r^T], [C_r, 0]] [u_dot; lam] = [F - k; F_d]."""
+    if _operations(equations, ("matrix", "right_side")) <= SHORT:
+        parts = [equations.matrix, sp.Matrix([*equations.accelerations, *equations.multipliers]), equations.rhs]
+        if sum(map(_wide, parts)) + 6 <= WIDTH:
+            A, x, b = map(sp.latex, parts)
+            return _display([f"{A} {x} = {b}"])
+    head = (r"\tilde{\mathbf{M}}\,\dot{\mathbf{u}} + \tilde{\mathbf{k}} + \mathbf{C}_{\mathbf{r}}^{T}\boldsymbol{\lambda} = "
+            r"\tilde{\mathbf{F}},\qquad \mathbf{C}_{\mathbf{r}}\,\dot{\mathbf{u}} = \mathbf{F}^{d}")
+    return _display(_lines(equations, head, ("M_tilde", "k_tilde", "F_tilde", "C_r", "F_d")))
+
+
+def _lines(equations: MotionEquations, head: str, names: Sequence[str]) -> list[str]:
+    """The equations in letters, then what the letters are."""
+    u = sp.latex(equations.accelerations.T)
+    first = rf"{head},\qquad \dot{{\mathbf{{u}}}}^{{T}} = {u}" if letters(u) <= WIDTH / 2 else head
+    if _operations(equations, names) <= SHORT:
+        lines = [first]
+        for name in names:
+            lines += matrix_lines(name_latex(name), name, equations.explicit(name), WIDTH)
+        if _height(lines) <= LINES / 2:
+            return lines
+    try:
+        lines = [first, *_in_intermediates(equations, names)]
+    except (SymdynError, ZeroDivisionError):
+        lines = []
+    if lines and _height(lines) <= LINES:
+        return lines
+    of = equations.provenance
+    if isinstance(of, OfBodies):
+        return [first, *_recursion(equations, of.of.tree), *_constraints(equations)]
+    return lines or [first]
+
+
+def _in_intermediates(equations: MotionEquations, names: Sequence[str]) -> list[str]:
+    """Quantities in intermediates that they have in common."""
+    outputs = equations.tape(*names).outputs
+    entries = tuple(e for name in names for e in outputs[name].entries)
+    value, steps = with_intermediates(Output("all", (len(entries),), entries), equations.printed_leaves(),
+                                      equations.recorder.names)
+    lines = _packed(steps)
+    place = 0
+    for name in names:
+        shape = outputs[name].shape
+        size = len(outputs[name].entries)
+        matrix = sp.Matrix(shape[0], shape[1] if len(shape) == 2 else 1, list(value)[place:place + size])
+        place += size
+        if size:
+            lines += matrix_lines(name_latex(name), name, matrix, WIDTH)
+    return lines
+
+
+def _packed(steps: Sequence[Step]) -> list[str]:
+    """Definitions, several on a line where they are short."""
+    lines: list[str] = []
+    row = ""
+    for step in steps:
+        for text in matrix_lines(sp.latex(step.symbol), "", step.expression, WIDTH):
+            whole = text.replace("&=", "=", 1)
+            joined = rf"{row},\quad {whole}" if row else whole
+            if whole.startswith("&") or letters(joined) > WIDTH:
+                lines += [f"&{row}"] if row else []
+                row = ""
+                if whole.startswith("&"):
+                    lines.append(whole)
+                    continue
+                joined = whole
+            row = joined
+    return [*lines, f"&{row}"] if row else lines
+
+
+# -- the recursion
+
+_RECURSION = (
+    r"\text{From the ground outwards, for link } i \text{ on its parent } p\text{:}",
+    r"\mathbf{X}_i = \begin{bmatrix} \mathbf{R}_i^T & \mathbf{0} \\ -\mathbf{R}_i^T [\mathbf{r}_i]_\times & \mathbf{R}_i^T "
+    r"\end{bmatrix},\quad \mathbf{I}_i = \begin{bmatrix} \mathbf{J}_i & [\mathbf{h}_i]_\times \\ -[\mathbf{h}_i]_\times & m_i "
+    r"\mathbf{1} \end{bmatrix}",
+    r"\mathbf{v}_i = \mathbf{X}_i \mathbf{v}_p + \mathbf{S}_i \mathbf{w}_i,\quad "
+    r"\mathbf{a}_i = \mathbf{X}_i \mathbf{a}_p + \mathbf{S}_i \dot{\mathbf{w}}_i + \mathbf{c}_i + "
+    r"\mathbf{v}_i \times \mathbf{S}_i \mathbf{w}_i,\quad \mathbf{a}_0 = \begin{bmatrix} \mathbf{0} \\ -\mathbf{g} \end{bmatrix}",
+    r"\text{back inwards, with the loads } \mathbf{f}^{e}_i \text{ on the link and its children } j\text{:}",
+    r"\mathbf{f}_i = \mathbf{I}_i \mathbf{a}_i + \mathbf{v}_i \times^{*} \mathbf{I}_i \mathbf{v}_i - \mathbf{f}^{e}_i + "
+    r"\textstyle\sum_j \mathbf{X}_j^T \mathbf{f}_j,\qquad \mathbf{S}_i^T \mathbf{f}_i = \boldsymbol{\tau}_i",
+    r"\text{with } \boldsymbol{\tau}_i \text{ the forces along the joint}",
+)
+
+
+def _recursion(equations: MotionEquations, tree: Tree) -> list[str]:
+    """The recursion in letters, then what belongs to each link."""
+    lines = [f"&{line}" for line in _RECURSION]
+    if tree.added:
+        lines.append(r"&\text{added mass } \mathbf{A}_i \text{ of the water stands with } \mathbf{I}_i \text{: }"
+                     r"\mathbf{A}_i \mathbf{a}_i + \mathbf{v}_i \times^{*} \mathbf{A}_i \mathbf{v}_i")
+    if tree.flexible:
+        lines.append(r"&\text{elastic links: } \mathbf{w}_i = \dot{\boldsymbol{\eta}}_i,\ \mathbf{S}_i \text{ the mode shapes at "
+                     r"the free end},\ \boldsymbol{\tau}_i = -\mathbf{K}_i \boldsymbol{\eta}_i - "
+                     r"\mathbf{D}_i \dot{\boldsymbol{\eta}}_i - (\text{inertia of the beam})")
+    for k, link in enumerate(tree.links):
+        lines += _link(equations, tree, k, link)
+    return lines
+
+
+def _link(equations: MotionEquations, tree: Tree, k: int, link: Link) -> list[str]:
+    """What the recursion takes of one link."""
+    n = k + 1
+    parent = r"\text{the ground}" if link.parent == GROUND else rf"\text{{link }} {link.parent + 1}"
+    head = rf"&\textbf{{link {n}: {_text(link.name)}}} \text{{ on }} {parent} \text{{ by {_text(link.joint.name)}}}"
+    speeds = [tree.w[i] for i in link.speeds]
+    called = [sp.Symbol(str(u)) if u is None else u for u in joint_speeds(link.joint)]
+    rows = [(rf"\mathbf{{R}}_{{{n}}}", link.R), (rf"\mathbf{{r}}_{{{n}}}", link.r), (rf"\mathbf{{S}}_{{{n}}}", link.S),
+            (rf"\mathbf{{w}}_{{{n}}}", speeds)]
+    if not all(is_zero(c) for c in link.c):
+        rows.append((rf"\mathbf{{c}}_{{{n}}}", link.c))
+    rows += [(rf"m_{{{n}}}", [link.inertia.m]), (rf"\mathbf{{h}}_{{{n}}}", link.inertia.h),
+             (rf"\mathbf{{J}}_{{{n}}}", link.inertia.I)]
+    parts = []
+    for letter, value in rows:
+        matrix = _matrix(equations, value)
+        if matrix is None:
+            text = rf"{letter}({', '.join(sp.latex(u) for u in called)})"
+        else:
+            text = f"{letter} = {sp.latex(matrix[0] if matrix.shape == (1, 1) else matrix)}"
+        parts.append((text, letters(letter) + 3 + (_wide(matrix) if matrix is not None else 10)))
+    return [head, *_rows(parts)]
+
+
+def _rows(parts: Sequence[tuple[str, float]]) -> list[str]:
+    """Texts with their widths, several on a line."""
+    lines, row, room = [], "", float(WIDTH)
+    for text, width in parts:
+        if row and width > room:
+            lines.append(f"&{row}")
+            row, room = "", float(WIDTH)
+        row, room = (rf"{row},\quad {text}" if row else text), room - width - 2
+    return [*lines, f"&{row}"]
+
+
+def _matrix(equations: MotionEquations, value: Any) -> sp.Matrix | None:
+    """A small array of the tape in SymPy; None where it is wider than a line or too long."""
+    output = Output.of("part", value)
+    sizes = written_out(output.entries)
+    if sum(sizes.get(e, 0) for e in output.entries if isinstance(e, Node)) > SMALL:
+        return None
+    try:
+        entries = written(output.entries, equations.printed_leaves())
+    except (TooLarge, UnsupportedExpression, ZeroDivisionError):
+        return None
+    rows, cols = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
+    matrix = sp.Matrix(rows, cols, entries)
+    return matrix if _wide(matrix) <= WIDTH - 8 else None
+
+
+def _constraints(equations: MotionEquations) -> list[str]:
+    """C = 0, and C_r and F_d from it."""
+    if not equations.constraints:
+        return []
+    lines = [r"&\mathbf{C}_{\mathbf{r}} = \partial\mathbf{C}/\partial\mathbf{q}\ \mathbf{N},\quad \mathbf{F}^{d} = "
+             r"-(\mathbf{C}_{\mathbf{r}}\mathbf{u})_{\mathbf{r}}\mathbf{u} - 2\,\mathbf{C}_{\mathbf{r}t}\mathbf{u} - "
+             r"\mathbf{C}_{tt}"]
+    try:
+        return [*lines, *_in_intermediates(equations, ("C",))]
+    except (SymdynError, ZeroDivisionError):
+        return lines
+
+
+def _text(name: str) -> str:
+    return name.replace("_", r"\_")
+
+
+def _operations(equations: MotionEquations, names: Sequence[str]) -> int:
+    """As derived, where nothing is shared."""
+    entries = [e for output in equations.tape(*names).outputs.values() for e in output.entries]
+    sizes = written_out(entries)
+    return sum(sizes.get(e, 0) for e in entries if isinstance(e, Node))
+
+
+def _wide(value: sp.Matrix) -> float:
+    """About how wide a matrix becomes, in letters."""
+    return columns([[str(sp.latex(e)) for e in value.row(i)] for i in range(value.rows)]) + 2 if len(value) else 2
+
+
+def _height(lines: Sequence[str]) -> int:
+    """How many lines of text they are as high as."""
+    return sum(1 + line.count(r"\\") for line in lines)
+
+
+def _display(lines: Sequence[str]) -> str:
+    if len(lines) == 1:
+        return rf"$\displaystyle {lines[0].replace('&', '', 1) if lines[0].startswith('&') else lines[0]}$"
+    rows = [line if "&" in line[:200] and not line.startswith(r"\tilde") else f"&{line}" for line in lines]
+    body = f" {_STRUT}\n".join(rows)
+    return f"$\\displaystyle \\begin{{aligned}}\n{body}\n\\end{{aligned}}$"
