@@ -29,7 +29,7 @@ from symdyn.tape.tape import Output, reachable
 # What has fewer operations is written out where it stands.
 WORTH_A_NAME = 2
 # Operations of a page, above which the steps of the derivation are an alternative; terms above which they are the only one.
-PAGE, CLOSED = 600, 2500
+PAGE, CLOSED = 600, 1200
 # Terms of a product on the way to it, and how many times as many terms a fraction counts as.
 LARGEST, FRACTION = 20_000, 10
 # Base parameters of which a constant may be the sum.

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.errors import SymdynError, UnsupportedExpression
@@ -22,6 +23,7 @@ from symdyn.model.record import joint_speeds
 from symdyn.report.latex import columns, letters, matrix_lines
 from symdyn.report.named import Step, with_intermediates
 from symdyn.report.notation import name_latex
+from symdyn.spatial.vectors import cross
 from symdyn.tape.node import Node, is_zero
 from symdyn.tape.tape import Output
 
@@ -30,9 +32,9 @@ if TYPE_CHECKING:
     from symdyn.formulation.printed.independent_speeds import MotionEquations
 
 # Letters in a line of a notebook; lines of two pages.
-WIDTH, LINES = 95, 100
+WIDTH, LINES = 78, 110
 # Operations as derived up to which the shortest form is tried; operations as derived of what is written at all in a recursion.
-SHORT, SMALL = 1500, 3000
+SHORT, SMALL = 1500, 20_000
 _STRUT = r"\\[2pt]"
 
 
@@ -104,17 +106,15 @@ def _packed(steps: Sequence[Step]) -> list[str]:
     lines: list[str] = []
     row = ""
     for step in steps:
-        for text in matrix_lines(sp.latex(step.symbol), "", step.expression, WIDTH):
-            whole = text.replace("&=", "=", 1)
-            joined = rf"{row},\quad {whole}" if row else whole
-            if whole.startswith("&") or letters(joined) > WIDTH:
-                lines += [f"&{row}"] if row else []
-                row = ""
-                if whole.startswith("&"):
-                    lines.append(whole)
-                    continue
-                joined = whole
-            row = joined
+        first, *more = matrix_lines(sp.latex(step.symbol), "", step.expression, WIDTH)
+        joined = rf"{row},\quad {first.replace('&=', '=', 1)}" if row else first.replace("&=", "=", 1)
+        if row and (more or letters(joined) > WIDTH):
+            lines.append(f"&{row}")
+            joined = first.replace("&=", "=", 1)
+        row = joined
+        if more:
+            lines += [f"&{row}", *more]
+            row = ""
     return [*lines, f"&{row}"] if row else lines
 
 
@@ -123,11 +123,11 @@ def _packed(steps: Sequence[Step]) -> list[str]:
 _RECURSION = (
     r"\text{From the ground outwards, for link } i \text{ on its parent } p\text{:}",
     r"\mathbf{X}_i = \begin{bmatrix} \mathbf{R}_i^T & \mathbf{0} \\ -\mathbf{R}_i^T [\mathbf{r}_i]_\times & \mathbf{R}_i^T "
-    r"\end{bmatrix},\quad \mathbf{I}_i = \begin{bmatrix} \mathbf{J}_i & [\mathbf{h}_i]_\times \\ -[\mathbf{h}_i]_\times & m_i "
+    r"\end{bmatrix},\quad \mathbf{I}_i = \begin{bmatrix} \Theta_i & [h_i]_\times \\ -[h_i]_\times & m_i "
     r"\mathbf{1} \end{bmatrix}",
-    r"\mathbf{v}_i = \mathbf{X}_i \mathbf{v}_p + \mathbf{S}_i \mathbf{w}_i,\quad "
-    r"\mathbf{a}_i = \mathbf{X}_i \mathbf{a}_p + \mathbf{S}_i \dot{\mathbf{w}}_i + \mathbf{c}_i + "
-    r"\mathbf{v}_i \times \mathbf{S}_i \mathbf{w}_i,\quad \mathbf{a}_0 = \begin{bmatrix} \mathbf{0} \\ -\mathbf{g} \end{bmatrix}",
+    r"\mathbf{v}_i = \mathbf{X}_i \mathbf{v}_p + \mathbf{S}_i w_i,\quad "
+    r"\mathbf{a}_i = \mathbf{X}_i \mathbf{a}_p + \mathbf{S}_i \dot{w}_i + \mathbf{c}_i + "
+    r"\mathbf{v}_i \times \mathbf{S}_i w_i,\quad \mathbf{a}_0 = \begin{bmatrix} \mathbf{0} \\ -\mathbf{g} \end{bmatrix}",
     r"\text{back inwards, with the loads } \mathbf{f}^{e}_i \text{ on the link and its children } j\text{:}",
     r"\mathbf{f}_i = \mathbf{I}_i \mathbf{a}_i + \mathbf{v}_i \times^{*} \mathbf{I}_i \mathbf{v}_i - \mathbf{f}^{e}_i + "
     r"\textstyle\sum_j \mathbf{X}_j^T \mathbf{f}_j,\qquad \mathbf{S}_i^T \mathbf{f}_i = \boldsymbol{\tau}_i",
@@ -142,7 +142,7 @@ def _recursion(equations: MotionEquations, tree: Tree) -> list[str]:
         lines.append(r"&\text{added mass } \mathbf{A}_i \text{ of the water stands with } \mathbf{I}_i \text{: }"
                      r"\mathbf{A}_i \mathbf{a}_i + \mathbf{v}_i \times^{*} \mathbf{A}_i \mathbf{v}_i")
     if tree.flexible:
-        lines.append(r"&\text{elastic links: } \mathbf{w}_i = \dot{\boldsymbol{\eta}}_i,\ \mathbf{S}_i \text{ the mode shapes at "
+        lines.append(r"&\text{elastic links: } w_i = \dot{\boldsymbol{\eta}}_i,\ \mathbf{S}_i \text{ the mode shapes at "
                      r"the free end},\ \boldsymbol{\tau}_i = -\mathbf{K}_i \boldsymbol{\eta}_i - "
                      r"\mathbf{D}_i \dot{\boldsymbol{\eta}}_i - (\text{inertia of the beam})")
     for k, link in enumerate(tree.links):
@@ -156,37 +156,40 @@ def _link(equations: MotionEquations, tree: Tree, k: int, link: Link) -> list[st
     parent = r"\text{the ground}" if link.parent == GROUND else rf"\text{{link }} {link.parent + 1}"
     head = rf"&\textbf{{link {n}: {_text(link.name)}}} \text{{ on }} {parent} \text{{ by {_text(link.joint.name)}}}"
     speeds = [tree.w[i] for i in link.speeds]
+    product = velocity_product(tree, link)
     called = [sp.Symbol(str(u)) if u is None else u for u in joint_speeds(link.joint)]
-    rows = [(rf"\mathbf{{R}}_{{{n}}}", link.R), (rf"\mathbf{{r}}_{{{n}}}", link.r), (rf"\mathbf{{S}}_{{{n}}}", link.S),
-            (rf"\mathbf{{w}}_{{{n}}}", speeds)]
-    if not all(is_zero(c) for c in link.c):
-        rows.append((rf"\mathbf{{c}}_{{{n}}}", link.c))
-    rows += [(rf"m_{{{n}}}", [link.inertia.m]), (rf"\mathbf{{h}}_{{{n}}}", link.inertia.h),
-             (rf"\mathbf{{J}}_{{{n}}}", link.inertia.I)]
-    parts = []
-    for letter, value in rows:
-        matrix = _matrix(equations, value)
+    rows: list[tuple[str, Any]] = [("R", link.R), ("r", link.r), ("S", link.S), ("w", speeds)]
+    if not all(map(is_zero, product)):
+        rows.append(("c", product))
+    rows += [("m", [link.inertia.m]), ("h", link.inertia.h), ("Theta", link.inertia.I)]
+    lines, row, room = [head], "", float(WIDTH)
+    for name, value in rows:
+        letter, matrix = name_latex(f"{name}_{n}"), _matrix(equations, value)
         if matrix is None:
-            text = rf"{letter}({', '.join(sp.latex(u) for u in called)})"
+            below, text, width = [], rf"{letter}({', '.join(sp.latex(u) for u in called)})", 20.0
         else:
-            text = f"{letter} = {sp.latex(matrix[0] if matrix.shape == (1, 1) else matrix)}"
-        parts.append((text, letters(letter) + 3 + (_wide(matrix) if matrix is not None else 10)))
-    return [head, *_rows(parts)]
-
-
-def _rows(parts: Sequence[tuple[str, float]]) -> list[str]:
-    """Texts with their widths, several on a line."""
-    lines, row, room = [], "", float(WIDTH)
-    for text, width in parts:
-        if row and width > room:
+            row_vector = matrix.cols == 1 and matrix.rows > 1 and _wide(matrix.T) < WIDTH / 2
+            left, shown = (rf"{letter}^{{T}}", matrix.T) if row_vector else (letter, matrix)
+            text, width = f"{left} = {sp.latex(shown[0] if shown.shape == (1, 1) else shown)}", letters(left) + 3 + _wide(shown)
+            below = matrix_lines(letter, f"{name}_{n}", matrix, WIDTH) if width > WIDTH else []
+        if row and (below or width > room):
             lines.append(f"&{row}")
             row, room = "", float(WIDTH)
-        row, room = (rf"{row},\quad {text}" if row else text), room - width - 2
-    return [*lines, f"&{row}"]
+        if below:
+            lines += below
+        else:
+            row, room = (rf"{row},\quad {text}" if row else text), room - width - 3
+    return [*lines, f"&{row}"] if row else lines
+
+
+def velocity_product(tree: Tree, link: Link) -> np.ndarray:
+    """(6,) rate of S w at constant rates of the speeds, seen from the link's frame, link axes."""
+    moved = link.S @ tree.w[list(link.speeds)]
+    return np.concatenate([link.c[:3], link.c[3:] - cross(moved[:3], moved[3:])])
 
 
 def _matrix(equations: MotionEquations, value: Any) -> sp.Matrix | None:
-    """A small array of the tape in SymPy; None where it is wider than a line or too long."""
+    """A small array of the tape in SymPy; None where it is too long."""
     output = Output.of("part", value)
     sizes = written_out(output.entries)
     if sum(sizes.get(e, 0) for e in output.entries if isinstance(e, Node)) > SMALL:
@@ -196,8 +199,7 @@ def _matrix(equations: MotionEquations, value: Any) -> sp.Matrix | None:
     except (TooLarge, UnsupportedExpression, ZeroDivisionError):
         return None
     rows, cols = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
-    matrix = sp.Matrix(rows, cols, entries)
-    return matrix if _wide(matrix) <= WIDTH - 8 else None
+    return sp.Matrix(rows, cols, entries)
 
 
 def _constraints(equations: MotionEquations) -> list[str]:
@@ -237,6 +239,6 @@ def _height(lines: Sequence[str]) -> int:
 def _display(lines: Sequence[str]) -> str:
     if len(lines) == 1:
         return rf"$\displaystyle {lines[0].replace('&', '', 1) if lines[0].startswith('&') else lines[0]}$"
-    rows = [line if "&" in line[:200] and not line.startswith(r"\tilde") else f"&{line}" for line in lines]
+    rows = ["&" + line.removeprefix("&").replace("&=", "=", 1) for line in lines]
     body = f" {_STRUT}\n".join(rows)
     return f"$\\displaystyle \\begin{{aligned}}\n{body}\n\\end{{aligned}}$"
