@@ -97,7 +97,9 @@ MEASUREMENTS: dict[str, Measurement] = {
             _folder("growth"))),
     "printing": Measurement(
         "symdyn.lab.printing:run", "operations of printed equations in every form, and the time", (
-            _names("--systems", "only", "some of the mechanisms of the catalogue"),)),
+            _names("--systems", "only", "some of the mechanisms of the catalogue"),
+            Option("against", "--against", {"choices": ("sympy",), "default": "", "help": "with what SymPy simplifies "
+                   "KanesMethod's equations to, a minute at most each"}))),
     "batch": Measurement(
         "symdyn.lab.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
     "sweep": Measurement(

@@ -17,8 +17,8 @@ import sympy as sp
 from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.exact.ring import TooLarge
 from symdyn.exact.shortest import written, written_out
-from symdyn.formulation.provenance import OfBodies
-from symdyn.formulation.tree import GROUND, Link, Tree
+from symdyn.formulation.printed.provenance import OfBodies
+from symdyn.formulation.trees.tree import GROUND, Link, Tree
 from symdyn.model.record import joint_speeds
 from symdyn.report.latex import columns, letters, matrix_lines
 from symdyn.report.named import Step, with_intermediates
