@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -15,14 +16,17 @@ from symdyn.tape.node import COORDINATE, PARAMETER, SPEED, Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
 
+# Decimal numbers are taken as floats.
+LEAST, MOST = sys.float_info.min, sys.float_info.max
+
 
 def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) -> tuple[list[Any], dict[Node, sp.Expr]]:
     """Entries (nodes and numbers) of the expressions, and what each leaf stands for.
 
     same   symbol -> the one that it is taken for
     Functions without a value, such as q(t), and their derivatives are leaves. Raises UnsupportedExpression for functions that no
-    code can be generated for, ZeroDivisionError for a division by zero, ArgumentError for text, which is never evaluated, and
-    anything else that is no expression.
+    code can be generated for, ZeroDivisionError for a division by zero, ArgumentError for text, which is never evaluated,
+    anything else that is no expression, and decimal numbers beyond the range of floats.
     """
     expressions = [_taken(e) for e in expressions]
     same = same or {}
@@ -43,9 +47,14 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
 
 def _taken(value: Any) -> Any:
     try:
-        return sp.sympify(value, strict=True)
+        e = sp.sympify(value, strict=True)
     except sp.SympifyError:
         raise ArgumentError(f"exact algebra takes numbers and expressions of SymPy symbols, found {shown(value)}") from None
+    for number in e.atoms(sp.Float):
+        if number.is_finite and not (LEAST <= abs(number) <= MOST or number == 0):
+            raise ArgumentError(f"the number {number.n(6)} is beyond the range of floats, {LEAST:.1e} to {MOST:.1e}; pass it as "
+                                f"a fraction, sp.Rational('{number.n(6)}')")
+    return e
 
 
 def _kind(symbol: Any) -> int:

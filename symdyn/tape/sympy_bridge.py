@@ -165,6 +165,10 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
     return sp.Matrix(rows, columns, entries)
 
 
+# Powers of two that floats reach, above and below one, and some less.
+_EXPONENT = 1000
+
+
 def number(value: Any) -> Any:
     """Short fractions as fractions, long ones as the decimal number they stand for."""
     if isinstance(value, bool):
@@ -176,9 +180,10 @@ def number(value: Any) -> Any:
 
 
 def printed_as_decimal(value: Fraction) -> bool:
-    """Whether a number stands on the tape for a decimal one, and is printed as such."""
+    """Whether a number stands on the tape for a decimal one, and is printed as such: one in the range of floats."""
     below = value.denominator
-    return below > 1000 and (below > 10**6 or below & (below - 1) == 0)
+    return (below > 1000 and (below > 10**6 or below & (below - 1) == 0)
+            and abs(value.numerator.bit_length() - below.bit_length()) < _EXPONENT)
 
 
 def applied(op: str, a: list) -> Any:

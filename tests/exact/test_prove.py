@@ -89,6 +89,9 @@ def test_too_large_a_claim_is_undecided(monkeypatch):
     (x, sp.nan, "b is nan"),
     (sp.zeros(2, 1), sp.zeros(1, 2), r"a is \(2, 1\), b is \(1, 2\)"),
     (sp.zeros(2, 1), x, r"a is \(2, 1\), b is a scalar"),
+    (sp.Float("1e400") * x, x, r"the number 1.00000E\+400 is beyond the range of floats, 2.2e-308 to 1.8e\+308; pass it as a "
+                               r"fraction, sp.Rational\('1.00000E\+400'\)"),
+    (x, sp.Float("-1e-400") * x, "the number -1.00000E-400 is beyond the range of floats"),
 ])
 def test_faults(left, right, message):
     with pytest.raises(ArgumentError, match=message):

@@ -96,6 +96,12 @@ def test_bound_is_reported_before_memory_is_taken():
         written(entries, symbols, bound=200)
 
 
+@pytest.mark.parametrize("number", ["1e400", "1e-400", "-3e-330"])
+def test_fractions_beyond_the_range_of_floats_are_kept(number):
+    e = sp.Rational(number) * q1 + sp.cos(q1)
+    assert shortest(e) == e and sd.prove(shortest(e), e)
+
+
 def test_unknown_form():
     eq = sd.systems.pendulum().embedding()
     with pytest.raises(SymdynError, match="the form 'shorter' was asked for; there are shortest, polynomial, fourier"):
