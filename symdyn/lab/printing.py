@@ -24,12 +24,12 @@ HEADING = f"{'mechanism':36}{'quantity':10}{'operations':>11}{'polynomial':>12}{
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity: operations in its shortest form, in others (None: too large), and in named intermediates together with
+    """One quantity: operations in its shortest form and in others (None: too large), and in named intermediates together with
     these; seconds of the processor for the shortest form."""
 
     mechanism: str
     quantity: str
-    operations: int
+    operations: int | None
     others: tuple[int | None, ...]
     named: int | None
     seconds: float
@@ -37,12 +37,13 @@ class Row:
     @property
     def longer(self) -> bool:
         """Whether another form has fewer operations, which must not be."""
-        return any(count is not None and count < self.operations for count in self.others)
+        return any(count is not None and (self.operations is None or count < self.operations) for count in self.others)
 
     def __str__(self) -> str:
         counts = "".join(f"{'-' if count is None else count:>{width}}" for count, width in zip((*self.others, self.named),
                                                                                              (12, 10, 12), strict=True))
-        return f"{self.mechanism:36}{self.quantity:10}{self.operations:>11}{counts}{self.seconds:>8.2f}"
+        own = "-" if self.operations is None else self.operations
+        return f"{self.mechanism:36}{self.quantity:10}{own:>11}{counts}{self.seconds:>8.2f}"
 
 
 def printed(name: str) -> Iterator[Row]:
@@ -53,7 +54,7 @@ def printed(name: str) -> Iterator[Row]:
     for quantity in QUANTITIES:
         if quantity in equations.quantities:
             begin = clock.process_time()
-            operations = int(sp.count_ops(equations.explicit(quantity)))
+            operations = _operations(equations, quantity, "shortest")
             seconds = clock.process_time() - begin
             yield Row(name, quantity, operations, tuple(_operations(equations, quantity, form) for form in FORMS),
                       _with_names(equations, quantity), seconds)
@@ -96,7 +97,7 @@ def run(only: Sequence[str] = (), against: str = "") -> int:
         for row in printed(name):
             rows.append(row)
             other = by_sympy(name, row.quantity) if against else ""
-            longer = row.longer or (other[:1].isdigit() and int(other.split()[0]) < row.operations)
+            longer = row.longer or (other[:1].isdigit() and row.operations is not None and int(other.split()[0]) < row.operations)
             print(f"{row}  {other:14}{'  another form is shorter' if longer else ''}".rstrip(), flush=True)
             missed += longer
         seconds = sum(row.seconds for row in rows if row.quantity in QUANTITIES[:3])
