@@ -54,7 +54,12 @@ class Typeset:
         return self.latex
 
     def _repr_latex_(self) -> str:
-        return rf"$\displaystyle {self.latex}$"
+        return rf"$\displaystyle {without_macros(self.latex)}$"
+
+
+def without_macros(text: str) -> str:
+    r"""LaTeX for MathJax, which expands \bigl in no more than 5 kB: \mathopen{\big[} is no macro there."""
+    return text.replace(r"\bigl[", r"\mathopen{\big[}").replace(r"\bigr]", r"\mathclose{\big]}")
 
 
 def latex(value: Any, name: str = "", shorthand: bool = False, width: int = WIDTH) -> Typeset:

@@ -20,7 +20,7 @@ from symdyn.exact.shortest import written, written_out
 from symdyn.formulation.printed.provenance import OfBodies
 from symdyn.formulation.trees.tree import GROUND, Link, Tree
 from symdyn.model.record import joint_speeds
-from symdyn.report.latex import columns, letters, matrix_lines
+from symdyn.report.latex import columns, letters, matrix_lines, without_macros
 from symdyn.report.named import Step, with_intermediates
 from symdyn.report.notation import name_latex
 from symdyn.spatial.vectors import cross
@@ -240,5 +240,5 @@ def _display(lines: Sequence[str]) -> str:
     if len(lines) == 1:
         return rf"$\displaystyle {lines[0].replace('&', '', 1) if lines[0].startswith('&') else lines[0]}$"
     rows = ["&" + line.removeprefix("&").replace("&=", "=", 1) for line in lines]
-    body = f" {_STRUT}\n".join(rows)
+    body = without_macros(f" {_STRUT}\n".join(rows))
     return f"$\\displaystyle \\begin{{aligned}}\n{body}\n\\end{{aligned}}$"
