@@ -59,9 +59,23 @@ def compare_lecture(names: Sequence[str] | None = None, jobs: int = 1) -> Compar
     if jobs == 1:
         results = [_named(name) for name in chosen]
     else:
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            results = list(pool.map(_named, chosen, chunksize=1))
+        results = _shared(chosen, jobs)
     return Comparisons(tuple(results), clock.monotonic() - start)
+
+
+def _shared(names: Sequence[str], jobs: int) -> list[Comparison]:
+    """The comparisons of cases on several processes, of which this one is the first: it takes cases from the end while the others
+    start."""
+    own: dict[int, Comparison] = {}
+    with ProcessPoolExecutor(jobs - 1, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(_named, name) for name in names]
+        try:
+            for k in reversed(range(len(names))):
+                if futures[k].cancel():
+                    own[k] = _named(names[k])
+            return [own[k] if k in own else future.result() for k, future in enumerate(futures)]
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def find(cases: Iterable[Case | str]) -> list[Case]:

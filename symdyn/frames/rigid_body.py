@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
+from symdyn.frames.product import times
 from symdyn.frames.quantities import Quantities
 
 
@@ -62,7 +63,7 @@ def rotated_inertia(R: Any, I: Any) -> Any:
     take = Quantities("rotated_inertia")
     R, I = take.rotation(R), take.inertia("I", I)
     take.demand_none()
-    return take.given_back(R * I * R.T)
+    return take.given_back(times(R, I, R.T))
 
 
 def point_inertia(masses: Sequence[Any], positions: Sequence[Any]) -> Any:
@@ -145,7 +146,7 @@ def moment_equation(inertia: Any, omega: Any, alpha: Any, mass: Any = 0, r_G: An
     I, w, w_rate = take.inertia("inertia", inertia), take.vector("omega", omega), take.vector("alpha", alpha)
     m, r, a = take.mass(mass), take.vector("r_G", r_G), take.vector("acceleration", acceleration)
     take.demand_none()
-    return take.given_back(I * w_rate + w.cross(I * w) + m * r.cross(a))
+    return take.given_back(times(I, w_rate) + w.cross(times(I, w)) + m * r.cross(a))
 
 
 def force_equation(mass: Any, acceleration: Any, omega: Any = (0, 0, 0), alpha: Any = (0, 0, 0), r_G: Any = (0, 0, 0)) -> Any:

@@ -7,6 +7,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import numeric_derivative
+from symdyn.frames.product import times
 from symdyn.lecture.arm_in_space import ArmInSpace
 from symdyn.lecture.chapter_5_spatial_velocity import ARM, Named
 
@@ -27,10 +28,10 @@ class AtCenter(Named):
         self.n_omega, self.n_v = vector("n_omega_bG2", bG.angular_velocity(n)), vector("n_v_G2", bG.velocity(n))
         self.n_alpha, self.n_a = vector("n_alpha_bG2", bG.angular_acceleration(n)), vector("n_a_G2", bG.acceleration(n))
         self.n_R_G = matrix("n_R_bG2", bG.rotation(n))
-        self.I_G = matrix("bG2_I_G2", turn.T * arm.I2 * turn)
-        self.n_I_G = matrix("n_I_G2", arm.b2.rotation(n) * arm.I2 * arm.b2.rotation(n).T)
-        self.resultant = sp.diag(turn.T, turn.T) * arm.of_link2("f_G")
-        self.n_M, self.n_F = bG.rotation(n) * self.resultant[:3, :], bG.rotation(n) * self.resultant[3:, :]
+        self.I_G = matrix("bG2_I_G2", times(turn.T, arm.I2, turn))
+        self.n_I_G = matrix("n_I_G2", times(arm.b2.rotation(n), arm.I2, arm.b2.rotation(n).T))
+        self.resultant = times(sp.diag(turn.T, turn.T), arm.of_link2("f_G"))
+        self.n_M, self.n_F = (times(bG.rotation(n), half) for half in (self.resultant[:3, :], self.resultant[3:, :]))
 
 
 def force() -> list[Formula]:

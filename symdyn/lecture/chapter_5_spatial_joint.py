@@ -7,6 +7,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import Proof
+from symdyn.frames.product import times
 from symdyn.lecture.arm_in_space import ArmInSpace, Letters, block, tilde
 from symdyn.lecture.chapter_5_spatial_velocity import ARM
 from symdyn.model.symbols import symbols_of
@@ -49,14 +50,14 @@ class LinkAlone(Letters):
         self.X_back = sp.Matrix(motion_transform(b2.rotation(bG), list(b2.position(bG))))
         self.X_star_G, self.X_star_3 = (sp.Matrix(motion_transform(b.rotation(b2), list(b.position(b2)))).T for b in (bG, b3))
         vector, matrix, to_n, to_bG = self.vector, self.matrix, b2.rotation(n), b2.rotation(bG)
-        self.f_G, self.v_G = sp.diag(to_bG, to_bG) * at_G, sp.diag(to_bG, to_bG) * v_G  # the recursion's axes are those of b2
-        self.omega, self.v = vector("bG2_omega_bG2", to_bG * v_G[:3, :]), vector("bG2_v_G2", to_bG * v_G[3:, :])
-        self.omega_dot = vector("bG2_omega_bG2_dot", to_bG * a_G[:3, :])
-        self.v_dot = vector("bG2_v_G2_dot", to_bG * a_G[3:, :])
-        self.I_G = matrix("bG2_I_G2", to_bG * I2 * to_bG.T)
-        self.n_f, self.n_m, self.n_F, self.n_M = to_n * f[3:, :], to_n * f[:3, :], to_n * at_G[3:, :], to_n * at_G[:3, :]
+        self.f_G, self.v_G = (times(sp.diag(to_bG, to_bG), value) for value in (at_G, v_G))  # the recursion's axes are those of b2
+        self.omega, self.v = vector("bG2_omega_bG2", self.v_G[:3, :]), vector("bG2_v_G2", self.v_G[3:, :])
+        self.omega_dot = vector("bG2_omega_bG2_dot", times(to_bG, a_G[:3, :]))
+        self.v_dot = vector("bG2_v_G2_dot", times(to_bG, a_G[3:, :]))
+        self.I_G = matrix("bG2_I_G2", times(to_bG, I2, to_bG.T))
+        self.n_f, self.n_m, self.n_F, self.n_M = (times(to_n, half) for half in (f[3:, :], f[:3, :], at_G[3:, :], at_G[:3, :]))
         self.n_f_2, self.n_m_2 = vector("n_f_O2", self.n_f), vector("n_m_O2", self.n_m)
-        self.n_f_3, self.n_m_3 = vector("n_f_O3", to_n * R_3 * f_3), vector("n_m_O3", to_n * R_3 * m_3)
+        self.n_f_3, self.n_m_3 = vector("n_f_O3", times(to_n, R_3, f_3)), vector("n_m_O3", times(to_n, R_3, m_3))
         self.b2_f_3, self.b2_m_3 = vector("b2_f_O3", R_3 * f_3), vector("b2_m_O3", R_3 * m_3)
         self.f_3, self.m_3 = vector("b3_f_O3", f_3), vector("b3_m_O3", m_3)
         self.n_F_G, self.n_M_G = vector("n_F_G2", self.n_F), vector("n_M_G2", self.n_M)

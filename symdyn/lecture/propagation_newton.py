@@ -10,6 +10,7 @@ from typing import Any
 
 import sympy as sp
 
+from symdyn.frames.product import times
 from symdyn.lecture.propagation_arms import Arm
 
 _ABOUT: dict[str, Callable[[Any], sp.Matrix]] = {"x": sp.rot_axis1, "y": sp.rot_axis2, "z": sp.rot_axis3}
@@ -25,7 +26,7 @@ class Newton:
         self.r_O, self.r_G = [sp.zeros(3, 1)], []
         R = sp.eye(3)
         for k, (axis, q) in enumerate(zip(arm.axes, arm.q), start=1):
-            R = R * _ABOUT[axis](q).T
+            R = times(R, _ABOUT[axis](q).T)
             self.R.append(R)
             self.r_G.append(self.r_O[-1] + R * _ALONG * arm.parameter("lc#", k))
             self.r_O.append(self.r_O[-1] + R * _ALONG * arm.parameter("l#", k))
@@ -39,8 +40,8 @@ class Newton:
     def velocity(self, link: int) -> sp.Matrix:
         """(6, 1) angular velocity, and velocity of O_i, both in link axes."""
         R = self.R[link - 1]
-        W = R.T * self.rate(R)
-        return sp.Matrix([W[2, 1], W[0, 2], W[1, 0], *(R.T * self.rate(self.r_O[link - 1]))])
+        W = times(R.T, self.rate(R))
+        return sp.Matrix([W[2, 1], W[0, 2], W[1, 0], *times(R.T, self.rate(self.r_O[link - 1]))])
 
     def acceleration(self, link: int) -> sp.Matrix:
         """(6, 1) rates of change of the components of the velocity; weights as an acceleration of the base."""
@@ -51,9 +52,9 @@ class Newton:
         """(6, 1) moment about G_i and force that move the body, link axes: I omega_dot + omega x I omega, m (a_G - g)."""
         R, I = self.R[link - 1], self.arm.I_Gi(link)
         omega = sp.Matrix(self.velocity(link)[:3])
-        moment = I * self.rate(omega) + omega.cross(I * omega)
+        moment = times(I, self.rate(omega)) + omega.cross(times(I, omega))
         a_G = self.rate(self.rate(self.r_G[link - 1])) + sp.Matrix(self.arm.a_0[3:])
-        return self.arm.put(sp.Matrix([*moment, *(R.T * a_G * self.arm.parameter("m#", link))]))
+        return self.arm.put(sp.Matrix([*moment, *times(R.T, a_G * self.arm.parameter("m#", link))]))
 
     def on_body(self, link: int) -> sp.Matrix:
         """(6, 1) the same with the moment about O_i."""
@@ -66,8 +67,8 @@ class Newton:
         """(6, 1) moment about O_i and force through the joint, link axes: what moves the body and all outwards of it."""
         total = self.on_body(link)
         for k in range(link + 1, len(self.R) + 1):
-            turn = self.R[link - 1].T * self.R[k - 1]
-            arm = self.arm.put(self.R[link - 1].T * (self.r_O[k - 1] - self.r_O[link - 1]))
+            turn = times(self.R[link - 1].T, self.R[k - 1])
+            arm = self.arm.put(times(self.R[link - 1].T, self.r_O[k - 1] - self.r_O[link - 1]))
             wrench = self.on_body(k)
             force = self.arm.put(turn) * sp.Matrix(wrench[3:])
             moment = self.arm.put(turn) * sp.Matrix(wrench[:3]) + arm.cross(force)
