@@ -50,7 +50,8 @@ class LinkAlone(Letters):
         self.X_back = sp.Matrix(motion_transform(b2.rotation(bG), list(b2.position(bG))))
         self.X_star_G, self.X_star_3 = (sp.Matrix(motion_transform(b.rotation(b2), list(b.position(b2)))).T for b in (bG, b3))
         vector, matrix, to_n, to_bG = self.vector, self.matrix, b2.rotation(n), b2.rotation(bG)
-        self.f_G, self.v_G = (times(sp.diag(to_bG, to_bG), value) for value in (at_G, v_G))  # the recursion's axes are those of b2
+        # The recursion's axes are those of b2.
+        self.f_G, self.v_G = (times(sp.diag(to_bG, to_bG), value) for value in (at_G, v_G))
         self.omega, self.v = vector("bG2_omega_bG2", self.v_G[:3, :]), vector("bG2_v_G2", self.v_G[3:, :])
         self.omega_dot = vector("bG2_omega_bG2_dot", times(to_bG, a_G[:3, :]))
         self.v_dot = vector("bG2_v_G2_dot", times(to_bG, a_G[3:, :]))
