@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import sympy as sp
@@ -99,6 +99,12 @@ class ArmInSpace(Letters):
         if name not in self.known:
             self.known[name] = sp.ImmutableMatrix(self.equations.explicit(f"{name}_3", simplify=False))
         return sp.Matrix(self.known[name])
+
+
+@cache
+def arm_in_space() -> ArmInSpace:
+    """The arm, derived once for all cases; a letter has the same value in all of them."""
+    return ArmInSpace()
 
 
 def cross(*factors: sp.Matrix) -> sp.Matrix:

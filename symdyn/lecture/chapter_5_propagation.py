@@ -13,7 +13,7 @@ from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import Proof, other
 from symdyn.frames.rates import rate
 from symdyn.lecture.chapter_5_spatial_joint import STAR
-from symdyn.lecture.propagation_arms import Arm, row
+from symdyn.lecture.propagation_arms import arm_of, row
 from symdyn.lecture.propagation_letters import typeset
 from symdyn.lecture.propagation_newton import Newton
 from symdyn.model.joints import Revolute, Universal
@@ -28,7 +28,7 @@ NEWTON = "Moment and force by Newton and Euler in 3-vectors, from differentiatin
 
 
 def _inverse_dynamics() -> list[Formula]:
-    arm = Arm(3)
+    arm = arm_of(3)
     newton, of = Newton(arm), arm.letter
     star = Erratum(WHY_STAR, other(NEWTON, newton.at_center(2)), slip=STAR)
     return [
@@ -75,7 +75,7 @@ def _where_S_moves() -> Formula:
 
 
 def _simplification() -> list[Formula]:
-    arm = Arm(3, exact=True)
+    arm = arm_of(3, exact=True)
     newton, of, f_2, f_B = Newton(arm), arm.letter, arm.f_2, arm.f_B(2)
     by_joint, by_body = other(NEWTON, newton.through_joint(2)), other(NEWTON, newton.on_body(2))
     no_work = Proof("energy balance", "With I constant dT/dt = v^T f, so the force that the velocity alone needs does no work: "
@@ -124,7 +124,7 @@ def _simplification() -> list[Formula]:
 
 
 def _letters() -> list[Formula]:
-    arm = Arm(3)
+    arm = arm_of(3)
     of = arm.letter
     return [
         row(of, "a_1", 9843, "a1 = 1X0 a0 + S1 q1'' + c1", arm.a_1),

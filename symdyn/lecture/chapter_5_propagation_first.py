@@ -6,7 +6,7 @@ Sizes, masses and angles in exact numbers, as f_1 is written in nine ways; 5.8 h
 from __future__ import annotations
 
 from symdyn.comparison.case import Case, Formula, Slide
-from symdyn.lecture.propagation_arms import Arm, row
+from symdyn.lecture.propagation_arms import arm_of, row
 
 # q2_ddot of the equations for link 2, and what of it a_1 is not in
 SOLVED = "(S2^T I2 S2)^-1 (tau_2 - S2^T (I2 (2X1 a1 + c2) + p2))"
@@ -16,7 +16,7 @@ P_1_A = f"p1 + 1X2* p2 + 1X2* I2 c2 + 1X2* I2 S2 {REST}"
 
 
 def _link_1() -> list[Formula]:
-    arm = Arm(2, exact=True)
+    arm = arm_of(2, exact=True)
     of, f_1 = arm.letter, arm.f_1
     # From here on q2_ddot is what tau_2 makes it, for a given a_1.
     free = arm.free(2)

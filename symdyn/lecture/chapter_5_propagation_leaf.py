@@ -6,14 +6,14 @@ import sympy as sp
 
 from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import other
-from symdyn.lecture.propagation_arms import Arm, row
+from symdyn.lecture.propagation_arms import arm_of, row
 from symdyn.lecture.propagation_newton import Newton
 
 TITLE = "Forward Dynamics - Propagation Methods"
 
 
 def _one_link() -> list[Formula]:
-    arm = Arm(1)
+    arm = arm_of(1)
     of, f_1, (tau,), torque = arm.letter, arm.f_1, arm.tau, arm.torques
     return [
         row(of, "a_1", 9871, "a1 = 1X0 a0 + S1 q1'' + c1", arm.a_1,
@@ -38,7 +38,7 @@ def _one_link() -> list[Formula]:
 
 
 def _link_2() -> list[Formula]:
-    arm = Arm(2)
+    arm = arm_of(2)
     of, f_2, tau, torque = arm.letter, arm.f_2, arm.tau[1], arm.torques[1:, :]
     # For a given a_1, that is a given q1_ddot.
     free = sp.Matrix([arm.free(2)[arm.q_ddot[1]]])

@@ -6,11 +6,11 @@ import sympy as sp
 
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import Proof
-from symdyn.lecture.propagation_arms import Arm, row
+from symdyn.lecture.propagation_arms import arm_of, row
 
 
 def _two_links() -> list[Formula]:
-    arm = Arm(2)
+    arm = arm_of(2)
     of, q1_ddot, q2_ddot = arm.letter, *arm.q_ddot
     free = arm.free(2)
     mass = arm.put(arm.system.embedding().explicit("M_tilde", simplify=False))
@@ -49,7 +49,7 @@ def _two_links() -> list[Formula]:
 
 
 def _three_links() -> list[Formula]:
-    arm = Arm(3, exact=True)
+    arm = arm_of(3, exact=True)
     of, _, q2_ddot, q3_ddot = arm.letter, *arm.q_ddot
     # Accelerations outwards of a link are what the torques make them, for given ones up to that link.
     free_3, free_23 = arm.free(3), arm.free(2, 3)

@@ -7,7 +7,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import Proof, numeric_derivative
-from symdyn.lecture.arm_in_space import ArmInSpace, block, cross, tilde
+from symdyn.lecture.arm_in_space import ArmInSpace, arm_in_space, block, cross, tilde
 from symdyn.lecture.chapter_5_spatial_velocity import ARM, Named, transform_to_center
 
 OMEGA_DOT, V_DOT = r"{}^{b_2}\dot{\boldsymbol\omega}_{b_2/n}", r"{}^{b_2}\dot{\mathbf v}_{O_2/E}"
@@ -38,7 +38,7 @@ class Accelerated(Named):
 
 def angular() -> list[Formula]:
     """The rate of omega_b2/n in b2-components."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Accelerated(arm)
     derived = arm.of_link2("a")[:3, :]
     R, w_1, w_1_dot, k, theta_dot, turn = s.b2_R_1, s.omega_1, s.omega_1_dot, s.k, s.theta_dot, s.turn
@@ -68,7 +68,7 @@ def angular() -> list[Formula]:
 
 def linear() -> list[Formula]:
     """The rate of v_O2/E in b2-components; it is not the acceleration of O_2, which has omega x v besides."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Accelerated(arm)
     derived = arm.of_link2("a")[3:, :]
     R, w_1, w_1_dot, r, v_1, v_1_dot = s.b2_R_1, s.omega_1, s.omega_1_dot, s.r_21, s.v_O1, s.v_O1_dot
@@ -113,7 +113,7 @@ def linear() -> list[Formula]:
 
 def spatial() -> list[Formula]:
     """Both as a = X a + S q_ddot + S_ring q_dot + v x S q_dot."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Accelerated(arm)
     derived, R = arm.of_link2("a"), s.b2_R_1
     X = block([[R, 0], [R * tilde(s.r_21), R]])
@@ -140,7 +140,7 @@ def spatial() -> list[Formula]:
 
 def of_center() -> list[Formula]:
     """bG2, which no joint moves against b2."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Accelerated(arm)
     R, r = s.bG_R_2, s.r_G
     a_G = transform_to_center(arm) * arm.of_link2("a")

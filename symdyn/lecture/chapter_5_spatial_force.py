@@ -8,7 +8,7 @@ import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.proofs import numeric_derivative
 from symdyn.frames.product import times
-from symdyn.lecture.arm_in_space import ArmInSpace
+from symdyn.lecture.arm_in_space import ArmInSpace, arm_in_space
 from symdyn.lecture.chapter_5_spatial_velocity import ARM, Named
 
 M_G, F_G = r"{}^{b_{G2}}\mathbf M_{G_2}", r"{}^{b_{G2}}\mathbf F_{G_2}"
@@ -36,7 +36,7 @@ class AtCenter(Named):
 
 def force() -> list[Formula]:
     """Newton's law in n- and in bG2-components."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = AtCenter(arm)
     n, bG, m, R = arm.n, arm.bG2, arm.m2, s.n_R_G
     R_dot = arm.matrix("n_R_bG2_dot", sd.rate(bG.rotation(n)))
@@ -58,7 +58,7 @@ def force() -> list[Formula]:
 
 def moment() -> list[Formula]:
     """Euler's equation in n- and in bG2-components."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = AtCenter(arm)
     n, bG, R, n_I = arm.n, arm.bG2, s.n_R_G, s.n_I_G
     R_dot = arm.matrix("n_R_bG2_dot", sd.rate(bG.rotation(n)))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import Proof
 from symdyn.frames.product import times
-from symdyn.lecture.arm_in_space import ArmInSpace, Letters, block, tilde
+from symdyn.lecture.arm_in_space import Letters, arm_in_space, block, tilde
 from symdyn.lecture.chapter_5_spatial_velocity import ARM
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.sixvectors import force_cross, motion_transform
@@ -72,9 +74,15 @@ class LinkAlone(Letters):
         self.R_G, self.R_3 = matrix("b2_R_bG2", bG.rotation(b2)), matrix("b2_R_b3", R_3)
 
 
+@cache
+def link_alone() -> LinkAlone:
+    """The link, derived once for all cases."""
+    return LinkAlone()
+
+
 def at_center() -> list[Formula]:
     """f = I a + v x* I v at G_2."""
-    s = LinkAlone()
+    s = link_alone()
     m, f = s.m2, s.f_G
     I_hat = block([[s.I_G, 0], [0, m * sp.eye(3)]])
     v, a = sp.Matrix.vstack(s.omega, s.v), sp.Matrix.vstack(s.omega_dot, s.v_dot)
@@ -100,7 +108,7 @@ def at_center() -> list[Formula]:
 
 def force_at_joint() -> list[Formula]:
     """What link 1 exerts on link 2 in O_2: the force."""
-    s = LinkAlone()
+    s = link_alone()
     b2, b2_f = r"{}^{b_2}\mathbf f_{O_2}", s.f[3:, :]
     return [
         s.formula("F_G2", s.n_f_2 - s.n_f_3, s.n_F, 8873, latex=r"{}^n\mathbf F_{G_2}"),
@@ -113,7 +121,7 @@ def force_at_joint() -> list[Formula]:
 
 def moment_at_joint() -> list[Formula]:
     """What link 1 exerts on link 2 in O_2: the moment."""
-    s = LinkAlone()
+    s = link_alone()
     r_2, r_3, f_2, f_3, m_2, m_3, M, F = s.n_r_2G, s.n_r_3G, s.n_f_2, s.n_f_3, s.n_m_2, s.n_m_3, s.n_M_G, s.n_F_G
     at_O2, at_b2 = s.n_m, s.f[:3, :]
     n, b2 = r"{}^n\mathbf m_{O_2}", r"{}^{b_2}\mathbf m_{O_2}"
@@ -138,7 +146,7 @@ def moment_at_joint() -> list[Formula]:
 
 def at_joint() -> list[Formula]:
     """Both as f = X* f_G + X* f_3."""
-    s = LinkAlone()
+    s = link_alone()
     X_star_G = block([[s.R_G, -s.R_G * tilde(s.r_2G)], [0, s.R_G]])
     X_star_3 = block([[s.R_3, -s.R_3 * tilde(s.r_23)], [0, s.R_3]])
     f_G, f_3 = sp.Matrix.vstack(s.M, s.F), sp.Matrix.vstack(s.m_3, s.f_3)
@@ -152,7 +160,7 @@ def at_joint() -> list[Formula]:
 
 def torque() -> list[Formula]:
     """The torque of joint 2, beside what the embedding technique gives for the same arm in space."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     f = arm.of_link2("f")
     k, S = arm.vector("b2_k_b2", arm.of_link2("S")[:3]), arm.of_link2("S")
     m_2, f_2 = arm.vector("b2_m_O2", f[:3]), arm.vector("b2_f_O2", f[3:])

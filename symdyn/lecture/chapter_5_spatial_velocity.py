@@ -9,7 +9,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.comparison.case import Case, Erratum, Formula, Slide
 from symdyn.comparison.proofs import other
-from symdyn.lecture.arm_in_space import ArmInSpace, block, tilde
+from symdyn.lecture.arm_in_space import ArmInSpace, arm_in_space, block, tilde
 from symdyn.spatial.sixvectors import motion_transform
 
 ARM = "Inverse Dynamics of 2-Link Arm"
@@ -63,7 +63,7 @@ def transform_to_center(arm: ArmInSpace) -> sp.Matrix:
 
 def positions() -> list[Formula]:
     """O_2 from E, and its velocity, by differentiating a rotation matrix."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Named(arm)
     n, b1, b2 = arm.n, arm.b1, arm.b2
     O2 = b2.point("O2")
@@ -89,7 +89,7 @@ def positions() -> list[Formula]:
 
 def in_n_components() -> list[Formula]:
     """omega_b2/n and v_O2/E in n-components, outwards from the base."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Named(arm)
     n, b2 = arm.n, arm.b2
     planar = sd.systems.two_link_arm().recursive().link(1).v
@@ -113,7 +113,7 @@ def in_n_components() -> list[Formula]:
 
 def in_b_components() -> list[Formula]:
     """The same in b2-components, and as [omega; v] = X [omega; v] + S q_dot."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Named(arm)
     v = arm.of_link2("v")
     omega_2, v_O2 = v[:3, :], v[3:, :]
@@ -150,7 +150,7 @@ def in_b_components() -> list[Formula]:
 
 def of_center() -> list[Formula]:
     """The frame bG2 at the centre of mass of link 2."""
-    arm = ArmInSpace()
+    arm = arm_in_space()
     s = Named(arm)
     n, bG = arm.n, arm.bG2
     R, R_n = s.bG_R_2, s.bG_R_2 * s.b2_R_n

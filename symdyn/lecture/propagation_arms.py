@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import sympy as sp
@@ -136,6 +136,12 @@ class Arm:
     def f_B(self, link: int) -> sp.Matrix:
         """(6, 1) resultant on the body alone, about O_i: symdyn's f_G carried there."""
         return (self.X_G(link).T * getattr(self, f"f_G_{link}")).applyfunc(sp.expand)
+
+
+@cache
+def arm_of(links: int, exact: bool = False) -> Arm:
+    """An arm, derived once for all cases."""
+    return Arm(links, exact)
 
 
 _OF_LINK_2: dict[str, Callable[[Arm], sp.Matrix]] = {
