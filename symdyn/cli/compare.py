@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from symdyn.comparison import Case, Comparison, Comparisons
 
 OUTPUT = Path("generated/compare")
+# Results that SymPy keeps of each function, of which the lecture's formulas need more than the thousand it keeps otherwise.
+CACHE_SIZE = "20000"
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -26,6 +28,7 @@ def compare(arguments: argparse.Namespace) -> int:
         raise Stop(f"--jobs takes a number of processes from 1 on, found {arguments.jobs}")
     if not arguments.all and not arguments.cases:
         return _list()
+    os.environ.setdefault("SYMPY_CACHE_SIZE", CACHE_SIZE)
     from symdyn.comparison import compare_lecture
     from symdyn.comparison.reports import prepare
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import gc
 import re
 import time as clock
 from collections.abc import Iterable, Sequence
@@ -10,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any, overload
 
+from symdyn.collector import collector_paused
 from symdyn.comparison.case import Case
 from symdyn.comparison.judge import judge
 from symdyn.comparison.result import Comparison, Comparisons
@@ -56,10 +58,8 @@ def compare_lecture(names: Sequence[str] | None = None, jobs: int = 1) -> Compar
 
     start = clock.monotonic()
     chosen = list(dict.fromkeys(c.name for c in (find(names) if names is not None else cases())))
-    if jobs == 1:
-        results = [_named(name) for name in chosen]
-    else:
-        results = _shared(chosen, jobs)
+    with collector_paused():
+        results = [_named(name) for name in chosen] if jobs == 1 else _shared(chosen, jobs)
     return Comparisons(tuple(results), clock.monotonic() - start)
 
 
@@ -67,7 +67,7 @@ def _shared(names: Sequence[str], jobs: int) -> list[Comparison]:
     """The comparisons of cases on several processes, of which this one is the first: it takes cases from the end while the others
     start."""
     own: dict[int, Comparison] = {}
-    with ProcessPoolExecutor(jobs - 1, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs - 1, mp_context=get_context("spawn"), initializer=gc.disable) as pool:
         futures = [pool.submit(_named, name) for name in names]
         try:
             for k in reversed(range(len(names))):
