@@ -24,6 +24,8 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare cases and print the verdicts; of all, or where a folder is named, write the reports."""
     if arguments.all and arguments.cases:
         raise Stop("name cases, or pass --all, not both")
+    if arguments.no_pages and (arguments.output is not None or not arguments.all):
+        raise Stop("--no-pages goes with --all, without --output: there are no reports otherwise")
     if arguments.jobs is not None and arguments.jobs < 1:
         raise Stop(f"--jobs takes a number of processes from 1 on, found {arguments.jobs}")
     if not arguments.all and not arguments.cases:
@@ -37,7 +39,7 @@ def compare(arguments: argparse.Namespace) -> int:
         raise Stop(f"--jobs shares cases of the lecture, and {files[0]} is a file of your own, whose cases are compared in one "
                    "process; leave --jobs out")
     cases = _chosen(arguments.cases)
-    folder = arguments.output or (OUTPUT if arguments.all else None)
+    folder = arguments.output or (OUTPUT if arguments.all and not arguments.no_pages else None)
     if folder is not None:
         # What the reports need is looked at before the time for comparing is spent.
         prepare(folder)

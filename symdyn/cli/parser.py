@@ -158,6 +158,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
                         "with --all one a processor)")
     parser.add_argument("--output", metavar="DIR", type=path, help="folder for the reports (default with --all: "
                         "generated/compare)")
+    parser.add_argument("--no-pages", action="store_true", help="with --all: the table alone, no reports")
 
 
 def joined(argv: Sequence[str]) -> list[str]:

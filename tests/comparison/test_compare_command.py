@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from symdyn.cli import main
+from symdyn.comparison import compare_lecture
 from symdyn.lecture import cases, names
 
 MINE = """
@@ -61,6 +62,8 @@ def test_files_that_are_no_cases(capsys, tmp_path, text, message):
     (["compare", "newtons-lew"], "there is no case 'newtons-lew'; the nearest are newtons-law"),
     (["compare", "newtons-law", "--all"], "name cases, or pass --all, not both"),
     (["compare", "newtons-law", "--jobs", "0"], "--jobs takes a number of processes from 1 on, found 0"),
+    (["compare", "newtons-law", "--no-pages"], "--no-pages goes with --all, without --output"),
+    (["compare", "--all", "--no-pages", "--output", "x"], "--no-pages goes with --all, without --output"),
     (["compare", "9.9"], "there is no case of section 9.9; sections with cases are 1.1"),
     (["compare", "missing.py"], "there is no file missing.py")])
 def test_what_is_asked_wrongly(capsys, arguments, message):
@@ -130,6 +133,16 @@ def test_what_the_reports_need_is_looked_at_first(capsys, tmp_path, monkeypatch,
     assert main(["compare", *asked, "--output", str(tmp_path / "report")]) == 1
     said = capsys.readouterr()
     assert "pip install 'symdyn[report]'" in said.err and said.out == "" and not (tmp_path / "report").exists()
+
+
+def test_the_table_alone(capsys, monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.chdir(tmp_path)
+    one = compare_lecture(["newtons-law"])
+    monkeypatch.setattr("symdyn.comparison.compare_lecture", lambda *given: asked.append(given) or one)
+    assert main(["compare", "--all", "--no-pages", "--jobs", "3"]) == 0
+    assert asked == [(None, 3)] and list(tmp_path.iterdir()) == []
+    assert "6 of 6 decided entries are proved equal" in capsys.readouterr().out
 
 
 def test_help_tells_the_exit_codes(capsys):
