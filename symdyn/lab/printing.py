@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from symdyn.bench import kane_forms
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
+from symdyn.lab import kane_forms
 from symdyn.systems import get, names
 
 QUANTITIES = ("M_tilde", "k_tilde", "F_tilde", "C", "C_r", "F_d")

@@ -6,9 +6,9 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.lab import kane_forms, printing
 from symdyn.cli import main
 from symdyn.errors import SymdynError
+from symdyn.lab import kane_forms, printing
 
 
 def test_table(capsys):
