@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
     from symdyn.verification import Verification
+
+
+def _derived_again(again: Callable[[], Equations], simplify_seconds: float, candidates: tuple[Any, ...]) -> Equations:
+    return replace(again(), simplify_seconds=simplify_seconds, candidates=candidates)
 
 
 @dataclass(frozen=True)
@@ -112,6 +116,13 @@ class Equations:
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)
     _printed: dict[tuple[str, str], Any] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled, and copied, by what they are derived from: the copy is derived anew on a tape of its own."""
+        if self.again is None:
+            raise SymdynError(f"{self.name}: these equations were put together by hand, without what they are derived from, and "
+                              "cannot be pickled or copied; pickle the description and derive them there")
+        return _derived_again, (self.again, self.simplify_seconds, self.candidates)
 
     def quantity(self, name: str) -> np.ndarray:
         """A quantity, or a named output, as an array of nodes and numbers; recorded on first use.

@@ -87,6 +87,10 @@ class Module:
         self._one, self._free = (metadata.sizes.x,), (self._n_in,)
         self._defaults = dict(zip(metadata.parameters, metadata.defaults, strict=True))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled with the text of what was generated; all else is derived where it is needed. Copies share nothing."""
+        return _restored, (self.metadata.as_plain(), self._provider, self.backend, self.fallback)
+
     # -- evaluation
 
     def rhs(self, t: float, x: States, params: States | None = None, inputs: States | None = ()) -> np.ndarray:
@@ -737,6 +741,11 @@ class BoundModule:
         evaluator.set_params(self.params)
         setattr(self._local, name, evaluator)
         return evaluator
+
+
+def _restored(metadata: Mapping[str, Any], provider: Any, backend: str, fallback: str) -> Module:
+    return Module(ModuleMetadata.of_plain(metadata), provider, backend, fallback, getattr(provider, "write", None),
+                  getattr(provider, "report", None))
 
 
 def _is_time(t: Any) -> bool:

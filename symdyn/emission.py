@@ -1,0 +1,65 @@
+"""From equations to files: the named functions of a mechanism as source in a backend."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import IO, Any
+
+from symdyn import kinds
+from symdyn.arguments import some
+from symdyn.backend.methods import method_of
+from symdyn.backend.right_side import METHOD, RightSide
+from symdyn.backend.source import Source, render
+from symdyn.collector import collector_paused
+from symdyn.formulation.equations import Equations
+from symdyn.functions import groups
+from symdyn.functions.content import content_of
+from symdyn.runtime.building.stored import write_whole
+from symdyn.runtime.paths import as_path
+
+
+def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
+         templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
+         specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
+         batch: bool = False, method: str = METHOD, states: int = 2) -> Source:
+    """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
+
+    specialize   parameters, by symbol or name, that become numbers in the code and are folded
+    work         rhs gets one more state at the end: the work of all loads but gravity and springs
+    baumgarte    rhs is stabilized by Baumgarte's method, with one more parameter at the end: its gain, 1/s
+    batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
+    method       C only: the integrator's, one of symdyn.backend.methods.METHODS; what it needs besides rhs is emitted with it
+    states       how many random states the reference vectors of a standalone source begin with
+
+    Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
+    """
+    if standalone and equations.again is not None:
+        equations = equations.again()
+    bound = some(specialize, [p.name for p in equations.symbols.parameters], "specialize", equations.name)
+    kinds.text(backend, f"{equations.name}: the backend", "c")
+    method_of(method)
+    if templates is not None:
+        as_path(templates, "of the templates", "my_templates")
+    names = groups.written(equations, functions, method if integrator and backend == "c" else None)
+    with collector_paused():
+        content = content_of(equations, names, standalone, bound, RightSide(work, baumgarte, method))
+        return render(content, backend, templates, standalone, integrator, batch, method, states)
+
+
+def write_source(source: Source, folder: Path) -> list[Path]:
+    """Write the files of a source into a folder (made if absent), each in one step, so that programs and threads that read or
+    write them at the same time have whole ones; returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, text in source.files.items():
+        path = folder / name
+        write_whole(path, partial(_put, text.encode()), sync=False)
+        paths.append(path)
+    return paths
+
+
+def _put(content: bytes, file: IO[bytes]) -> None:
+    file.write(content)
