@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 # Letters in a line of a notebook; lines of two pages.
 WIDTH, LINES = 78, 110
+# Lines of each formula where one of all lines is more than MathJax takes.
+BLOCK = 36
 # Operations as derived up to which the shortest form is tried; operations as derived of what is written at all in a recursion.
 SHORT, SMALL = 1500, 20_000
 _STRUT = r"\\[2pt]"
@@ -240,5 +242,6 @@ def _display(lines: Sequence[str]) -> str:
     if len(lines) == 1:
         return rf"$\displaystyle {lines[0].replace('&', '', 1) if lines[0].startswith('&') else lines[0]}$"
     rows = ["&" + line.removeprefix("&").replace("&=", "=", 1) for line in lines]
-    body = without_macros(f" {_STRUT}\n".join(rows))
-    return f"$\\displaystyle \\begin{{aligned}}\n{body}\n\\end{{aligned}}$"
+    size = len(rows) if len(rows) <= LINES else BLOCK
+    blocks = [without_macros(f" {_STRUT}\n".join(rows[k:k + size])) for k in range(0, len(rows), size)]
+    return "\n\n".join(f"$\\displaystyle \\begin{{aligned}}\n{block}\n\\end{{aligned}}$" for block in blocks)
