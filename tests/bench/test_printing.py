@@ -57,3 +57,9 @@ def test_a_shorter_form_of_sympy_counts_as_missed(monkeypatch, capsys):
     assert "simplify" not in lines[3]
     monkeypatch.setattr(kane_forms, "operations", lambda *_: None)
     assert printing.by_sympy("cart_pole", "M_tilde") == "-"
+
+
+def test_what_is_too_large_has_a_row():
+    row = printing.Row("spatial_chain", "k_tilde", None, (None, 9), 945, 0.1)
+    assert row.longer and str(row).split() == ["spatial_chain", "k_tilde", "-", "-", "9", "945", "0.10"]
+    assert not dataclasses.replace(row, others=(None, None)).longer
