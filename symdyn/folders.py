@@ -6,6 +6,6 @@ from pathlib import Path
 
 
 def templates_folder() -> Path:
-    """The shipped templates: in the package where it is installed, beside it in a checkout."""
+    """The shipped templates: in the package where it is installed, next to it in a checkout."""
     package = Path(__file__).parent
     return package / "templates" if (package / "templates").is_dir() else package.parent / "templates"

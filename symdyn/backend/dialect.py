@@ -1,4 +1,4 @@
-"""A dialect: how the operations of the tape are written in a language; read from a TOML table beside its templates."""
+"""A dialect: how the operations of the tape are written in a language; read from a TOML table next to its templates."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def write(path: Path, data: Any) -> None:
 
 
 def put(path: Path, name: str, data: Mapping[str, Any]) -> None:
-    """Put one entry into a file beside the others."""
+    """Put one entry into a file next to the others."""
     write(path, dict(sorted({**(read(path) or {}), name: dict(data)}.items())))
 
 

@@ -50,7 +50,7 @@ def include_flags(*needed: str) -> list[str]:
     for what in needed:
         found = next((f for f in _include_folders() if (f / _HEADERS[what]).is_file()), None)
         if found is None:
-            raise SymdynError(f"the C++ header {_HEADERS[what]} was found neither beside the Python packages pinocchio and "
+            raise SymdynError(f"the C++ header {_HEADERS[what]} was found neither next to the Python packages pinocchio and "
                               "casadi, whose wheels bring it (pip install 'symdyn[peers]'), nor in the system; install the "
                               f"headers of {what}")
         folders.append(found)

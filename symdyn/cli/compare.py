@@ -1,4 +1,4 @@
-"""`symdyn compare`: what slides print beside what symdyn derives."""
+"""`symdyn compare`: what slides print compared with what symdyn derives."""
 
 from __future__ import annotations
 

@@ -67,21 +67,21 @@ _LEAST = _number("--repeats", "repeats", "timed runs, of which the least time is
 _BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
 _JSON = Option("to_json", "--json", {"metavar": "FILE", "type": path, "help": "write everything that was measured into a file"})
 _STORE = Option("file", "--store", {"metavar": "FILE", "type": path,
-                                    "help": "file to store them in beside what it holds (default: the package's own)"})
+                                    "help": "file to store them in next to what it holds (default: the package's own)"})
 
 MEASUREMENTS: dict[str, Measurement] = {
     "figures": Measurement(
         "symdyn.lab.pipeline:run", "the pipeline, from description to motion: times, operations, energy errors", (_ONLY,)),
     "peers": Measurement(
-        "symdyn.lab.peers.command:run", "accelerations beside Pinocchio and CasADi's C code, in one run", (
+        "symdyn.lab.peers.command:run", "accelerations compared with Pinocchio and CasADi's C code, in one run", (
             _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON)),
     "robots": Measurement(
-        "symdyn.lab.robots.command:run", "robots from URDF files beside Pinocchio: agreement, operations, times", (
+        "symdyn.lab.robots.command:run", "robots from URDF files compared with Pinocchio: agreement, operations, times", (
             _names("--only", "only", "some of the robots; names with * and ?", "ROBOT"),
             _number("--states", "states", "random states of each robot (default: 100)"),
             Option("no_times", "--no-times", {"action": "store_true", "help": "compile nothing"}))),
     "loops": Measurement(
-        "symdyn.lab.loops:run", "mechanisms with loops beside published motions and closed forms", (
+        "symdyn.lab.loops:run", "mechanisms with loops compared with published motions and closed forms", (
             _names("--systems", "names", "some of the mechanisms, such as andrews_squeezer or 'n_four_bar(2)'"), _TIMED, _JSON)),
     "published": Measurement(
         "symdyn.lab.published.command:run", "published mechanisms within their bounds, in the least time of all programs", (
@@ -101,7 +101,7 @@ MEASUREMENTS: dict[str, Measurement] = {
             Option("against", "--against", {"choices": ("sympy",), "default": "", "help": "with what SymPy simplifies "
                    "KanesMethod's equations to, a minute at most each"}))),
     "batch": Measurement(
-        "symdyn.lab.batch:run", "many states and motions at once, beside one after the other and Pinocchio", (_ONLY,)),
+        "symdyn.lab.batch:run", "many states and motions at once, compared with one after the other and Pinocchio", (_ONLY,)),
     "sweep": Measurement(
         "symdyn.lab.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
             _number("--count", "count", "motions (default: 1000000)"),
@@ -113,11 +113,11 @@ MEASUREMENTS: dict[str, Measurement] = {
     "costs": Measurement(
         "symdyn.lab.cost_model:run", "the constants by which the fastest formulation is predicted, from 40 systems", (_BEST,)),
     "references": Measurement(
-        "symdyn.bench.work.store:run", "make the references of work against error anew, with more digits than floats", (
+        "symdyn.bench.work.store:run", "make the references of work against error again, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "*", "help": "some of symdyn bench --all (default: all)"}),
             _number("--digits", "digits", "of the local errors (default: 20)"), _STORE)),
     "extended": Measurement(
-        "symdyn.lab.extended:run", "make the references of symdyn bench loops anew, with more digits than floats", (
+        "symdyn.lab.extended:run", "make the references of symdyn bench loops again, with more digits than floats", (
             Option("names", "", {"metavar": "NAME", "nargs": "+", "help": "such as puma560, or 'flyball_governor(rods)'"}),
             _number("--t", "end", "s (default: the system's duration, which is the published one)", float, "END"),
             _number("--digits", "digits", "of the local errors (default: 26)"), _STORE,

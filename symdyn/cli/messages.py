@@ -1,4 +1,4 @@
-"""Messages beside the results, with the exit codes they go with."""
+"""Messages next to the results, with the exit codes they go with."""
 
 from __future__ import annotations
 

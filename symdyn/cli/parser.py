@@ -65,7 +65,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_full(proof)
     _add_diagnose(coordinates(command("diagnose", diagnose, "what the constraints do: freedoms, redundant and contradictory "
                                       "ones, singular configurations, idle motions")))
-    _add_compare(command("compare", compare, "what slides print beside what symdyn derives, with a verdict on every entry; "
+    _add_compare(command("compare", compare, "what slides print and what symdyn derives, with a verdict on every entry; "
                          "without names the cases are listed", system=False))
     _add_bench(commands)
     _add_stress(command("stress", stress, "numerical stability: every check with a figure, a bound with its reason, and a "
@@ -162,7 +162,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
 
 
 def joined(argv: Sequence[str]) -> list[str]:
-    """The arguments with `bench peers` and the like as one word: a command of its own beside `bench`, which takes names."""
+    """The arguments with `bench peers` and the like as one word: a command of its own next to `bench`, which takes names."""
     words = list(argv)
     return [" ".join(words[:2]), *words[2:]] if words[:1] == ["bench"] and words[1:2] and words[1] in MEASUREMENTS else words
 

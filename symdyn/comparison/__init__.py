@@ -1,4 +1,4 @@
-"""Printed formulas beside derived ones, with a verdict on every entry."""
+"""Printed formulas compared with derived ones, with a verdict on every entry."""
 
 from symdyn.comparison.case import Case, Erratum, Formula, Remark, Slide
 from symdyn.comparison.result import Comparison, Comparisons

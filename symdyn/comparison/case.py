@@ -1,4 +1,4 @@
-"""A case: what a slide prints, beside what symdyn derives."""
+"""A case: what a slide prints, compared with what symdyn derives."""
 
 from __future__ import annotations
 

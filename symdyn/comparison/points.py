@@ -21,7 +21,7 @@ TRIES = 120
 SEED = 20101
 # Distances from zero: near points lie inside the ranges of roots and arc functions, far ones see where an angle leaves its own.
 NEAR, FAR = (0.2, 1.3), (1.5, 7.0)
-# Far outside of NEAR and FAR: constants that are small or large beside a symbol show here.
+# Far outside of NEAR and FAR: constants that are small or large next to a symbol show here.
 TINY, HUGE = (-9, -1), (1, 6)
 # Values near which formulas change their form or lose digits, and the powers of ten of the distances from them.
 SPECIAL = ("1/2", "1", "2", "pi/6", "pi/4", "pi/3", "pi/2", "pi", "2*pi")

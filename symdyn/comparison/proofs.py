@@ -202,7 +202,7 @@ def dimensions(sentence: str, units: Mapping[Any, Sequence[float]], unit: Sequen
 
 
 def _relative(value: Any, scale: Any) -> Residual:
-    """Of a difference, beside the size of what was subtracted."""
+    """Of a difference, compared with the size of what was subtracted."""
     size = float(abs(value) / scale) if scale else float(abs(value))
     return Residual(size, size <= ZERO_MEASURED, size >= VISIBLE)
 

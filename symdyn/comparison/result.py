@@ -22,7 +22,7 @@ PROVABLE = (Verdict.EQUAL, Verdict.CONVENTION, Verdict.WRONG, Verdict.DIFFERENT)
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """A case beside what symdyn derives: `formulas` with their entries, `counts` of verdicts, `remarks`; prints as a table."""
+    """A case compared with what symdyn derives: `formulas` with entries, `counts` of verdicts, `remarks`; prints as a table."""
 
     name: str
     title: str

@@ -33,7 +33,7 @@ def compare(case: Iterable[Case | str]) -> Comparisons: ...
 
 
 def compare(case: Case | str | Iterable[Case | str]) -> Any:
-    """What slides print beside what symdyn derives, entry by entry, with a verdict each.
+    """What slides print compared with what symdyn derives, entry by entry, with a verdict each.
 
     case   a Case of your own; the name of a case of the lecture ("pendulum-augmented"; names: symdyn.lecture.names()); a section
            or a chapter of it ("3.5", "3"), for all of its cases; or several of these

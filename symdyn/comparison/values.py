@@ -23,7 +23,7 @@ class Value:
     sides: tuple[Value, Value] | None = None
 
     def rebuilt(self) -> Value:
-        """With every expression made anew from its parts, as it comes back from another process: SymPy then multiplies
+        """With every expression made again from its parts, as it comes back from another process: SymPy then multiplies
         numbers into sums that were factored."""
         sides = None if self.sides is None else (self.sides[0].rebuilt(), self.sides[1].rebuilt())
         done: dict[Any, Any] = {}
@@ -49,7 +49,7 @@ class Value:
 
 
 def rebuilt(e: Any, done: dict[Any, Any] | None = None) -> Any:
-    """An expression made anew from its parts; done: part -> what was made of it."""
+    """An expression made again from its parts; done: part -> what was made of it."""
     if not e.args:
         return e
     done = {} if done is None else done

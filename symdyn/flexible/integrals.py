@@ -133,7 +133,7 @@ def _crossed(PP: np.ndarray) -> np.ndarray:
 
 def modes_of(M: np.ndarray, K: np.ndarray, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """omega^2 rising, rad^2/s^2, and the modes as columns with phi . M phi = 1, of K phi = omega^2 M phi; all or the first."""
-    size = np.sqrt(np.diag(M))  # scaled to a unit diagonal, so that modes of different units can stand beside each other
+    size = np.sqrt(np.diag(M))  # scaled to a unit diagonal, so that modes of different units can stand next to each other
     part = None if count is None else [0, count - 1]
     values, vectors = eigh(K / np.outer(size, size), M / np.outer(size, size), subset_by_index=part)
     return values, vectors / size[:, None]

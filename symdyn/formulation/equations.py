@@ -118,7 +118,7 @@ class Equations:
     _printed: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, and copied, by what they are derived from: the copy is derived anew on a tape of its own."""
+        """Pickled, and copied, by what they are derived from: the copy is derived again on a tape of its own."""
         if self.again is None:
             raise SymdynError(f"{self.name}: these equations were put together by hand, without what they are derived from, and "
                               "cannot be pickled or copied; pickle the description and derive them there")

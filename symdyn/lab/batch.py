@@ -1,4 +1,4 @@
-"""Many states at once beside one after the other, and beside Pinocchio: `symdyn bench batch`.
+"""Many states at once compared with one after the other, and compared with Pinocchio: `symdyn bench batch`.
 
 All figures of one line come from one run; the contestants take turns, and of each the best timing counts.
 """

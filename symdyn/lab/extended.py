@@ -33,12 +33,12 @@ def known(name: str) -> Mapping[str, Any] | None:
 
 def run(names: Sequence[str], end: float | None = None, digits: int = DIGITS, print_only: bool = False,
         file: Path | None = None) -> int:
-    """Make the ends of motions anew, print them and, unless `print_only`, store them; returns 0.
+    """Make the ends of motions again, print them and, unless `print_only`, store them; returns 0.
 
     names   of the catalogue, or variants such as "flyball_governor(rods)"
     end     s (default: the system's duration, which is the published one)
     digits  of the local errors
-    file    to store them in beside what it holds (default: the package's)
+    file    to store them in next to what it holds (default: the package's)
     """
     if end is not None and not 0 < end < math.inf:
         raise ArgumentError(f"the end is {end!r}; pass a positive time, s")

@@ -1,4 +1,4 @@
-"""Figures beside what they should be: what `symdyn bench figures` and other words print."""
+"""Figures compared with what they should be: what `symdyn bench figures` and other words print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`symdyn bench flexible`: figures of flexible bodies in whole systems, each beside what it should be."""
+"""`symdyn bench flexible`: figures of flexible bodies in whole systems, each compared with what it should be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`symdyn bench loops`: mechanisms with loops and constraints, each beside what is known of its motion, in one run."""
+"""`symdyn bench loops`: mechanisms with loops and constraints, each compared with what is known of its motion, in one run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`symdyn bench figures`: the figures of the pipeline, each beside what it should be."""
+"""`symdyn bench figures`: the figures of the pipeline, each compared with what it should be."""
 
 from __future__ import annotations
 

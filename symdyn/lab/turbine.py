@@ -1,4 +1,4 @@
-"""`symdyn bench turbine`: figures of the floating wind turbine, each beside what it should be."""
+"""`symdyn bench turbine`: figures of the floating wind turbine, each compared with what it should be."""
 
 from __future__ import annotations
 
@@ -220,7 +220,7 @@ def motion() -> Iterator[Figure]:
 
 
 def statics() -> Iterator[Figure]:
-    """Equilibria from random starts, and natural periods beside those of free decay."""
+    """Equilibria from random starts, and natural periods compared with those of free decay."""
     module = turbine(rotor="fixed").embedding().compile()
     reach = np.radians(20)
     found = module.equilibria(100, {**dict.fromkeys("xyz", 3.0), **dict.fromkeys(("psi", "theta", "phi"), reach)})

@@ -1,6 +1,6 @@
 """The lecture "Topics in ship design automation" (K.-Y. Lee, Seoul National University, 2010), formula by formula.
 
-Every module holds cases of one part of a chapter: what the slides print, typed from them, beside what symdyn derives.
+Every module holds cases of one part of a chapter: what the slides print, typed from them, compared with what symdyn derives.
 Lines are those of the transcribed notes.
 """
 

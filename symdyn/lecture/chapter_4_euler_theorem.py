@@ -46,16 +46,16 @@ def _product_of_rotations() -> list[Formula]:
     second, third = r"{}^{b_1}R_{b_2}", r"{}^{b_2}R_{b_3}"
     return [
         Formula("second factor, with superscript b", R_23.T, turn_y, line=6597, also=(6611,), latex=second, errata=[Erratum(
-            "The index 1 is missing: b, which is b_3, does not follow b_1; the matrix beside it is that of b1R_b2.", about_y,
+            "The index 1 is missing: b, which is b_3, does not follow b_1; the matrix next to it is that of b1R_b2.", about_y,
             slip=NO_INDEX)]),
         Formula("third factor, with superscript b", sp.eye(3), turn_x, line=6597, latex=third, errata=[Erratum(
-            "The index 2 is missing: from b_3 to b, which is b_3, nothing turns; the matrix beside it is that of b2R_b3.",
+            "The index 2 is missing: from b_3 to b, which is b_3, nothing turns; the matrix next to it is that of b2R_b3.",
             whole, slip=NO_INDEX)]),
         Formula("second factor, with superscript n", R_1 * R_12, turn_y, line=6631, latex=second, errata=[Erratum(
-            "The superscript is b_1, not n: R_b1 would be counted twice; the matrix beside it is that of b1R_b2.", about_y,
+            "The superscript is b_1, not n: R_b1 would be counted twice; the matrix next to it is that of b1R_b2.", about_y,
             slip=ALL_N)]),
         Formula("third factor, with superscript n", R_1 * R_12 * R_23, turn_x, line=6631, latex=third, errata=[Erratum(
-            "The superscript is b_2, not n: nR_b3 is the whole product already; the matrix beside it is that of b2R_b3.",
+            "The superscript is b_2, not n: nR_b3 is the whole product already; the matrix next to it is that of b2R_b3.",
             whole, slip=ALL_N)]),
         Formula("R of b", R_1 * R_12 * R_23, right, line=6597, also=(6611, 6631, 6653), latex=r"{}^nR_b"),
     ]
@@ -148,7 +148,7 @@ def _products() -> list[Formula]:
 def _matrix() -> list[Formula]:
     about = sd.rotation.about
     right = about(list(a), phi, unit=True)
-    still = Erratum("The matrix beside R, the name of the bracket above, is S(a); R is 1 + sin phi S + (1 - cos phi) S^2.",
+    still = Erratum("The matrix next to R, the name of the bracket above, is S(a); R is 1 + sin phi S + (1 - cos phi) S^2.",
                     proofs.limit("By the angle 0 nothing turns.", at={phi: 0}, value=sp.eye(3)))
     axes = (dict(zip(a, row)) for row in sp.eye(3).tolist())
     along_x, along_y, along_z = axes

@@ -20,7 +20,7 @@ _SHADE, _EDGE = 0.5, 0.6
 class Scene(PolyCollection):
     """Shapes at one time as polygons of the screen, in the order in which they hide each other.
 
-    Polygons are made anew whenever the axes are drawn: they follow the eye.
+    Polygons are made again whenever the axes are drawn: they follow the eye.
     """
 
     def __init__(self, solids: Solids, spatial: bool, alpha: float = 1.0) -> None:

@@ -72,7 +72,7 @@ class Saddle(Kernel):
     Values: e, M lower triangle row by row, C row by row, scales of the rows (m) and columns (n) of C, f, d.
     Columns are scaled on until all masses M_kk are equal, rows back by the largest of their columns' factors. The augmented
     Lagrangian, iterated: (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d) with a = M_kk / e^2; each round takes the
-    residual anew, so that rounding of the large matrix does not stay. A combination of rows with a singular value below e
+    residual again, so that rounding of the large matrix does not stay. A combination of rows with a singular value below e
     holds less and less: x depends smoothly on the values.
     Source: Bayo, Garcia de Jalon and Serna, A modified Lagrangian formulation for the dynamic analysis of constrained
     mechanical systems, Comput. Methods Appl. Mech. Eng. 71 (1988).

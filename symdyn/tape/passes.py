@@ -14,7 +14,7 @@ _ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
 
 
 def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
-    """Record the operation anew, with folding."""
+    """Record the operation again, with folding."""
     if op == "call":
         items = recorder.call(args[0], args[1:])
         return items[0].args[0] if isinstance(items[0], Node) else items
@@ -28,7 +28,7 @@ def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
 
 
 def substitute(entries: tuple, replacements: Mapping[Node, Any], recorder: Recorder) -> tuple:
-    """The entries with nodes replaced, everything above them recorded anew under its old name and section."""
+    """The entries with nodes replaced, everything above them recorded again under its old name and section."""
     new: dict[Node, Any] = {}
     for node in reachable(entries):
         if node in replacements:

@@ -97,7 +97,7 @@ class Recorder:
         return node
 
     def guarded(self, value: Any, margin: Any) -> Any:
-        """A guard that is recorded anew; its reason is taken over with it."""
+        """A guard that is recorded again; its reason is taken over with it."""
         if not isinstance(margin, Node) or not isinstance(value, Node):
             return value if isinstance(margin, Node) or margin > 0 else 0
         if value.op == "neg":

@@ -46,7 +46,7 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
                    to two thirds of it, but a run or a compilation that has begun is brought to its end. Other programs have
                    processes of their own then, on Linux; what they prepare counts, and is ended and told where it takes too much
                    of what is left
-    folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed anew
+    folder         where results are written, after every run; what an unfinished run left there is gone on with, and timed again
                    at the end if there is time for that, else the rows say so; rows that are not asked for stay in the file for
                    a later run
     progress       show a bar (needs tqdm)

@@ -148,7 +148,7 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
         begun: float | None = None) -> Benchmark:
     """Measure a mechanism.
 
-    folder     rows that an unfinished run left there are kept, and timed anew at the end where that is cheap; every row is
+    folder     rows that an unfinished run left there are kept, and timed again at the end where that is cheap; every row is
                written as soon as it is measured
     progress   show a bar (needs tqdm);  told: called with what is going on;  command: see Benchmark
     share      of the budget, s, where it is for several mechanisms;  begun: of time.perf_counter, when it began to count

@@ -28,7 +28,7 @@ class Carried:
     done: frozenset[Key] = frozenset()
 
     def kept(self, mark: str, asked: Iterable[Key]) -> dict[Key, Row]:
-        """The rows that a run goes on with; none if the latest one was done with all that is asked for: it is measured anew.
+        """The rows that a run goes on with; none if the latest one was done with all that is asked for: it is measured again.
 
         mark   fingerprint
         """
@@ -36,7 +36,7 @@ class Carried:
         return {} if self.done.issuperset(keys) else {key: known[key] for key in keys if key in known}
 
     def record(self, mark: str, rows: Sequence[Row]) -> dict[str, list[dict[str, Any]]]:
-        """As plain data, without what was measured anew: rows with a fingerprint."""
+        """As plain data, without what was measured again: rows with a fingerprint."""
         new = {row.key for row in rows}
         left = {m: [row.record() for key, row in known.items() if m != mark or key not in new] for m, known in self.rows.items()}
         return {m: records for m, records in left.items() if records}

@@ -50,13 +50,13 @@ def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
     failed = measured = 0
     command = _fingerprint(subjects, asked)
     done = [one for one in subjects if resume.whole(_place(folder, one, subjects) / RESULTS, command)]
-    done = done if len(done) < len(subjects) else []  # all of it was done: it begins anew
+    done = done if len(done) < len(subjects) else []  # all of it was done: it begins again
     late: list[str] = []
     for k, one in enumerate(subjects):
         share, place = None, _place(folder, one, subjects)
         earlier = finished(one, asked, place, command) if one in done else None
         if earlier is not None:
-            print(f"{earlier.table()}\n  all of it was measured in an earlier run, of {earlier.timed}; to have it measured anew "
+            print(f"{earlier.table()}\n  all of it was measured in an earlier run, of {earlier.timed}; to have it measured again "
                   f"delete {place / RESULTS}", end="\n\n", flush=True)
             measured += any(not row.message for row in earlier.rows)
             _save(earlier, place, results, pictures)

@@ -22,7 +22,7 @@ from symdyn.errors import ArgumentError, SymdynError
 _FOR_PEERS, _FOR_NEXT = 1 / 2, 1 / 2
 # A method that took longer than this for a run, s, is not asked for tighter tolerances.
 _SLOW = 2.0
-# Rows of an earlier run are timed anew beside the others if that takes no longer than this, s, and fits the budget.
+# Rows of an earlier run are timed again with the others if that takes no longer than this, s, and fits the budget.
 _AGAIN = 120.0
 
 

@@ -43,7 +43,7 @@ def fingerprint(*parts: Any) -> str:
 def code() -> str:
     """Changes with every file that shapes the code that runs, of whatever method, or how it is measured."""
     package = Path(symdyn.__file__).parent
-    # In a checkout the templates lie beside the package, in an installation inside it.
+    # In a checkout the templates lie next to the package, in an installation inside it.
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
     return digest({path.relative_to(folder).as_posix(): path for folder in folders
                    for ending in ("*.py", "*.jinja", "*.toml", "*.h", "*.c") for path in folder.rglob(ending)

@@ -1,6 +1,6 @@
 """References that were made before: those of the package, made by a command, and those of this user, in the cache folder.
 
-`symdyn bench references NAME ...` makes references for the package anew.
+`symdyn bench references NAME ...` makes references for the package again.
 """
 
 from __future__ import annotations
@@ -102,10 +102,10 @@ def _cached(formulation: Formulation, times: Sequence[float]) -> Path:
 
 
 def run(names: Sequence[str] = (), digits: int | None = None, file: Path | None = None) -> int:
-    """Make references anew and store them; returns how many could not be made.
+    """Make references again and store them; returns how many could not be made.
 
     names   of the list of `symdyn bench --all` (default: all); digits: of the local errors (default: as many as usual)
-    file    to store them in beside what it holds (default: the package's)
+    file    to store them in next to what it holds (default: the package's)
     """
     from symdyn.bench.work.cases import CASES, subject
     from symdyn.bench.work.converged import DIGITS, converged

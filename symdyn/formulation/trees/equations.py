@@ -63,7 +63,7 @@ def _point_units(model: Model) -> dict[str, str]:
 
 
 def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], again: Callable[[], E], **more: Any) -> E:
-    """The equations that hold the quantities of a tree; again: derives them anew."""
+    """The equations that hold the quantities of a tree; again: derives them again."""
     model, tree, algebra = quantities.model, quantities.tree, quantities.algebra
     symbols = Symbols(model.coordinates, model.speeds, tuple(z.symbol for z in model.states), model.inputs,
                       model.parameters, model.defaults, model.initial, model.units, model.duration, _reach(model),

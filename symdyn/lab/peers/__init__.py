@@ -1,4 +1,4 @@
-"""symdyn beside its peers on the same mechanisms, in one run: `symdyn bench peers`.
+"""symdyn compared with its peers on the same mechanisms, in one run: `symdyn bench peers`.
 
     models        the mechanisms, with the bounds that symdyn is held to
     description   a mechanism as plain text that the peers read

@@ -1,4 +1,4 @@
-"""Operations of the inverse dynamics of a six-joint arm with spherical wrist and dense inertias, beside published ones."""
+"""Operations of the inverse dynamics of a six-joint arm with spherical wrist and dense inertias, compared with published ones."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class CasadiPeer:
         self.compiler = c_compiler()
         libraries = [root for root in (folder, *[p / "lib" for p in folder.parents[:4]]) if (root / "libcasadi.so").exists()]
         if not libraries:
-            raise SymdynError(f"the library libcasadi.so was not found beside the package {folder}; install symdyn[peers]")
+            raise SymdynError(f"the library libcasadi.so was not found next to the package {folder}; install symdyn[peers]")
         import casadi
 
         self.casadi = casadi

@@ -53,7 +53,7 @@ class LoopRow:
 
     @property
     def ratio(self) -> float | None:
-        """Accelerations and multipliers, symdyn's time over that of the fastest generated code beside it."""
+        """Accelerations and multipliers, symdyn's time over that of the fastest generated code compared with it."""
         rivals = [self.times[name] for name in map(self.fastest, ("casadi", "kane")) if name is not None]
         return self.times["symdyn with multipliers"] / min(rivals) if rivals else None
 

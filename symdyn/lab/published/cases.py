@@ -158,7 +158,7 @@ def _precise() -> Mapping[str, Any]:
     """The stored end of Andrews' motion. Raises SymdynError where it is not there."""
     precise = known("andrews_squeezer")
     if precise is None:
-        raise SymdynError("the motion of andrews_squeezer with more digits is not there; install symdyn anew")
+        raise SymdynError("the motion of andrews_squeezer with more digits is not there; install symdyn again")
     return precise
 
 

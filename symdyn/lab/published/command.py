@@ -107,7 +107,7 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
 
     peers      default: all;  deadline: of time.perf_counter, after which nothing new is tried
     told       called with what is going on
-    before     the record of a run that was stopped: the tolerances that it found are timed anew, not looked for
+    before     the record of a run that was stopped: the tolerances that it found are timed again, not looked for
     store      called with what is known after every line;  progress: show a bar (needs tqdm)
     Raises SymdynError where there is no reference.
     """
@@ -182,7 +182,7 @@ def run(names: Sequence[str] | None = None, peers: Sequence[str] | None = None, 
     stored = _stored(folder / RESULTS)
     known = {name: r for name, r in stored.items() if name in marks and _sound(r) and r["fingerprint"] == marks[name]}
     if all(name in known and not known[name]["unfinished"] for name in marks):
-        known = {}  # all of it was done: it is measured anew
+        known = {}  # all of it was done: it is measured again
     about = {"machine": platform.machine(), "compiler": compiler.version, "repeats": repeats}
 
     def store(result: Result | None = None) -> None:

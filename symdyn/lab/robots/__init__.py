@@ -1,4 +1,4 @@
-"""`symdyn bench robots`: robots from files beside Pinocchio.
+"""`symdyn bench robots`: robots from files compared with Pinocchio.
 
     collection        the robots of the package example-robot-data
     pinocchio_robot   one of them in Pinocchio, its quantities in symdyn's order

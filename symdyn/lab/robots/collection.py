@@ -76,7 +76,7 @@ def folder() -> Path:
 
 
 def _folders() -> Iterator[Path]:
-    """The package has no module of its own: its files are in a prefix beside the modules, or in that of the system."""
+    """The package has no module of its own: its files are in a prefix next to the modules, or in that of the system."""
     for root in (*map(Path, sys.path), Path(sys.prefix)):
         for prefix in (root / "cmeel.prefix", root):
             if (prefix / _SHARED).is_dir():

@@ -33,7 +33,7 @@ LONGEST = 100
 def build(source: str, stem: str, compiler: Compiler) -> Path:
     """Path of the shared library of this C source, compiled only if it is not there yet, whole to the last bit.
 
-    Raises CompileError with the command and the compiler's own output, the source is kept beside it; CacheError where the cache
+    Raises CompileError with the command and the compiler's own output, the source is kept next to it; CacheError where the cache
     folder does not take the library.
     """
     target = _target(source, stem, compiler)

@@ -97,7 +97,7 @@ class _Memory:
 def _state_of_symdyn() -> str:
     """Changes whenever a file that shapes generated code may have changed."""
     package = Path(symdyn.__file__).parent
-    # In a checkout the templates lie beside the package, in an installation inside it.
+    # In a checkout the templates lie next to the package, in an installation inside it.
     folders = [package] if (package / "templates").is_dir() else [package, package.parent / "templates"]
     endings = ("*.py", "*.jinja", "*.toml", "*.h", "*.c")
     files = sorted(p for folder in folders for ending in endings for p in folder.rglob(ending))

@@ -1,4 +1,4 @@
-"""Other programs beside symdyn in the same run, one small module each; see `peer` for what each gives.
+"""Other programs compared with symdyn in the same run, one small module each; see `peer` for what each gives.
 
 A module here gives PEERS, a tuple of peers: one program may run with several integrators.
 """

@@ -67,7 +67,7 @@ def family(adams: bool) -> str:
 
 
 def runner(ca: Any, problem: Mapping[str, Any], x0: np.ndarray, end: float, adams: bool) -> Runner:
-    """Runs the integrator, which CasADi makes anew for each tolerance, outside the timing."""
+    """Runs the integrator, which CasADi makes again for each tolerance, outside the timing."""
     compiler = c_compiler()
     options = {"linear_multistep_method": family(adams).lower(),
                "nonlinear_solver_iteration": "functional" if adams else "newton",

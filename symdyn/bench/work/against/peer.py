@@ -1,4 +1,4 @@
-"""What another program is asked for when it runs beside symdyn: the same motion, at its own fair best."""
+"""What another program is asked for when it runs compared with symdyn: the same motion, at its own fair best."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def _options() -> list[str]:
     roots = (folder, *[p / "lib" for p in folder.parents[:4]])
     library = next((root for root in roots if (root / "libcasadi.so").exists()), None)
     if library is None:
-        raise SymdynError(f"the library libcasadi.so was not found beside the package {folder}; install symdyn[peers]")
+        raise SymdynError(f"the library libcasadi.so was not found next to the package {folder}; install symdyn[peers]")
     return ["-O0", *include_flags("pinocchio", "boost", "eigen", "casadi"), "-Wl,--no-as-needed", f"-L{library}", "-lcasadi",
             f"-Wl,-rpath,{library}"]
 

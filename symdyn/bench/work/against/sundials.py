@@ -118,7 +118,7 @@ def _libraries() -> dict[str, Path]:
     found = {part: path for part in _PARTS for place in places for path in sorted(place.glob(f"libsundials_{part}[-.]*"))[:1]}
     missing = [part for part in _PARTS if part not in found]
     if missing:
-        raise Unfit(f"the libraries libsundials_{missing[0]} and so on were not found beside scikit-sundae; take its wheel: "
+        raise Unfit(f"the libraries libsundials_{missing[0]} and so on were not found next to scikit-sundae; take its wheel: "
                     "pip install scikit-sundae")
     return found
 
