@@ -6,9 +6,8 @@
 #include "simulate.h"
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void);
-SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
-    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out,
-    symdyn_report *reports);
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
+    const double *const *real, double *const *out, symdyn_report *reports);
 SYMDYN_EXPORT long SYMDYN_NAME(batch_go)(void *memory, long max_steps);
 
 // Zeros until batch_start.
@@ -141,9 +140,8 @@ SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_ba
 // given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP); counts: trajectories, output times; real: span (t0,
 // t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), states of the
 // reports (2 SYMDYN_NX each); reports: one each. All have to stay.
-SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(
-    void *memory, const symdyn_table *given, const long *counts, const double *const *real, double *const *out,
-    symdyn_report *reports) {
+SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
+    const double *const *real, double *const *out, symdyn_report *reports) {
     symdyn_batch *const batch = memory;
     for (int k = 0; k < 3; k++) batch->given[k] = given[k];
     batch->n = counts[0];

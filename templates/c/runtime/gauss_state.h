@@ -7,6 +7,6 @@ typedef struct {
     double t_first, h_whole;                    // where the constant steps began, their length
     long n_whole, n_given_up, fixed;            // how many of them were begun, were given up; whether their length was asked for
     double from, ratio, E[SYMDYN_STAGES][SYMDYN_STAGES];  // what the latest extrapolation of slopes was for, its matrix
-    long n_halved, n_rough;  // steps that were done again by halves; whose ends differ
-    double t_rough;          // the latest of these, or of those given up
+    long n_halved, n_rough;                               // steps that were done again by halves; whose ends differ
+    double t_rough;                                       // the latest of these, or of those given up
 } symdyn_method;
