@@ -20,8 +20,8 @@ from symdyn.backend.source import _shipped, template_folders
 from symdyn.runtime.building.compiler import find_compiler, require_compiler
 from symdyn.runtime.integrating.compiled import Problem
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from tests.backend.c_warnings import RUNTIME, faults_of
 
-RUNTIME = Path(__file__).parents[2] / "templates" / "c" / "runtime"
 STRICT = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-const-variable",
           "-Werror", "-fPIC", "-shared")
 SIGNATURE = "(const symdyn_problem *problem, double t, const double *x, double *out)"
@@ -35,13 +35,14 @@ Build = Callable[..., ctypes.CDLL]
 
 @pytest.fixture
 def build(tmp_path: Path) -> Build:
-    """build(text): the library of a text that includes parts."""
+    """build(text): the library of a text that includes parts, in which no tool that is here finds a fault."""
     def library(text: str, *options: str) -> ctypes.CDLL:
         (tmp_path / "main.c").write_text(text)
         made = tmp_path / "main.so"
         done = subprocess.run([*require_compiler().command, *STRICT, *options, f"-I{RUNTIME}", f"-I{tmp_path}", "-o", made,
                                tmp_path / "main.c", "-lm"], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+        assert faults_of(tmp_path / "main.c", *options, f"-I{RUNTIME}", f"-I{tmp_path}") == ""
         return ctypes.CDLL(str(made))
 
     return library
@@ -207,6 +208,7 @@ def test_a_reset_on_a_circle_takes_the_other_speed_along(build: Build, tmp_path:
 
 def test_an_input_by_pieces(build: Build, tmp_path: Path) -> None:
     text = ('#define SYMDYN_HAS_INPUTS 1\n#define SYMDYN_NIN 1\n#include "problem.h"\n'
+            "int at(const symdyn_problem *p, double t, double *out);\n"
             "int at(const symdyn_problem *p, double t, double *out) { return symdyn_inputs_at(p, t, out, out); }\n")
     library = build(text)
     breaks, pieces = np.array([0.0, 1.0, 3.0]), np.array([[1.0, 2.0, 0.5, 0.25], [3.75, 0.0, 1.0, 0.0]])
@@ -221,7 +223,8 @@ def test_an_input_by_pieces(build: Build, tmp_path: Path) -> None:
 
 
 def test_sines_and_cosines(build: Build) -> None:
-    library = build('#include "sincos.h"\nvoid at(int n, const double *a, double *s, double *c) { symdyn_sincos(n, a, s, c); }\n')
+    library = build('#include "sincos.h"\nvoid at(int n, const double *a, double *s, double *c);\n'
+                    'void at(int n, const double *a, double *s, double *c) { symdyn_sincos(n, a, s, c); }\n')
     angles = np.concatenate([np.linspace(-20, 20, 997), [0.0, 1e5, 1e9, np.pi, 1e-300]])
     sines, cosines = np.zeros(len(angles)), np.zeros(len(angles))
     library.at(len(angles), pointer(angles), pointer(sines), pointer(cosines))
@@ -230,6 +233,10 @@ def test_sines_and_cosines(build: Build) -> None:
 
 
 SOLVERS = """#define SYMDYN_LINKED
+int symdyn_saddle(int n, int m, const double *in, double *x);
+int symdyn_multipliers(int n, int m, const double *in, double *lam);
+int symdyn_cube(int order, const double *in, double *out);
+int symdyn_catenary(int seabed, const double *in, double *out);
 #define SYMDYN_LOOSE 1e-14
 #define SYMDYN_MASSLESS 1e-14
 #define SYMDYN_SMOOTHED 1e-4

@@ -1338,7 +1338,10 @@ SYMDYN_EXPORT int four_bar_rhs_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_rhs(frame->x + i * frame->x_stride * 6, frame->x + i * frame->x_stride * 6 + 3, frame->p, frame->c, frame->out + i * 6);
         if (!code && !symdyn_all_finite(frame->out + i * 6, 6)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -1348,7 +1351,10 @@ SYMDYN_EXPORT int four_bar_C_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_C(frame->x + i * frame->x_stride * 6, frame->p, frame->out + i * 2);
         if (!code && !symdyn_all_finite(frame->out + i * 2, 2)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -1358,7 +1364,10 @@ SYMDYN_EXPORT int four_bar_C_r_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_C_r(frame->x + i * frame->x_stride * 6, frame->p, frame->out + i * 6);
         if (!code && !symdyn_all_finite(frame->out + i * 6, 6)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -1368,7 +1377,10 @@ SYMDYN_EXPORT int four_bar_F_d_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_F_d(frame->x + i * frame->x_stride * 6, frame->x + i * frame->x_stride * 6 + 3, frame->p, frame->out + i * 2);
         if (!code && !symdyn_all_finite(frame->out + i * 2, 2)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -1378,7 +1390,10 @@ SYMDYN_EXPORT int four_bar_lam_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_lam(frame->x + i * frame->x_stride * 6, frame->x + i * frame->x_stride * 6 + 3, frame->p, frame->c, frame->out + i * 2);
         if (!code && !symdyn_all_finite(frame->out + i * 2, 2)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -1388,7 +1403,10 @@ SYMDYN_EXPORT int four_bar_reactions_rows(four_bar_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = four_bar_reactions(frame->x + i * frame->x_stride * 6, frame->x + i * frame->x_stride * 6 + 3, frame->p, frame->c, frame->out + i * 24);
         if (!code && !symdyn_all_finite(frame->out + i * 24, 24)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }

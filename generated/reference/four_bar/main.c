@@ -8,7 +8,7 @@
 
 // Whether the largest difference, relative to the largest entry of the reference, is above the tolerance.
 static int check(const char *name, int code, const double *found, const double *wanted, int n, double tolerance) {
-    double largest = 0.0, error = code ? INFINITY : 0.0;
+    double largest = 0.0, error = code ? HUGE_VAL : 0.0;
     for (int i = 0; i < n; i++) largest = fmax(largest, fabs(wanted[i]));
     for (int i = 0; i < n && !code; i++)
         if (!(fabs(found[i] - wanted[i]) <= error)) error = fabs(found[i] - wanted[i]);
@@ -25,7 +25,10 @@ int main(void) {
     {
         const double p[] = { 9.81, 1.0, 0.4, 0.053333333333333344, 2.0, 1.0, 0.6666666666666666, 1.5, 0.8, 0.32000000000000006, 0.8, 2.0, 2.0, 1.6 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.008376, -0.533831, -0.538267 };
         const double u[] = { -0.562438, -0.080793, -0.420437 };
         {
@@ -68,7 +71,10 @@ int main(void) {
     {
         const double p[] = { 9.814162, 1.124693, 0.361177, 0.065353, 2.411285, 0.813765, 0.540967, 1.565453, 0.978094, 0.310893, 0.717976, 1.979905, 1.626137, 1.439618 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.628187, 0.985087, 0.719893 };
         const double u[] = { -0.75822, -0.33461, 0.442969 };
         {
@@ -111,7 +117,10 @@ int main(void) {
     {
         const double p[] = { 11.512193, 1.101638, 0.374606, 0.056769, 2.394231, 1.180789, 0.684918, 1.597577, 0.652429, 0.290955, 0.927066, 1.972883, 1.755707, 1.675135 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.348972, -0.250594, -0.122077 };
         const double u[] = { 0.016853, 0.556885, 0.041877 };
         {
@@ -136,7 +145,10 @@ int main(void) {
     {
         const double p[] = { 8.039975, 1.116522, 0.496974, 0.056903, 1.95424, 0.876657, 0.684005, 1.862902, 0.917388, 0.333705, 0.949704, 1.808959, 2.062394, 1.965777 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.081737, -0.461441, 0.095993 };
         const double u[] = { 0.914233, -0.988582, 0.56731 };
         {
@@ -161,7 +173,10 @@ int main(void) {
     {
         const double p[] = { 11.419948, 1.033405, 0.421044, 0.052893, 1.650511, 1.191505, 0.704333, 1.334892, 0.821699, 0.325829, 0.768444, 1.91147, 2.084631, 1.728912 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.083706, -0.94405, -0.54079 };
         const double u[] = { -0.645577, 0.168922, 0.722018 };
         {
@@ -186,7 +201,10 @@ int main(void) {
     {
         const double p[] = { 8.974996, 1.178785, 0.44116, 0.044664, 1.615022, 0.806552, 0.760009, 1.368452, 0.679416, 0.345972, 0.763992, 1.662564, 1.743663, 1.659714 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.454171, 0.42318, -0.090597 };
         const double u[] = { -0.355996, -0.052458, -0.952731 };
         {
@@ -211,7 +229,10 @@ int main(void) {
     {
         const double p[] = { 8.328128, 1.204918, 0.411821, 0.047685, 2.145084, 1.167668, 0.539579, 1.212059, 0.692726, 0.359512, 0.697682, 2.234145, 2.210358, 1.672186 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.951189, 0.595622, 0.033199 };
         const double u[] = { -0.553608, 0.297013, -0.210204 };
         {
@@ -236,7 +257,10 @@ int main(void) {
     {
         const double p[] = { 8.107507, 0.934373, 0.494223, 0.063679, 1.875748, 1.186331, 0.626442, 1.83402, 0.907783, 0.315929, 0.730849, 1.607632, 2.390846, 1.3073 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.924402, 0.140561, -0.656966 };
         const double u[] = { 0.735562, 0.94755, 0.408046 };
         {
@@ -261,7 +285,10 @@ int main(void) {
     {
         const double p[] = { 8.756335, 1.103369, 0.397931, 0.047326, 1.693982, 1.099681, 0.622155, 1.537365, 0.757124, 0.381513, 0.963884, 1.616284, 1.780768, 1.515973 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.565401, -0.321809, -0.57394 };
         const double u[] = { 0.34891, 0.675402, 0.864375 };
         {
@@ -286,7 +313,10 @@ int main(void) {
     {
         const double p[] = { 9.98682, 1.243479, 0.362235, 0.060078, 1.676212, 0.876362, 0.80663, 1.343754, 0.913282, 0.34243, 0.942808, 1.931297, 1.906257, 1.489675 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.207965, 0.908615, 0.77453 };
         const double u[] = { -0.729308, 0.102341, -0.79145 };
         {
@@ -311,7 +341,10 @@ int main(void) {
     {
         const double p[] = { 11.32714, 1.172828, 0.381362, 0.057431, 2.303713, 0.970118, 0.704568, 1.351007, 0.669428, 0.294408, 0.960677, 2.108002, 2.43256, 1.609594 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.574029, 0.655536, -0.975237 };
         const double u[] = { 0.340823, -0.816634, -0.769795 };
         {
@@ -336,7 +369,10 @@ int main(void) {
     {
         const double p[] = { 12.210226, 0.989456, 0.3408, 0.046684, 1.817278, 1.134803, 0.564184, 1.814766, 0.77618, 0.395718, 0.96732, 1.864621, 1.828069, 1.623447 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.3041, -0.92076, -0.978988 };
         const double u[] = { 0.965167, -0.4089, 0.193141 };
         {
@@ -361,7 +397,10 @@ int main(void) {
     {
         const double p[] = { 11.880169, 1.236416, 0.494563, 0.045339, 1.793674, 1.078013, 0.827319, 1.566466, 0.887748, 0.351304, 0.733271, 2.087442, 1.876589, 1.457394 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.438427, 0.966753, -0.104196 };
         const double u[] = { 0.304021, 0.286932, 0.881469 };
         {
@@ -386,7 +425,10 @@ int main(void) {
     {
         const double p[] = { 9.246227, 1.181211, 0.48083, 0.049934, 1.9009, 1.044901, 0.707029, 1.602275, 0.728235, 0.258934, 0.727753, 1.665095, 2.096084, 1.33106 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.270764, -0.418357, 0.58437 };
         const double u[] = { -0.013478, 0.725298, -0.691641 };
         {
@@ -411,7 +453,10 @@ int main(void) {
     {
         const double p[] = { 12.038367, 0.877959, 0.459718, 0.066304, 2.339395, 0.943903, 0.565397, 1.547192, 0.970968, 0.298262, 0.961753, 1.727513, 2.419434, 1.302867 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.806177, 0.607713, 0.814308 };
         const double u[] = { 0.681437, 0.49237, 0.37919 };
         {
@@ -436,7 +481,10 @@ int main(void) {
     {
         const double p[] = { 11.003593, 1.1005, 0.365466, 0.044213, 2.467047, 1.163714, 0.698114, 1.56543, 0.946465, 0.321277, 0.782456, 1.904802, 1.832172, 1.297574 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { -0.166632, 0.141207, -0.875357 };
         const double u[] = { -0.290113, -0.723432, -0.749742 };
         {
@@ -461,7 +509,10 @@ int main(void) {
     {
         const double p[] = { 9.618577, 1.0756, 0.362035, 0.042846, 2.075832, 1.025405, 0.727985, 1.495864, 0.887145, 0.361325, 0.725815, 2.045565, 2.030944, 1.442045 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 0.120815, 0.813879, 0.835413 };
         const double u[] = { -0.449549, 0.29283, -0.903605 };
         {
@@ -486,7 +537,10 @@ int main(void) {
     {
         const double p[] = { 9.81, 1.0, 0.4, 0.053333333333333344, 2.0, 1.0, 0.6666666666666666, 1.5, 0.8, 0.32000000000000006, 0.8, 2.0, 2.0, 1.6 };
         int code = four_bar_prologue(p, c);
-        if (code) return printf("prologue: %s\n", four_bar_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", four_bar_reason(code));
+            return 1;
+        }
         const double q[] = { 76.62460479074576, -0.00019939005023796746, -0.008224923277109563 };
         const double u[] = { -0.0006638302270933178, -0.00043377443092171454, 0.00015608466193168169 };
         {

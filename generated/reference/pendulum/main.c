@@ -8,7 +8,7 @@
 
 // Whether the largest difference, relative to the largest entry of the reference, is above the tolerance.
 static int check(const char *name, int code, const double *found, const double *wanted, int n, double tolerance) {
-    double largest = 0.0, error = code ? INFINITY : 0.0;
+    double largest = 0.0, error = code ? HUGE_VAL : 0.0;
     for (int i = 0; i < n; i++) largest = fmax(largest, fabs(wanted[i]));
     for (int i = 0; i < n && !code; i++)
         if (!(fabs(found[i] - wanted[i]) <= error)) error = fabs(found[i] - wanted[i]);
@@ -25,7 +25,10 @@ int main(void) {
     {
         const double p[] = { 9.81, 1.0, 1.0 };
         int code = pendulum_prologue(p, c);
-        if (code) return printf("prologue: %s\n", pendulum_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", pendulum_reason(code));
+            return 1;
+        }
         const double q[] = { 0.577447 };
         const double u[] = { -0.812281 };
         const double ud[] = { -0.943305 };
@@ -75,7 +78,10 @@ int main(void) {
     {
         const double p[] = { 8.974002, 1.022946, 1.002271 };
         int code = pendulum_prologue(p, c);
-        if (code) return printf("prologue: %s\n", pendulum_reason(code)), 1;
+        if (code) {
+            printf("prologue: %s\n", pendulum_reason(code));
+            return 1;
+        }
         const double q[] = { -0.134466 };
         const double u[] = { 0.52456 };
         const double ud[] = { -0.995788 };

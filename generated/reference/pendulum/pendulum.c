@@ -295,7 +295,10 @@ SYMDYN_EXPORT int pendulum_rhs_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_rhs(frame->x + i * frame->x_stride * 2, frame->x + i * frame->x_stride * 2 + 1, frame->p, frame->c, frame->out + i * 2);
         if (!code && !symdyn_all_finite(frame->out + i * 2, 2)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -305,7 +308,10 @@ SYMDYN_EXPORT int pendulum_mass_matrix_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_mass_matrix(frame->c, frame->out + i * 1);
         if (!code && !symdyn_all_finite(frame->out + i * 1, 1)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -315,7 +321,10 @@ SYMDYN_EXPORT int pendulum_k_tilde_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_k_tilde(frame->out + i * 1);
         if (!code && !symdyn_all_finite(frame->out + i * 1, 1)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -325,7 +334,10 @@ SYMDYN_EXPORT int pendulum_F_tilde_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_F_tilde(frame->x + i * frame->x_stride * 2, frame->p, frame->c, frame->out + i * 1);
         if (!code && !symdyn_all_finite(frame->out + i * 1, 1)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -335,7 +347,10 @@ SYMDYN_EXPORT int pendulum_J_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_J(frame->x + i * frame->x_stride * 2, frame->p, frame->out + i * 3);
         if (!code && !symdyn_all_finite(frame->out + i * 3, 3)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -345,7 +360,10 @@ SYMDYN_EXPORT int pendulum_energy_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_energy(frame->x + i * frame->x_stride * 2, frame->x + i * frame->x_stride * 2 + 1, frame->p, frame->c, frame->out + i * 2);
         if (!code && !symdyn_all_finite(frame->out + i * 2, 2)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }
@@ -355,7 +373,10 @@ SYMDYN_EXPORT int pendulum_inverse_dynamics_rows(pendulum_frame *frame) {
     for (long i = 0; i < frame->n; i++) {
         int code = pendulum_inverse_dynamics(frame->x + i * frame->x_stride * 2, frame->ud + i * frame->ud_stride * 1, frame->p, frame->c, frame->out + i * 1);
         if (!code && !symdyn_all_finite(frame->out + i * 1, 1)) code = SYMDYN_NOT_FINITE;
-        if (code) return frame->failed = i, code;
+        if (code) {
+            frame->failed = i;
+            return code;
+        }
     }
     return 0;
 }

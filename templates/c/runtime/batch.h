@@ -36,7 +36,7 @@ SYMDYN_EXPORT long SYMDYN_NAME(rhs_batch)(long n, const symdyn_table *given, dou
     long n_failed = 0;
     for (long first = 0; first < n; first += SYMDYN_WIDTH) {
         const int contiguous = x.row == 1 && out_steps[0] == 1 && first + SYMDYN_WIDTH <= n;
-        symdyn_vector times, xd[SYMDYN_NX], rest = VECTOR(0.0);  // not a number where a result is not finite
+        symdyn_vector times = VECTOR(0.0), xd[SYMDYN_NX], rest = VECTOR(0.0);  // not a number where a result is not finite
         long long any = 0;
         for (int l = 0; l < SYMDYN_WIDTH; l++) {
             const long i = first + l < n ? first + l : n - 1;

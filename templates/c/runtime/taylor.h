@@ -116,7 +116,8 @@ static int symdyn_begin(symdyn_run *run) {
     double tolerance = run->atol[0];
     for (int i = 0; i < SYMDYN_NX; i++) tolerance = fmin(tolerance, run->atol[i]);
     tolerance = fmax(fmax(tolerance, run->rtol), 1e-18);
-    run->method.order = (int)fmin(fmax(ceil(4.0 - 0.55 * log(tolerance)), 6.0), SYMDYN_ORDERS);
+    const double wanted = fmin(fmax(ceil(4.0 - 0.55 * log(tolerance)), 6.0), SYMDYN_ORDERS);
+    run->method.order = (int)wanted;
     run->method.h_before = run->method.unit = 0.0;
     run->method.ready = 0;
     run->reason = symdyn_constants(run->problem.p, run->method.constants);
