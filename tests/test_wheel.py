@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,6 +66,37 @@ def test_wheel_holds_templates_and_code_only(wheel: Path) -> None:
     code = {str(p.relative_to(ROOT)) for p in (ROOT / "symdyn").rglob("*.py")}
     assert code <= names
     assert all(name.startswith(("symdyn/", "symdyn-")) for name in names) and not any("__pycache__" in n for n in names)
+
+
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder in an sdist of this checkout."""
+    folder = tmp_path_factory.mktemp("sdist")
+    isolation = [] if importlib.util.find_spec("hatchling") is None else ["--no-isolation"]
+    run(sys.executable, "-m", "build", "--sdist", *isolation, "-o", folder, ROOT, cwd=folder)
+    (path,) = folder.glob("symdyn-*.tar.gz")
+    with tarfile.open(path) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / path.name.removesuffix(".tar.gz")
+
+
+def test_sdist_holds_what_both_commands_of_the_readme_need(unpacked: Path) -> None:
+    kept = ("symdyn", "templates", "tests", "docs", "notebooks", "generated/reference")
+    wanted = {str(p.relative_to(ROOT)) for folder in kept for p in (ROOT / folder).rglob("*")
+              if p.suffix in (".py", ".md", ".c", ".h", ".jinja", ".json", ".csv", ".toml", ".ipynb") and ".ipynb_" not in str(p)}
+    there = {str(p.relative_to(unpacked)) for p in unpacked.rglob("*") if p.is_file()}
+    assert wanted | {"README.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", ".clang-format"} <= there
+    assert not [name for name in there if name.startswith("generated/") and not name.startswith("generated/reference/")]
+    assert not [name for name in there if "__pycache__" in name or name.startswith((".venv", ".git/"))]
+
+
+def test_commands_of_the_readme_in_an_unpacked_sdist(unpacked: Path) -> None:
+    """As an editable installation runs them; of the tests those that need files beside the package."""
+    printed = run(sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(unpacked)!r}); "
+                  "from symdyn.cli import main; sys.exit(main(['demo']))", cwd=unpacked)
+    assert "energy" in printed
+    printed = run(sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests/backend/test_golden.py", cwd=unpacked)
+    assert "100%" in printed
 
 
 def required(path: Path) -> dict[str, importlib.metadata.Distribution]:
