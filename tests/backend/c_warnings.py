@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -41,6 +42,8 @@ def faults_of(source: Path, *options: str, tidy: bool = True) -> str:
     analyzer = shutil.which("clang-tidy") if tidy else None
     if analyzer:
         reports.append([analyzer, "--quiet", f"--checks={CHECKS}", "--header-filter=.*", str(source), "--", *LANGUAGE, *options])
-    outputs = [subprocess.run(command, capture_output=True, text=True) for command in reports]
+    # A sanitizer that this process was started with is not for the tools.
+    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"}
+    outputs = [subprocess.run(command, capture_output=True, text=True, env=environment) for command in reports]
     return "\n".join(line for done in outputs for line in (done.stdout + done.stderr).splitlines()
                      if done.returncode or ": warning: " in line or ": error: " in line)

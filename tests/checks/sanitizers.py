@@ -53,7 +53,8 @@ def test_a_fault_ends_the_program(compiler: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "method"), [
-    ("double_pendulum", "dop853"), ("four_bar", "dop853"), ("four_bar", "radau"), ("four_bar", "gauss"), ("double_pendulum", "taylor")])
+    ("double_pendulum", "dop853"), ("double_pendulum", "taylor"), ("four_bar", "dop853"), ("four_bar", "radau"),
+    ("four_bar", "gauss")])
 def test_written_mechanisms(name: str, method: str, compiler: str, tmp_path: Path) -> None:
     """Trajectories keep every bit, self-tests agree, and no sanitizer finds anything."""
     mechanism = written(name, tmp_path, method)
@@ -70,7 +71,7 @@ def test_parts_of_the_runtime(compiler: str) -> None:
     """All of tests/backend/test_runtime_in_c.py in a process that has the sanitizer's library loaded."""
     library, shared = COMPILERS[compiler]
     path = output(compiler, f"-print-file-name={library}").strip()
-    if not os.path.isabs(path):
+    if not Path(path).is_absolute():
         pytest.skip(f"no {library}")
     environment = {**os.environ, "LD_PRELOAD": path, "ASAN_OPTIONS": "detect_leaks=0",
                    "SYMDYN_CC": " ".join([compiler, *SANITIZED, *shared])}
