@@ -27,6 +27,7 @@ ALLOWED_CHECKS = {
     "bugprone-assignment-in-selection-statement": "the same, where a second call follows the first with ||",
     "bugprone-signed-bitwise": "comparisons are 0 or 1, and & and | join them without a branch",
     "bugprone-implicit-widening-of-multiplication-result": "products of two sizes of a mechanism are far below the limit of int",
+    "bugprone-sizeof-expression": "a block of lanes may be one number: its size over that of a number is then 1, as it should be",
     "bugprone-suspicious-include": "runtime.c is the list of parts, and one translation unit includes it",
     "bugprone-macro-parentheses": "rows of tableaus are sums, put between parentheses where they are used",
 }

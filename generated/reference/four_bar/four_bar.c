@@ -1595,7 +1595,7 @@ static int symdyn_eval(symdyn_run *run, double t, const double *y, double *xd) {
     for (int i = 0; i < SYMDYN_NX; i++)  // comparisons with NaN are false
         bad |= !(fabs(y[i]) <= symdyn_huge) | !(fabs(xd[i]) <= symdyn_huge);
     if (!reason && !bad) return 0;
-    while (!reason && fabs(y[first]) <= symdyn_huge && fabs(xd[first]) <= symdyn_huge) first++;
+    while (!reason && first < SYMDYN_NX - 1 && fabs(y[first]) <= symdyn_huge && fabs(xd[first]) <= symdyn_huge) first++;
     return symdyn_fail(run, reason ? SYMDYN_FIELD_FAILED : SYMDYN_STATE_NOT_FINITE, reason, reason ? -1 : first, t, y);
 }
 
