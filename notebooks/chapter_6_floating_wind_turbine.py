@@ -196,8 +196,8 @@ system.add_joint(sd.Fixed("tank", "platform", tank, parent_point=[x_b, 0, z_b]))
 system.defaults |= {m_b: 0.0, x_b: 0.0, z_b: -2.0}
 system.draw(tank, sd.shapes.Box((4, 4, 2)))
 floating = system.embedding().compile()
-print(", ".join(floating.metadata["q"]))
-print("inputs:", ", ".join(floating.metadata["inputs"]))
+print(", ".join(floating.metadata.q))
+print("inputs:", ", ".join(floating.metadata.inputs))
 masses = {body.name: float(body.mass.subs(system.defaults)) for body in system.check().bodies}
 print(", ".join(f"{name} {mass / 1000:.1f} t" for name, mass in masses.items()))
 print(f"together {sum(masses.values()) / 1000:.1f} t")
@@ -339,7 +339,7 @@ print(modes)
 # behind, and the period is a little shorter than above.
 
 # %%
-names = floating.metadata["q"]
+names = floating.metadata.q
 print(f"{'mode':8}{'linear':>12}{'free decay':>14}{'difference':>13}")
 for mode in floating.linearize(rest.x).modes():
     column = int(np.argmax(mode.shares))
@@ -406,7 +406,7 @@ def ramp(begin, end, value):
     return np.array([0.0, begin, end, 1e4]), np.array([0.0, 0.0, value, value])
 
 
-speed = floating.metadata["x"].index("azimuth_dot")
+speed = floating.metadata.x.index("azimuth_dot")
 startup = {"v_w": ramp(1, 30, 8.0), "tau_a": lambda t, x: 2e6 * min(t / 30, 1.0) * (2 - x[speed] / RATED),
            "tau_g": lambda t, x: 2e6 * x[speed] * abs(x[speed]) / RATED**2}
 runs = {

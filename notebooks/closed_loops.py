@@ -192,7 +192,7 @@ equations = linkage.augmented()
 show(r"\mathbf C", equations.C)
 show(r"\mathbf C_r", equations.C_r)
 module = equations.compile()
-print("rows:", ", ".join(module.metadata["constraints"]))
+print("rows:", ", ".join(module.metadata.constraints))
 
 # %% [markdown]
 # ### Consistent states
@@ -301,8 +301,8 @@ plt.show()
 # %%
 linkage.initial = dict(zip((q1, q2, q3), branches["open"][0], strict=True))
 wide = linkage.augmented(coordinates="absolute").compile()
-print("coordinates:", ", ".join(wide.metadata["q"]))
-print("constraints:", ", ".join(wide.metadata["constraints"]))
+print("coordinates:", ", ".join(wide.metadata.q))
+print("constraints:", ", ".join(wide.metadata.constraints))
 
 # %% [markdown]
 # Let go with the motor off, the mechanism moves alike in both, and its joints carry the same.
@@ -325,7 +325,7 @@ for system in (linkage, sd.systems.andrews_squeezer()):
     for coordinates in ("relative", "absolute"):
         compiled = system.augmented(coordinates=coordinates).compile(backend="numpy")
         count = compiled.report().rows[0].total
-        sizes = compiled.metadata["sizes"]["q"], len(compiled.metadata["constraints"])
+        sizes = compiled.metadata.sizes.q, len(compiled.metadata.constraints)
         print(f"{system.name:18}{sizes[0]:12}{sizes[1]:12}{count:12}  {coordinates}")
 
 # %% [markdown]
@@ -340,7 +340,7 @@ published = np.array([15.81077119629904, -15.75637105984298, 0.04082224013073101
                       0.5347301163226948, 1.048080741042263])
 end = squeezer.simulate(t=[0, 0.03], rtol=1e-11)
 print(f"{'':8}{'symdyn':>17}{'published':>17}")
-for name, ours, theirs in zip(squeezer.metadata["q"], end.q[-1], published, strict=True):
+for name, ours, theirs in zip(squeezer.metadata.q, end.q[-1], published, strict=True):
     print(f"{name:8}{ours:17.10f}{theirs:17.10f}")
 
 

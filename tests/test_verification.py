@@ -242,7 +242,7 @@ def test_one_wrong_quantity_under_constraints_is_found(linkage, quantity):
     ("universal", "_tilt", "n_c", "C_dot is the rate of C"), ("rod", "_distance", "f", "C_dot is the rate of C")])
 @pytest.mark.filterwarnings("ignore::symdyn.ModelWarning")
 def test_a_row_with_a_wrong_sign_is_found(monkeypatch, kind, row, entry, failing):
-    from symdyn.formulation.constraints.rows import closures
+    from symdyn.formulation.constraints import closures
 
     right = getattr(closures, row)
 

@@ -25,10 +25,10 @@ class RightSide:
     @property
     def label(self) -> str:
         """Plain words for messages."""
-        parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte))
-        added = [text for text, there in parts if there]
-        return ("rhs" + (f" with {' and '.join(added)}" if added else "")
-                + (f" and the method {self.method}" if self.method != METHOD else ""))
+        parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte),
+                 (f"the method {self.method}", self.method != METHOD))
+        added = " and ".join(text for text, there in parts if there)
+        return f"rhs with {added}" if added else "rhs"
 
 
 def key_of(what: str | RightSide) -> str:

@@ -83,7 +83,7 @@ def _exact(equations: Any, function: str, t: float, x: Any, inputs: Any, ud: Any
         quantities = [q for q in equations.quantities if q.startswith("output_")]
         results = [evaluate(equations.tape(q), values, 30)[q].ravel() for q in quantities]
         return np.concatenate(results).astype(float)
-    quantity = FUNCTIONS[function][0]
+    quantity = FUNCTIONS[function].quantity
     return evaluate(equations.tape(quantity), values, 30)[quantity].astype(float)
 
 

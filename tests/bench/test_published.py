@@ -14,13 +14,13 @@ from symdyn.bench.work.against.peer import Failed
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.subject import Subject, Yardstick
 from symdyn.errors import SymdynError
+from symdyn.lab import extended
 from symdyn.lab.loop_cases import REFERENCE
 from symdyn.lab.published import command as published
 from symdyn.lab.published import lines as published_lines
 from symdyn.lab.published.cases import CASES, Case, level_pendulum, windows
 from symdyn.lab.published.command import Result, measure
 from symdyn.lab.published.lines import Line, Run
-from symdyn.precision import motion as extended
 from symdyn.runtime.building.compiler import LINUX
 
 TIMES = np.array([0.3, 0.31, 1.0, 2.0])

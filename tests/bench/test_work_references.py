@@ -14,7 +14,7 @@ from symdyn.bench.work.record import Reference
 from symdyn.bench.work.reference import agreement, default_times, find_reference
 from symdyn.bench.work.subject import Yardstick
 from symdyn.errors import CompileError, SymdynError
-from symdyn.precision import motion as extended
+from symdyn.lab import extended
 
 
 @pytest.fixture(scope="module")

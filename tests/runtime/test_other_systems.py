@@ -16,9 +16,9 @@ import pytest
 import symdyn as sd
 from symdyn.ensembles import lock
 from symdyn.errors import ArgumentError
-from symdyn.runtime import cache_folder, interrupts, stored
-from symdyn.runtime.cache_folder import cache_dir
-from symdyn.runtime.compiler import find_compiler
+from symdyn.runtime.building import cache_folder, interrupts, stored
+from symdyn.runtime.building.cache_folder import cache_dir
+from symdyn.runtime.building.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
 AWKWARD = "a folder, 'Äpfel' & $HOME; 单摆 %TEMP%"
@@ -27,8 +27,8 @@ AWKWARD = "a folder, 'Äpfel' & $HOME; 单摆 %TEMP%"
 NAMES = """
 import ctypes, sys, tempfile, subprocess, platform, importlib.util, shlex, shutil
 sys.platform = {platform!r}
-from symdyn.runtime.cache import SUFFIX
-from symdyn.runtime.compiler import Compiler, flags, link_flags
+from symdyn.runtime.building.cache import SUFFIX
+from symdyn.runtime.building.compiler import Compiler, flags, link_flags
 zig = Compiler(("zig", "cc"), "zig", "21")
 gcc = Compiler(("gcc", "-march=x86-64"), "gcc", "12")
 tcc = Compiler(("tcc",), "tcc", "0.9.28")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ def test_distance_of_both_kinds_of_sequence(angles: Any) -> None:
     proper = sd.System("top")
     top = proper.add_body("top", mass=1, inertia=[1, 1, 2])
     proper.add_joint(sd.Spherical("tip", proper.ground, top, sd.coordinates("a b c"), orientation=sd.EulerAngles("ZXZ")))
-    module = type("Module", (), {"metadata": {"charts": [list(c) for c in proper.embedding().charts],
-                                              "x": ["a", "b", "c", "a_dot", "b_dot", "c_dot"]}})
+    names = ["a", "b", "c", "a_dot", "b_dot", "c_dot"]
+    module: Any = SimpleNamespace(metadata=SimpleNamespace(charts=proper.embedding().charts, x=names))
     assert np.allclose(distances(module, x), np.sin([[0.0], [0.3]]))
     assert free_body("parameters").embedding().charts == ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import islice
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -279,7 +280,7 @@ class Stopped:
 
     success, message = False, "cart: stopped at t = 0.5: gust is not finite; the state there: x = 1, x_dot = 2"
     t, x = np.array([0.0, 0.5]), np.zeros((2, 2))
-    module = type("Module", (), {"metadata": {"x": ["x", "x_dot"]}})
+    module = SimpleNamespace(metadata=SimpleNamespace(x=["x", "x_dot"]))
 
 
 @pytest.mark.parametrize(("change", "told"), [
