@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import random
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.exact.ring import BOUND, TooLarge
 from symdyn.exact.shortest import Writer, not_negative
-from symdyn.exact.taken import recorded
+from symdyn.exact.taken import recorded, value_unknown
 from symdyn.exact.walk import Exact
-from symdyn.model.symbols import symbols_of
+from symdyn.model.symbols import described, parts_of, symbols_of
 from symdyn.shown import shown
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import Node
@@ -63,7 +64,8 @@ class Proof:
         return "proved" if self.proved else "refuted" if self.refuted else "undecided"
 
     def __str__(self) -> str:
-        return f"{self.verdict}{': ' if self.reason else ''}{self.reason}"
+        place = "" if self.index is None else f"entry {list(self.index)}: "
+        return f"{self.verdict}: {place}{self.reason}" if self.reason else self.verdict
 
     def __repr__(self) -> str:
         return str(self)
@@ -73,8 +75,9 @@ def prove(a: Any, b: Any = 0) -> Proof:
     """Whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
 
     a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too
-    Numbers are taken exactly: 0.1 is the double next to 1/10, which is not 1/10. Raises ArgumentError for what is neither
-    expression nor matrix, and for matrices of different shapes.
+    Numbers are taken exactly: 0.1 is the double next to 1/10, which is not 1/10. Derivatives are taken; integrals are letters,
+    with which nothing is refuted. A function without a value, such as f(x), stands for any function. Raises ArgumentError for
+    what is neither expression nor matrix, and for matrices of different shapes.
 
     >>> import sympy as sp, symdyn as sd
     >>> x, y = sp.symbols("x y")
@@ -83,18 +86,61 @@ def prove(a: Any, b: Any = 0) -> Proof:
     """
     left, right, columns = _entries(a, b)
     try:
-        nodes, symbols = recorded([*left, *right])
+        nodes, symbols = recorded(map(_with_known_angles, [*left, *right]), _same_functions([*left, *right]))
     except (UnsupportedExpression, ZeroDivisionError) as error:
         return Proof(False, reason=str(error))
     n = len(left)
     recorder = _recorder(nodes)
     pairs = [(x if isinstance(x, Node) else recorder.add(x, 0), y) for x, y in zip(nodes[:n], nodes[n:])]
     proof = decide(recorder, pairs, symbols, columns=columns)
-    others = sorted({str(s) for e in right for s in symbols_of(e)} ^ {str(s) for e in left for s in symbols_of(e)})
-    if proof.refuted and others and any(e != 0 for e in right):
-        only = f"; only one side holds {', '.join(others)}"
-        return Proof(False, True, proof.reason + only, proof.index, proof.state, proof.difference)
-    return proof
+    if not proof.refuted:
+        return proof
+    letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
+    if letters:
+        return Proof(False, reason=f"the sides differ unless {shown(letters[0])} has a certain value; take it with .doit()")
+    return replace(proof, reason=proof.reason + _other_symbols(left, right))
+
+
+def _other_symbols(left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
+    """Symbols of one side only, and those of one name that are not the same, in words for a refuted claim."""
+    if all(e == 0 for e in right):
+        return ""
+    sides = [{s for e in side for s in symbols_of(e)} for side in (left, right)]
+    only = sorted({str(s) for s in sides[0]} ^ {str(s) for s in sides[1]})
+    told = f"; only one side holds {', '.join(only)}" if only else ""
+    pairs = sorted(((one, two) for one in sides[0] - sides[1] for two in sides[1] - sides[0] if str(one) == str(two)), key=str)
+    return told + "".join(f"; {one} is not the same symbol on both sides: {described(one)} in a, {described(two)} in b"
+                          for one, two in pairs)
+
+
+def _same_functions(entries: Sequence[sp.Expr]) -> dict[Any, Any]:
+    """Functions without a value -> the first one with arguments that are proved equal."""
+    kept: list[Any] = []
+    same: dict[Any, Any] = {}
+    for part in sorted({part for part in parts_of(*entries) if isinstance(part, AppliedUndef)}, key=sp.default_sort_key):
+        other = next((k for k in kept if k.func == part.func and len(k.args) == len(part.args)
+                      and all(p == q or prove(p, q) for p, q in zip(k.args, part.args))), None)
+        if other is None:
+            kept.append(part)
+        else:
+            same[part] = other
+    return same
+
+
+def _with_known_angles(e: sp.Expr) -> sp.Expr:
+    """The expression with sin(x + pi/3) and others by the sum, where SymPy has roots for sine and cosine of the number."""
+    if not e.has(sp.pi):
+        return e
+
+    def by_the_sum(function: Any) -> sp.Expr:
+        known = function.args[0].as_coefficients_dict()[sp.pi] * sp.pi
+        s, c, rest = sp.sin(known), sp.cos(known), function.args[0] - known
+        if known == 0 or rest == 0 or s.has(sp.sin, sp.cos) or c.has(sp.sin, sp.cos):
+            return function
+        sine, cosine = sp.sin(rest) * c + sp.cos(rest) * s, sp.cos(rest) * c - sp.sin(rest) * s
+        return {sp.sin: sine, sp.cos: cosine, sp.tan: sine / cosine}[function.func]
+
+    return e.replace(lambda part: part.func in (sp.sin, sp.cos, sp.tan), by_the_sum)
 
 
 def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
@@ -104,7 +150,9 @@ def _entries(a: Any, b: Any) -> tuple[list[sp.Expr], list[sp.Expr], int]:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             value = sp.sympify(value, strict=True)
         if not isinstance(value, (sp.MatrixBase, sp.Expr)) or value.has(sp.nan, sp.zoo, sp.oo):
-            raise ArgumentError(f"prove takes expressions and matrices of SymPy and finite numbers; {name} is {shown(value)}")
+            rows = f"; pass rows as sp.Matrix({name})" if isinstance(value, (list, tuple)) else ""
+            raise ArgumentError("prove takes expressions and matrices of SymPy and finite numbers; "
+                                f"{name} is {shown(value)}{rows}")
         sides.append(value)
     a, b = sides
     if isinstance(a, sp.MatrixBase) and b == 0:
@@ -124,7 +172,7 @@ def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same:
     What stands in the way of all pairs together, such as a pair that is too large, is looked for pair by pair.
     """
     try:
-        nodes, symbols = recorded([side for pair in pairs for side in pair], same)
+        nodes, symbols = recorded([_with_known_angles(side) for pair in pairs for side in pair], same)
         recorder = _recorder(nodes)
         exact = Exact([recorder.sub(x, y) for x, y in zip(nodes[::2], nodes[1::2])], bound, positive=not_negative(symbols))
     except (UnsupportedExpression, ZeroDivisionError, TooLarge) as error:

@@ -24,9 +24,9 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
     """Entries (nodes and numbers) of the expressions, and what each leaf stands for.
 
     same   symbol -> the one that it is taken for
-    Functions without a value, such as q(t), and their derivatives are leaves. Raises UnsupportedExpression for functions that no
-    code can be generated for, ZeroDivisionError for a division by zero, ArgumentError for text, which is never evaluated,
-    anything else that is no expression, and decimal numbers beyond the range of floats.
+    Functions without a value, such as q(t), their derivatives, and integrals are leaves; other derivatives are taken. Raises
+    UnsupportedExpression for functions that no code can be generated for, ZeroDivisionError for a division by zero, ArgumentError
+    for text, which is never evaluated, anything else that is no expression, and decimal numbers beyond the range of floats.
     """
     expressions = [_taken(e) for e in expressions]
     same = same or {}
@@ -54,7 +54,13 @@ def _taken(value: Any) -> Any:
         if number.is_finite and not (LEAST <= abs(number) <= MOST or number == 0):
             raise ArgumentError(f"the number {number.n(6)} is beyond the range of floats, {LEAST:.1e} to {MOST:.1e}; pass it as "
                                 f"a fraction, sp.Rational('{number.n(6)}')")
-    return e
+    left = {part: part.doit(deep=False) for part in parts_of(e) if isinstance(part, sp.Derivative) and value_unknown(part)}
+    return e.xreplace(left) if left else e
+
+
+def value_unknown(letter: sp.Basic) -> bool:
+    """Whether a letter stands for an integral, or a derivative, whose value follows from what stands in it."""
+    return isinstance(letter, sp.Integral) or (isinstance(letter, sp.Derivative) and not isinstance(letter.expr, AppliedUndef))
 
 
 def _kind(symbol: Any) -> int:

@@ -16,6 +16,7 @@ from symdyn.tape.tape import reachable
 
 x, y, z = sp.symbols("x y z", real=True)
 l, m = sp.symbols("l m", positive=True)
+f = sp.Function("f")
 
 
 @pytest.mark.parametrize(("left", "right"), [
@@ -35,6 +36,15 @@ l, m = sp.symbols("l m", positive=True)
     (sp.Matrix([[x, x + y], [0, sp.cos(z) ** 2]]), sp.Matrix([[x, y + x], [0, 1 - sp.sin(z) ** 2]])),
     (sp.zeros(2, 2), 0),
     (0.5 * x, x / 2),
+    (sp.cos(x + sp.pi / 3), sp.cos(x) / 2 - sp.sqrt(3) / 2 * sp.sin(x)),
+    (sp.cos(x) + sp.cos(x + 2 * sp.pi / 3) + sp.cos(x - 2 * sp.pi / 3), 0),
+    (sp.tan(x + sp.pi / 4), (1 + sp.tan(x)) / (1 - sp.tan(x))),
+    (sp.cos(sp.sin(x + sp.pi / 3) + sp.pi / 6), sp.cos(sp.sin(x) / 2 + sp.sqrt(3) / 2 * sp.cos(x) + sp.pi / 6)),
+    (sp.cos(x + sp.pi / 7), sp.cos(x) * sp.cos(sp.pi / 7) - sp.sin(x) * sp.sin(sp.pi / 7)),
+    (sp.Derivative(x**2, x), 2 * x),
+    (sp.Derivative(x * f(x), x), f(x) + x * f(x).diff(x)),
+    (f((x + 1) ** 2, y), f(x**2 + 2 * x + 1, y)),
+    (sp.Integral(f(y), (y, 0, x)) * (x + 1), sp.Integral(f(y), (y, 0, x)) + x * sp.Integral(f(y), (y, 0, x))),
 ])
 def test_proved(left, right):
     proof = sd.prove(left, right)
@@ -47,6 +57,8 @@ def test_proved(left, right):
     (sp.Matrix([[x, y]]), sp.Matrix([[x, -y]]), (0, 1)),
     (sp.Matrix([x, y]), sp.Matrix([x, x]), (1,)),
     (x, 0.5 * x, None),
+    (sp.cos(x + sp.pi / 3), sp.cos(x) / 2 + sp.sqrt(3) / 2 * sp.sin(x), None),
+    (sp.Integral(f(y), (y, 0, x)) + x, sp.Integral(f(y), (y, 0, x)), None),
 ])
 def test_refuted_by_a_state(left, right, index):
     proof = sd.prove(left, right)
@@ -60,12 +72,20 @@ def test_symbols_of_one_side_are_named():
     assert str(sd.prove(x * z, x * y)) == "refuted: the sides differ by x*(-y + z); only one side holds y, z"
 
 
+def test_symbols_of_one_name_are_told_apart():
+    proof = sd.prove(sp.Matrix([0, m * x]), sp.Matrix([0, sp.Symbol("m") * x]))
+    assert str(proof) == ("refuted: entry [1]: the sides differ by x*(-m + m); m is not the same symbol on both sides: "
+                          "a parameter with positive=True in a, a parameter without assumptions in b")
+
+
 @pytest.mark.parametrize(("left", "right", "reason"), [
     (sp.exp(x) * sp.exp(-y), sp.exp(x - y), "undecided: the normal forms differ, at no state that was tried do the values; "
                                             "functions whose relations are not all known: exp"),
     (0.1 * x + 0.2 * x, 0.3 * x, "the sides differ by no more than the rounding of decimal numbers"),
     (sp.zeta(x), sp.zeta(x), "has no counterpart in generated code"),
     (x / sp.Add(x, -x, evaluate=False), 1, "divides by zero"),
+    (sp.Integral(sp.cos(y), (y, 0, x)), sp.sin(x),
+     "the sides differ unless Integral(cos(y), (y, 0, x)) has a certain value; take it with .doit()"),
 ])
 def test_undecided_with_the_reason(left, right, reason):
     proof = sd.prove(left, right)
@@ -87,6 +107,7 @@ def test_too_large_a_claim_is_undecided(monkeypatch):
 @pytest.mark.parametrize(("left", "right", "message"), [
     ("x", x, "prove takes expressions and matrices of SymPy and finite numbers; a is 'x'"),
     (x, sp.nan, "b is nan"),
+    (sp.Matrix([x]), [x], r"b is \[x\]; pass rows as sp.Matrix\(b\)"),
     (sp.zeros(2, 1), sp.zeros(1, 2), r"a is \(2, 1\), b is \(1, 2\)"),
     (sp.zeros(2, 1), x, r"a is \(2, 1\), b is a scalar"),
     (sp.Float("1e400") * x, x, r"the number 1.00000E\+400 is beyond the range of floats, 2.2e-308 to 1.8e\+308; pass it as a "
