@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
 from symdyn.analytic.lagrange import momentum_leaves
-from symdyn.exact.dimensions import Dimension, Dimensions, parsed, product, text, written
+from symdyn.exact.dimensions import NAMED, Dimension, Dimensions, parsed, product, text, written
 from symdyn.tape.node import ACCELERATION, Node
 
 if TYPE_CHECKING:
@@ -27,12 +27,14 @@ class UnitReport:
     faults     in words: sums of what has different units, entries that have another unit than the equations give them
     units      name of a quantity -> units of its entries, nested like it
     inferred   symbol without a unit -> the one that the equations give it; "?" where they leave it open
+    unread     symbol -> text of its unit, which is no product of known ones and was left out
     """
 
     name: str
     faults: tuple[str, ...]
     units: Mapping[str, Any]
     inferred: Mapping[sp.Symbol, str]
+    unread: Mapping[sp.Symbol, str] = field(default_factory=dict)
 
     @property
     def agree(self) -> bool:
@@ -47,7 +49,11 @@ class UnitReport:
         lines += [f"  {fault}" for fault in self.faults]
         if self.faults:
             lines.append("  numbers count as factors without a unit: give a parameter where one stands for a quantity")
-        lines += [f"  {symbol} has no unit; the equations give it {unit}" for symbol, unit in self.inferred.items()]
+        for symbol, unit in self.inferred.items():
+            own = f"the unit {self.unread[symbol]!r}, which is not read" if symbol in self.unread else "no unit"
+            lines.append(f"  {symbol} has {own}; the equations give it {unit}")
+        if self.unread:
+            lines.append(f"  units are products of powers of {', '.join(NAMED)}, such as 'N m/rad'")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -98,7 +104,8 @@ def check_units(equations: Equations) -> UnitReport:
         told[name] = array.reshape(value.shape).tolist()
     used = {symbol: leaf for leaf, symbol in printed.items() if leaf in dimensions}
     inferred = {symbol: text(dimensions.of(leaf)) for symbol, leaf in used.items() if units.get(symbol) is None}
-    return UnitReport(f"{equations.name} ({equations.formulation})", tuple(dict.fromkeys(faults)), told, inferred)
+    unread = {symbol: s.units[symbol] for symbol in inferred if s.units.get(symbol)}
+    return UnitReport(f"{equations.name} ({equations.formulation})", tuple(dict.fromkeys(faults)), told, inferred, unread)
 
 
 def _wanted(name: str, index: tuple[int, ...], speeds: list[Dimension | None], states: list[Dimension | None],

@@ -25,7 +25,7 @@ from symdyn.tape.tape import Output, reachable
 # Exponents by unit of the base, or by the leaf whose unit is unknown.
 Dimension = dict[Any, Fraction]
 BASE = ("kg", "m", "s", "A", "K")
-_NAMED: dict[str, tuple[int, ...]] = {
+NAMED: dict[str, tuple[int, ...]] = {
     "1": (), "rad": (), "deg": (), "rev": (), "sr": (), "kg": (1,), "m": (0, 1), "s": (0, 0, 1), "A": (0, 0, 0, 1),
     "K": (0, 0, 0, 0, 1), "N": (1, 1, -2), "J": (1, 2, -2), "W": (1, 2, -3), "Pa": (1, -1, -2), "Hz": (0, 0, -1),
     "V": (1, 2, -3, -1), "C": (0, 0, 1, 1), "ohm": (1, 2, -3, -2), "H": (1, 2, -2, -2)}
@@ -51,10 +51,10 @@ def parsed(unit: str | None) -> Dimension | None:
     for k, part in enumerate(unit.replace("*", " ").replace("·", " ").split("/")):
         for token in part.split():
             found = re.fullmatch(r"\(?([A-Za-z1]+)(?:\^\(?(-?\d+)\)?)?\)?", token)
-            if found is None or found[1] not in _NAMED:
+            if found is None or found[1] not in NAMED:
                 return None
             power = int(found[2] or 1) * (-1 if k else 1)
-            for base, n in zip(BASE, _NAMED[found[1]], strict=False):
+            for base, n in zip(BASE, NAMED[found[1]], strict=False):
                 total[base] = total.get(base, Fraction(0)) + n * power
     return {base: n for base, n in total.items() if n}
 
@@ -77,11 +77,12 @@ def text(dimension: Dimension | None) -> str:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """A step whose arguments have different units."""
+    """A step some arguments of which (sides) have units that do not fit."""
 
     node: Node
     units: tuple[str, ...]
     what: str
+    sides: tuple[Node, ...]
 
 
 class Dimensions:
@@ -135,7 +136,7 @@ class Dimensions:
         if op in _PURE:
             own = self._value(args[0])
             if own is not None and not self._unified(own, {}):
-                self.mismatches.append(Mismatch(node, (text(self._resolved(own)), "1"), f"{op} of"))
+                self.mismatches.append(Mismatch(node, (text(self._resolved(own)),), f"{op} of", (args[0],)))
             return {}
         if op in ("neg", "abs"):
             return self._value(args[0])
@@ -150,9 +151,9 @@ class Dimensions:
         exponent = node.args[1]
         if not isinstance(exponent, Node):
             return None if values[0] is None else _scaled(values[0], Fraction(exponent))
-        for value in values:
+        for side, value in zip(node.args, values, strict=True):
             if value is not None and not self._unified(value, {}):
-                self.mismatches.append(Mismatch(node, (text(self._resolved(value)), "1"), "a power with"))
+                self.mismatches.append(Mismatch(node, (text(self._resolved(value)),), "a power with", (side,)))
                 return None
         return {}
 
@@ -164,13 +165,14 @@ class Dimensions:
         known = [a for a in args if isinstance(a, Node) and not _constant(a)]
         if not known:
             return {}
-        first = self._done[known[0]]
+        side, first = known[0], self._done[known[0]]
         for other in known[1:]:
             second = self._done[other]
             if first is None:
-                first = second
+                side, first = other, second
             elif second is not None and not self._unified(first, second):
-                self.mismatches.append(Mismatch(node, (text(self._resolved(first)), text(self._resolved(second))), what))
+                units = text(self._resolved(first)), text(self._resolved(second))
+                self.mismatches.append(Mismatch(node, units, what, (side, other)))
                 return None
         return first
 
@@ -214,9 +216,8 @@ def _scaled(a: Dimension, factor: Fraction) -> Dimension:
 def written(mismatch: Mismatch, symbols: Mapping[Node, sp.Basic]) -> str:
     """A mismatch in words, with the expressions where they are short."""
     node = mismatch.node
-    sides = [a for a in node.args if isinstance(a, Node)]
     told = []
-    for a, unit in zip(sides, mismatch.units, strict=False):
+    for a, unit in zip(mismatch.sides, mismatch.units, strict=True):
         short = len(reachable([a])) <= TOLD
         told.append(f"{shown(expand(Output.of('e', a), symbols)) if short else 'a long expression'} in {unit}")
     where = f"{node.section}: " if node.section else ""

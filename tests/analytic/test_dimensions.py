@@ -68,6 +68,27 @@ def test_a_load_of_the_wrong_unit_and_functions():
                .check_units().faults)
 
 
+@pytest.mark.parametrize(("force", "fault"), [
+    (lambda x, q: sp.Piecewise((x, x > 0), (q, True)), "a choice of x in m and q in 1"),
+    (lambda x, q: sp.Max(x, 0, q), "Max(0, q) in 1 and x in m"),
+    (lambda x, q: (x / l) ** (q * m), "a power with m*q in kg"),
+])
+def test_what_does_not_fit_is_named_with_its_own_unit(force, fault):
+    faults = arm(lambda x, q: -k * force(x, q)).check_units().faults
+    assert any(fault in f for f in faults), faults
+
+
+def test_units_that_cannot_be_read_are_named():
+    c, c3 = sd.parameters("c c3")
+    report = arm(lambda x, q: -k * x - c * x.dot - c3 * x**3, units={c: "kN s/m"}).check_units()
+    assert report.agree and report.unread == {c: "kN s/m"}
+    assert str(report).splitlines()[1:] == [
+        "  c has the unit 'kN s/m', which is not read; the equations give it N s/m",
+        "  c3 has no unit; the equations give it kg/m^2 s^2",
+        "  units are products of powers of 1, rad, deg, rev, sr, kg, m, s, A, K, N, J, W, Pa, Hz, V, C, ohm, H, "
+        "such as 'N m/rad'"]
+
+
 def test_units_that_are_not_given_are_inferred():
     c, c3 = sd.parameters("c c3")
     report = arm(lambda x, q: -k * x - c * x.dot - c3 * x**3).check_units()
