@@ -56,6 +56,7 @@ class EquilibriumPoint:
     def __str__(self) -> str:
         told = ", ".join(f"{q} = {value}" for q, value in self.values.items())
         told += f"{', ' if told and self.free else ''}{', '.join(f'{q} free' for q in self.free)}"
+        told = told or "the coordinates that are held are at rest"
         return told + (f"   where {' and '.join(map(str, self.conditions))}" if self.conditions else "")
 
 
@@ -113,7 +114,7 @@ def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, val
     """
     if isinstance(values, Mapping):
         values = {key: _decimal(value) for key, value in values.items()}
-    state = State(equations, fixed, (), values)
+    state = State(equations, fixed, (), values, "fixed")
     search = _Search(state)
     seconds = max(equations.simplify_seconds, 1.0)
     try:

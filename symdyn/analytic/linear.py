@@ -24,7 +24,7 @@ from symdyn.errors import ArgumentError, SymdynError
 from symdyn.exact.prove import decide, drawn_state
 from symdyn.exact.ring import TooLarge
 from symdyn.exact.shortest import written
-from symdyn.exact.taken import recorded
+from symdyn.exact.taken import in_range, recorded
 from symdyn.formulation.linearization import multiplier_names
 from symdyn.model.symbols import Timed, symbols_of, time
 from symdyn.report.limit import TimeUp, within
@@ -197,9 +197,9 @@ class _Values:
         self.name, self.recorder, self.symbols = name, recorder, symbols
 
     def node(self, what: str, value: Any) -> Any:
-        """Raises ArgumentError for what is no expression in parameters."""
+        """Raises ArgumentError for what is no expression in parameters, and for decimal numbers beyond the range of floats."""
         try:
-            e = sp.sympify(value, strict=True)
+            e = in_range(sp.sympify(value, strict=True))
         except (sp.SympifyError, TypeError):
             e = None
         if not isinstance(e, sp.Expr) or e.has(sp.nan, sp.zoo, sp.oo):
@@ -234,20 +234,21 @@ class State:
     drifting   coordinates whose speed is not zero; held: indices of speeds that are held; multipliers: leaves of them
     """
 
-    def __init__(self, equations: Equations, about: Any, hold: Any, parameters: Mapping[Any, Any] | None = None) -> None:
-        """parameters: values for them, by symbol or name. Raises ArgumentError, and SymdynError for a steady motion under
-        constraints or in quasi-velocities, and for loads that depend on multipliers."""
+    def __init__(self, equations: Equations, about: Any, hold: Any, parameters: Mapping[Any, Any] | None = None,
+                 what: str = "about") -> None:
+        """parameters: values for them, by symbol or name; what: the name of `about` in errors. Raises ArgumentError, and
+        SymdynError for a steady motion under constraints or in quasi-velocities, and for loads that depend on multipliers."""
         self.equations, self.m = equations, Mechanics(equations)
         if equations.constraints and equations.implicit_loads:
             raise SymdynError(f"{equations.name}: its state was requested in symbols, but {', '.join(equations.implicit_loads)} "
                               "depends on accelerations, multipliers or reactions under constraints; use module.linearize(at) "
                               "or module.equilibrium()")
         self.symbols: dict[Node, Any] = {leaf: s for leaf, s in equations.printed_leaves().items() if leaf.mask == PARAMETER}
-        self.about = self._taken(about)
+        self.about = self._taken(about, what)
         self.held = self._held(hold)
         m, s = self.m, equations.symbols
         taken = _Values(equations.name, m.recorder, self.symbols)
-        self.values = {equations.leaves[key]: taken.node(f"about: {key}", value) for key, value in self.about.items()}
+        self.values = {equations.leaves[key]: taken.node(f"{what}: {key}", value) for key, value in self.about.items()}
         known = {p.name: equations.leaves[p] for p in s.parameters}
         wrong = [name_of(key) for key in parameters or {} if name_of(key) not in known]
         if wrong:
@@ -266,15 +267,15 @@ class State:
         m = self.m
         return {**dict.fromkeys((*m.u, *m.ud, *m.inputs), 0), **self.values, **self.parameters}
 
-    def _taken(self, about: Any) -> dict[sp.Symbol, Any]:
+    def _taken(self, about: Any, what: str) -> dict[sp.Symbol, Any]:
         """Symbol -> value."""
         s = self.equations.symbols
         if about is not None and not isinstance(about, Mapping):
-            raise ArgumentError(f"{self.equations.name}: about is {shown(about)}; pass a dict such as {{theta: 0}}, or None")
+            raise ArgumentError(f"{self.equations.name}: {what} is {shown(about)}; pass a dict such as {{theta: 0}}, or None")
         known = {symbol.name: symbol for symbol in (*s.coordinates, *s.speeds, *s.states, *s.inputs)}
         wrong = [name_of(key) for key in about or {} if name_of(key) not in known]
         if wrong:
-            raise ArgumentError(f"{self.equations.name}: about has {', '.join(wrong)}; it takes {', '.join(known)}")
+            raise ArgumentError(f"{self.equations.name}: {what} has {', '.join(wrong)}; it takes {', '.join(known)}")
         return {known[name_of(key)]: value for key, value in (about or {}).items()}
 
     def _held(self, hold: Any) -> list[int]:

@@ -32,20 +32,25 @@ class Stability:
     """Conditions on the parameters that decide stability by the linear equations.
 
     conditions   inequalities that must hold, all of them, where the mass matrix is positive definite
-    kind         "asymptotic": disturbances die out; "neutral": they oscillate for ever (no damping)
+    kind         "asymptotic": disturbances die out; "neutral": they oscillate for ever (no damping); "undecided": all roots are 0
     zero_roots   roots s = 0, of cyclic coordinates, which are left out: along these a disturbance drifts or stays
+    equilibrium  what must be zero, besides, for the state to be an equilibrium
     """
 
     conditions: tuple[sp.Rel, ...]
     kind: str
     zero_roots: int = 0
+    equilibrium: tuple[sp.Basic, ...] = ()
 
     def __str__(self) -> str:
         told = [f"{self.kind} stability where"] + [f"  {c.lhs} > 0" for c in self.conditions]
         if not self.conditions:
             told = [f"{self.kind} stability for all values of the parameters"]
-        if self.zero_roots:
-            told.append(f"  besides {self.zero_roots} roots s = 0")
+        if self.kind == "undecided":
+            told = ["stability is not decided by the linear equations: all roots are s = 0"]
+        elif self.zero_roots:
+            told.append(f"  besides {self.zero_roots} root{'s' * (self.zero_roots > 1)} s = 0")
+        told += [f"  if the state is an equilibrium: {c.lhs} = {c.rhs}" for c in self.equilibrium]
         return "\n".join(told)
 
 
@@ -86,13 +91,15 @@ class Characteristic:
             raise SymdynError(f"{self.linear.name}: conditions for a polynomial of degree {degree} were requested; they are "
                               f"written for up to {LARGEST}, three degrees of freedom; hold some with linearized(hold=...), "
                               "or put in numbers and use module.linearize(at).verdict")
+        if degree == 0:
+            return Stability((), "undecided", zero, self.linear.conditions)
         if all(map(is_zero, left[1::2])) and degree % 2 == 0:
             # Without gyroscopic and circulatory terms all s^2 are real.
             real = self.linear.C.is_zero_matrix and self.linear.K.is_symmetric() and self.linear.M.is_symmetric()
             kind, found = "neutral", list(left[:-1:2]) if real else _negative_and_real(left[::2])
         else:
             kind, found = "asymptotic", _lienard_chipart(left[::-1])
-        return Stability(_inequalities(self.linear.write(found)), kind, zero)
+        return Stability(_inequalities(self.linear.write(found)), kind, zero, self.linear.conditions)
 
 
 def characteristic(linear: Linearized) -> Characteristic:

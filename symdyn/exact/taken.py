@@ -50,12 +50,18 @@ def _taken(value: Any) -> Any:
         e = sp.sympify(value, strict=True)
     except sp.SympifyError:
         raise ArgumentError(f"exact algebra takes numbers and expressions of SymPy symbols, found {shown(value)}") from None
-    for number in e.atoms(sp.Float):
-        if number.is_finite and not (LEAST <= abs(number) <= MOST or number == 0):
-            raise ArgumentError(f"the number {number.n(6)} is beyond the range of floats, {LEAST:.1e} to {MOST:.1e}; pass it as "
-                                f"a fraction, sp.Rational('{number.n(6)}')")
+    in_range(e)
     left = {part: part.doit(deep=False) for part in parts_of(e) if isinstance(part, sp.Derivative) and value_unknown(part)}
     return e.xreplace(left) if left else e
+
+
+def in_range(e: Any) -> Any:
+    """The expression itself. Raises ArgumentError if it holds a decimal number beyond the range of floats."""
+    for number in e.atoms(sp.Float):
+        if number.is_finite and not (LEAST <= abs(number) <= MOST or number.is_zero):
+            raise ArgumentError(f"the number {number.n(6)} is beyond the range of floats, {LEAST:.1e} to {MOST:.1e}; pass it as "
+                                f"a fraction, sp.Rational('{number.n(6)}')")
+    return e
 
 
 def value_unknown(letter: sp.Basic) -> bool:

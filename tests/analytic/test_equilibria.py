@@ -183,3 +183,13 @@ def test_quasi_velocities():
     assert all(p.free == (z,) for p in found)
     with pytest.raises(SymdynError, match="that are held, but its speeds are quasi-velocities; leave speeds='body' out"):
         eq.equilibria({y: 0})
+
+
+def test_held_coordinates():
+    eq = sd.systems.two_link_arm().embedding()
+    assert str(eq.equilibria(fixed={"q1": 0, "q2": 0})).splitlines() == [
+        "two_link_arm: 1 equilibrium", "  the coordinates that are held are at rest"]
+    with pytest.raises(ArgumentError, match=r"fixed is \['q1'\]; pass a dict such as"):
+        eq.equilibria(fixed=["q1"])
+    with pytest.raises(ArgumentError, match="fixed has q9; it takes q1, q2, q1_dot, q2_dot, tau1, tau2"):
+        eq.equilibria(fixed={"q9": 0})

@@ -229,10 +229,12 @@ def test_printing():
     assert r"\text{condition}" in linear._repr_latex_() and "ddot" in repr(linear._repr_latex_())
     found = linear.characteristic()
     assert str(found) == "c*s + k + m*s**2" and found._repr_latex_() == r"$\displaystyle c s + k + m s^{2}$"
-    assert str(found.routh_hurwitz()) == "asymptotic stability for all values of the parameters"
+    assert str(found.routh_hurwitz()) == ("asymptotic stability for all values of the parameters\n"
+                                           "  if the state is an equilibrium: -M = 0")
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
+    ({"about": {"q1": sp.Float("1e400")}}, r"the number 1.00000E\+400 is beyond the range of floats"),
     ({"about": {"p": 1}}, "about has p; it takes q1, q2, q1_dot, q2_dot, F"),
     ({"about": [1]}, r"about is \[1\]; pass a dict such as"),
     ({"about": {"q1": "x"}}, "about: q1 is 'x'; pass a finite number or an expression in parameters"),
@@ -314,3 +316,16 @@ def test_loads_that_depend_on_multipliers():
     system.add_joint_force(rail, -c * sd.multiplier("wire"))
     with pytest.raises(SymdynError, match="depends on accelerations, multipliers or reactions under constraints; use module"):
         system.augmented().linearized()
+
+
+def test_stability_names_what_the_state_needs_to_be_an_equilibrium():
+    eq = sd.systems.get("n_link_pendulum", n=2).embedding()
+    level = eq.linearized().characteristic().routh_hurwitz()
+    assert level.kind == "undecided" and level.zero_roots == 4
+    assert str(level).splitlines() == [
+        "stability is not decided by the linear equations: all roots are s = 0",
+        "  if the state is an equilibrium: g*(lc1*m1 + m2*(l1 + lc2)) = 0", "  if the state is an equilibrium: g*lc2*m2 = 0"]
+    hanging = eq.linearized({"q1": -sp.pi / 2}).characteristic().routh_hurwitz()
+    assert hanging.kind == "neutral" and hanging.equilibrium == ()
+    cart = sd.systems.get("cart_pole").embedding().linearized().characteristic().routh_hurwitz()
+    assert "besides 2 roots s = 0" in str(cart)

@@ -36,6 +36,7 @@ f = sp.Function("f")
     (sp.Matrix([[x, x + y], [0, sp.cos(z) ** 2]]), sp.Matrix([[x, y + x], [0, 1 - sp.sin(z) ** 2]])),
     (sp.zeros(2, 2), 0),
     (0.5 * x, x / 2),
+    (sp.Matrix([0.0, x]), sp.Matrix([0, x])),
     (sp.cos(x + sp.pi / 3), sp.cos(x) / 2 - sp.sqrt(3) / 2 * sp.sin(x)),
     (sp.cos(x) + sp.cos(x + 2 * sp.pi / 3) + sp.cos(x - 2 * sp.pi / 3), 0),
     (sp.tan(x + sp.pi / 4), (1 + sp.tan(x)) / (1 - sp.tan(x))),
