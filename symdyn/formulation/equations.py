@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.counting import counted
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.kinds import flag, text
 from symdyn.shown import shown
 from symdyn.tape.node import ACCELERATION, Node
@@ -160,14 +160,17 @@ class Equations:
                    constants of the mechanism first, then sines and cosines, then what stands in several places
         What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
         for an unknown form, for one that is too large, for a quantity that is too large to be read, and if the quantity is so
-        long that the time is over before it is multiplied into one expression.
+        long that the time is over before it is multiplied into one expression; ArgumentError for a form of what has none.
         """
         text(name, "the name of a quantity", "M_tilde")
+        if text(form, "the form", "fourier") != "shortest" and (intermediates or not simplify):
+            raise ArgumentError(f"{self.name}: the form {form!r} of {name} was asked for, together with "
+                                f"{'intermediates=True' if intermediates else 'simplify=False'}; take one of them")
         if flag(intermediates, "intermediates"):
             return self._in_intermediates(name)
         if not flag(simplify, "simplify"):
             return expand(self.tape(name).outputs[name], self.printed_leaves())
-        key = (name, text(form, "the form", "fourier"))
+        key = (name, form)
         if key not in self._printed:
             from symdyn.exact.ring import TooLarge
             from symdyn.exact.shortest import explicit, written_out

@@ -4,7 +4,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
-from symdyn.errors import SymdynError
+from symdyn.errors import ArgumentError, SymdynError
 from symdyn.exact.ring import TooLarge
 from symdyn.exact.shortest import FORMS, shortest, written
 from symdyn.exact.taken import recorded
@@ -104,6 +104,9 @@ def test_fractions_beyond_the_range_of_floats_are_kept(number):
 
 def test_unknown_form():
     eq = sd.systems.pendulum().embedding()
+    for other in ({"intermediates": True}, {"simplify": False}):
+        with pytest.raises(ArgumentError, match=f"'fourier' of M_tilde was asked for, together with {next(iter(other))}="):
+            eq.explicit("M_tilde", form="fourier", **other)
     with pytest.raises(SymdynError, match="the form 'shorter' was asked for; there are shortest, polynomial, fourier"):
         eq.explicit("M_tilde", form="shorter")
 
