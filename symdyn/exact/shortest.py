@@ -57,6 +57,7 @@ class Writer:
         self._rows: list[Letter] = []
         self.arranger = Arranger(_Lookup(self))
         self._written: dict[Any, sp.Expr] = {}
+        self._factors_below: dict[int, tuple[int, Tree]] = {}
         n = len(exact.bases)
         self.bases = [Basis(exact, tuple(tuple(int(i == k) for i in range(n)) for k in range(n)))]
         longest = max((value.num for value in exact.values), key=len, default=None)
@@ -103,7 +104,7 @@ class Writer:
             key = self.letters.below[letter]
             if key < 0:
                 return self.expression(-1 - key)
-            return self.tree_expression(self.tree(Value(self.exact.ring.factors[key])))
+            return self.tree_expression(self._below(key)[1])
         if letter in self.exact.leaves:
             return self._node(self.exact.leaves[letter])
         return self._function(self.exact.atoms[letter])
@@ -187,7 +188,21 @@ class Writer:
         return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
 
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
-        return divided(p, value.under, self.exact.ring.factors, self.letters) if value.under else p
+        if not value.under:
+            return p
+        sign = math.prod(self._below(k)[0] ** n for k, n in value.under)
+        return {m: sign * c for m, c in divided(p, value.under, self.exact.ring.factors, self.letters).items()}
+
+    def _below(self, k: int) -> tuple[int, Tree]:
+        """1 and how a factor of the ring is written in a denominator, or -1 and how its opposite is, where that is shorter or
+        has fewer minus signs."""
+        if k not in self._factors_below:
+            factor = self.exact.ring.factors[k]
+            own = self.tree(Value(factor))
+            opposite = self.tree(Value(-factor)) if len(factor) > 1 else own
+            least = [(total(tree), str(self.tree_expression(tree)).count("-")) for tree in (own, opposite)]
+            self._factors_below[k] = (-1, opposite) if least[1] < least[0] else (1, own)
+        return self._factors_below[k]
 
     def representations(self, value: Value) -> list[Polynomial]:
         """Different polynomials in letters for the same value."""
