@@ -70,6 +70,8 @@ def test_textbook_form_of_a_planar_chain():
     (0.1 * a * b + 0.1 * a * c, 0.1 * a * (b + c)),
     (sp.Piecewise((a**2 - a * a + b, a > b), (c, True)), sp.Piecewise((b, a > b), (c, True))),
     (sp.cos(q1 + sp.pi / 2), -sp.sin(q1)),
+    (-c / (b * sp.cos(q1) ** 2 - a - b), c / (a + b * sp.sin(q1) ** 2)),
+    (c / (a + b * sp.sin(q1) ** 2) ** 2, c / (a + b * sp.sin(q1) ** 2) ** 2),
     (sp.Integer(0), sp.Integer(0)),
 ])
 def test_relations(given, wanted):
