@@ -21,7 +21,7 @@ from symdyn.exact.ring import BOUND, TooLarge
 from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.taken import recorded, value_unknown
 from symdyn.exact.walk import Exact
-from symdyn.model.symbols import described, parts_of, symbols_of
+from symdyn.model.symbols import Timed, described, parts_of, symbols_of, take_over
 from symdyn.shown import shown
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import Node
@@ -76,8 +76,9 @@ def prove(a: Any, b: Any = 0) -> Proof:
 
     a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too
     Numbers are taken exactly: 0.1 is the double next to 1/10, which is not 1/10. Derivatives are taken; integrals are letters,
-    with which nothing is refuted. A function without a value, such as f(x), stands for any function. Raises ArgumentError for
-    what is neither expression nor matrix, and for matrices of different shapes.
+    with which nothing is refuted. A function without a value, such as f(x), stands for any function; dynamicsymbols stand for
+    coordinates of their name where a side holds such. Raises ArgumentError for what is neither expression nor matrix, and for
+    matrices of different shapes.
 
     >>> import sympy as sp, symdyn as sd
     >>> x, y = sp.symbols("x y")
@@ -85,6 +86,8 @@ def prove(a: Any, b: Any = 0) -> Proof:
     proved
     """
     left, right, columns = _entries(a, b)
+    if any(isinstance(s, Timed) for e in (*left, *right) for s in symbols_of(e)):
+        left, right = list(map(take_over, left)), list(map(take_over, right))
     try:
         nodes, symbols = recorded(map(_with_known_angles, [*left, *right]), _same_functions([*left, *right]))
     except (UnsupportedExpression, ZeroDivisionError) as error:
