@@ -14,6 +14,7 @@ from symdyn.comparison.values import Value, by_name, rebuilt, renaming, take
 from symdyn.comparison.values import taken as value_of
 from symdyn.comparison.verdict import EntryResult, ErratumResult, FormulaResult, Verdict
 from symdyn.errors import CaseError
+from symdyn.model.symbols import symbols_of
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,15 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     entries = []
     assert taken.shown is not None
     shown, right = taken.shown.rebuilt(), derived.rebuilt()
+    known = {str(s) for e in derived.entries for s in symbols_of(e)}
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
         a, b = (shown.entries[k], right.entries[k]) if decision.how != SHAPE else (None, None)
         entry = EntryResult(place, Verdict.EQUAL, decision.how, "", a, b, decision.point, decision.values, decision.proved)
-        entries.append(_verdict(entry, decision, convention, errata, unreadable.get(place, "")))
+        judged = _verdict(entry, decision, convention, errata, unreadable.get(place, ""))
+        if judged.verdict is Verdict.DIFFERENT and not judged.note and decision.how != SHAPE:
+            alone = sorted({str(s) for s in symbols_of(taken.printed.entries[k])} - known)
+            judged = replace(judged, note=f"only the print holds {', '.join(alone)}" if alone else "")
+        entries.append(judged)
     return FormulaResult(formula.name, formula.slide, tuple(formula.also), formula.latex, _shown(shown), _shown(right),
                          tuple(entries), tuple(e.result for e in errata), convention.name if convention else "",
                          tuple((name, rebuilt(e)) for name, e in taken.where.items()))

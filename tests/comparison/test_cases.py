@@ -397,3 +397,9 @@ def test_entries_that_are_sampled_are_named_with_the_reason():
     assert "1 equal, proved; 1 equal, sampled" in str(found.cases[0])
     assert "1 of 2 decided entries are proved equal, or refuted at a state; sampled:" in str(found)
     assert "\n  gravity, g: [0] equal at 24 random points" in str(found) and "not proved: decimal numbers" in str(found)
+
+
+def test_symbols_that_only_the_print_holds_are_named():
+    wrong = compare(sd.Formula("F", [sp.Symbol("M") * g * sp.sin(q), l * q.dot], sp.Matrix([m * g * sp.sin(q), 2 * l * q.dot])))
+    first, second = wrong.formulas[0].entries
+    assert (first.note, second.note) == ("only the print holds M", "") and "; only the print holds M" in str(wrong)
