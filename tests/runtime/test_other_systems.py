@@ -16,9 +16,10 @@ import pytest
 import symdyn as sd
 from symdyn.ensembles import lock
 from symdyn.errors import ArgumentError
-from symdyn.runtime.building import cache_folder, interrupts, stored
+from symdyn.runtime.building import cache_folder, stored
 from symdyn.runtime.building.cache_folder import cache_dir
 from symdyn.runtime.building.compiler import find_compiler
+from symdyn.runtime.integrating import interrupts
 
 ROOT = Path(__file__).parents[2]
 AWKWARD = "a folder, 'Äpfel' & $HOME; 单摆 %TEMP%"
