@@ -11,6 +11,7 @@ import random
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import combinations
 from typing import Any
 
 import sympy as sp
@@ -35,6 +36,9 @@ STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
 # Of a difference that is rounding no more than this part remains with twice the digits.
 REMAINDER = 1e-10
 DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
+# Axes of decimal numbers are divided by their length at sixty digits; that their squares add up to one is true up to this.
+UNIT = Fraction(1, 10**50)
+DIRECTIONS = "for axes of decimal numbers, divided by their length exactly"
 # A difference with more terms than this is not written out in a reason.
 WRITTEN = 60
 
@@ -44,7 +48,8 @@ class Proof:
     """The verdict on a claim a = b; true where it is proved.
 
     proved, refuted   undecided where neither holds
-    reason    why it is undecided, or how the sides differ; index: of the entry that differs, of matrices
+    reason    why it is undecided, or how the sides differ, or of which numbers it is proved; index: of the entry that differs, of
+              matrices
     state     symbol -> number, where the sides differ; difference: a - b in its shortest form, unless it is long
     """
 
@@ -222,10 +227,12 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     reason = ""
     try:
         differences = [recorder.sub(x, y) for x, y in pairs]
-        exact = Exact(differences, bound, unit_vectors, not_negative(symbols))
+        exact = Exact(differences, bound, unit_vectors, not_negative(symbols), of_calls=True)
         doubtful = [k for k, value in enumerate(exact.values) if len(value.num)]
         if not doubtful:
             return Proof(True)
+        if _proved_for_directions([differences[k] for k in doubtful], bound, unit_vectors, symbols):
+            return Proof(True, reason=DIRECTIONS)
         reason = "the normal forms differ, at no state that was tried do the values"
         reason += _without_relations(exact)
     except TooLarge as error:
@@ -244,6 +251,30 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         return Proof(False, True, "the values differ", index(k), where)
     difference = Writer(exact, symbols).write(exact.values[k])
     return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _proved_for_directions(differences: Sequence[Any], bound: int, unit_vectors: Sequence[Sequence[Node]],
+                           symbols: Mapping[Node, sp.Expr]) -> bool:
+    """Whether the differences vanish for all axes of unit length in place of those that were divided by their length and
+    rounded, for which they vanish up to the rounding only."""
+    directions = rounded_directions(differences)
+    if not directions:
+        return False
+    exact = Exact(differences, bound, unit_vectors, not_negative(symbols), directions, of_calls=True)
+    return not any(len(value.num) for value in exact.values)
+
+
+def rounded_directions(entries: Sequence[Any]) -> list[tuple[Fraction, ...]]:
+    """Two or three numbers each, without signs, whose squares add up to one but for rounding at sixty digits."""
+    left = sorted({abs(a) for node in reachable(entries) for a in node.args
+                   if isinstance(a, Fraction) and 1 / UNIT < a.denominator and abs(a) < 1}, reverse=True)
+    found: list[tuple[Fraction, ...]] = []
+    for size in (2, 3):
+        for group in combinations(left, size):
+            if 0 < abs(sum(a * a for a in group) - 1) < UNIT and all(a in left for a in group):
+                found.append(group)
+                left = [a for a in left if a not in group]
+    return found
 
 
 def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: Sequence[int],

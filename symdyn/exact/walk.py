@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import combinations_with_replacement
 from math import isqrt
 from typing import Any
 
@@ -46,9 +47,11 @@ class Exact:
     """
 
     def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = (),
-                 positive: Collection[Node] = ()) -> None:
+                 positive: Collection[Node] = (), directions: Sequence[Sequence[Fraction]] = (), of_calls: bool = False) -> None:
         """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters; positive: leaves that are not
-        negative, so that roots of their squares are themselves.
+        negative, so that roots of their squares are themselves; directions: groups of positive numbers that are taken as any
+        numbers whose squares add up to one, also in products of two of them; of_calls: whether results of algorithms are expressed by each other where they can
+        be (Kernel.homogeneous).
 
         Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
@@ -64,13 +67,24 @@ class Exact:
         self.bases: list[Linear] = angles.bases
         self.sines = tuple((n + k, n + m + k) for k in range(m))
         count = n + 2 * m
-        self.ring = ring = Ring(count + len(leaves), self.sines, bound)
+        free_numbers = [number for direction in directions for number in direction]
+        self.ring = ring = Ring(count + len(leaves) + len(free_numbers), self.sines, bound)
         self.leaves = {count + k: leaf for k, leaf in enumerate(leaves)}
+        taken_as = {number: ring.generator(count + len(leaves) + k) for k, number in enumerate(free_numbers)}
         self.atoms: dict[int, Atom] = {}
         self._angles = angles
         number_of = {leaf: k for k, leaf in self.leaves.items()}
         for first, *others in groups:
             ring.relate(number_of[first], 1 - sum(ring.generators[number_of[leaf]] ** 2 for leaf in others))
+        place = count + len(leaves)
+        for direction in directions:
+            ring.relate(place, 1 - sum(ring.generators[place + k] ** 2 for k in range(1, len(direction))))
+            place += len(direction)
+            for a, b in combinations_with_replacement(direction, 2):
+                taken_as[a * b] = ring.mul(taken_as[a], taken_as[b])
+                if a == b:
+                    taken_as[1 - a * a] = ring.sub(ring.one, taken_as[a * a])
+        taken_as |= {-number: ring.neg(value) for number, value in taken_as.items()}
         self._pairs: dict[tuple[int, ...], tuple[Value, Value]] = {}
         known: dict[str, Value] = {}
         done: dict[Node, Any] = {leaf: ring.generator(k) for k, leaf in self.leaves.items()}
@@ -78,7 +92,9 @@ class Exact:
         def take(a: Any) -> Any:
             if isinstance(a, Node):
                 return done[a]
-            return a if isinstance(a, bool) else ring.number(exact(a))
+            if isinstance(a, bool):
+                return a
+            return taken_as.get(exact(a)) or ring.number(exact(a))
 
         free_of_sign = {k for k, leaf in self.leaves.items() if leaf in positive}
         same: dict[str, list[tuple[Value, Value]]] = {}
