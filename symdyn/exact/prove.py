@@ -194,7 +194,7 @@ def zero(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], bound: int, unit_
          positive: Collection[Node] = ()) -> bool:
     """Whether exact algebra proves both nodes of every pair equal; no is no refutation. Parameters as in `decide` and Exact."""
     try:
-        values = Exact([recorder.sub(x, y) for x, y in pairs], bound, unit_vectors, positive).values
+        values = Exact([recorder.sub(x, y) for x, y in pairs], bound, unit_vectors, positive, of_calls=True).values
     except (TooLarge, ZeroDivisionError):
         return False
     return not any(len(value.num) for value in values)

@@ -11,9 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from itertools import combinations_with_replacement
-from math import isqrt
+from math import isqrt, prod
 from typing import Any
+
+from flint import fmpz
 
 from symdyn.exact.angles import Angles, Linear, arguments
 from symdyn.exact.ring import BOUND, FACTORED, Ring, Value, fraction
@@ -23,8 +26,10 @@ from symdyn.tape.tape import reachable
 
 _ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)
-# Roots that one is taken apart to, at most.
-ROOTS = 4
+# Numbers of more bits are not split into primes other than these.
+_BITS = 80
+# Roots that one is taken apart to, at most; that of a number.
+ROOTS, NUMBER_ROOTS = 4, 8
 _TRUTH = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 
 
@@ -51,7 +56,7 @@ class Exact:
         """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters; positive: leaves that are not
         negative, so that roots of their squares are themselves; directions: groups of positive numbers that are taken as any
         numbers whose squares add up to one, also in products of two of them; of_calls: whether results of algorithms are expressed by each other where they can
-        be (Kernel.homogeneous).
+        be (Kernel.by_others).
 
         Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
@@ -61,7 +66,7 @@ class Exact:
         groups = [group for group in unit_vectors if all(leaf in leaves for leaf in group)]
         leading = [group[0] for group in groups]
         leaves = [*leading, *[leaf for leaf in leaves if leaf not in leading]]
-        n, m, count = sum(ROOTS if node.op == "sqrt" else 1 for node in others), len(angles.bases), 0
+        n, m, count = sum(map(partial(_generators, of_calls), others)), len(angles.bases), 0
         # Functions first, the last one highest; two generators a base angle; plain symbols.
         free = iter(range(n - 1, -1, -1))
         self.bases: list[Linear] = angles.bases
@@ -100,14 +105,23 @@ class Exact:
         same: dict[str, list[tuple[Value, Value]]] = {}
 
         def function(node: Node) -> Value:
-            item = node.args[1] if node.op == "item" else None
             args = done[node.args[0]] if node.op == "item" else tuple(map(take, node.args))
             if node.op == "sqrt" and len(args[0].num):
-                result, below = root_taken_apart(ring, args[0], free_of_sign)
+                result, below = root_taken_apart(ring, args[0], free_of_sign, _roots(node))
                 for inside in below:
                     result = ring.mul(result, of_atom(Atom("sqrt", (inside,))))
                 return result
-            return of_atom(Atom("call" if node.op == "item" else node.op, args, item))
+            return of_call(args, node.args[1]) if node.op == "item" else of_atom(Atom(node.op, args))
+
+        def of_call(args: tuple[Any, ...], item: int) -> Value:
+            kernel, *values = args
+            found = kernel.by_others(item) if of_calls else None
+            if found is None or not len(values[found[0]].num):
+                return of_atom(Atom("call", args, item))
+            total = ring.zero
+            for i, j in found[1]:
+                total = ring.add(total, ring.mul(values[i], of_call(args, j)))
+            return ring.neg(ring.div(total, values[found[0]]))
 
         def of_atom(atom: Atom) -> Value:
             args, item = atom.args, atom.item
@@ -176,11 +190,24 @@ class Exact:
         return self._pairs[vector]
 
 
-def root_taken_apart(ring: Ring, value: Value, positive: Collection[int]) -> tuple[Value, list[Value]]:
+def _generators(of_calls: bool, node: Node) -> int:
+    """The most generators that a function needs; with the results that others are expressed by, which all are needed for a call."""
+    if node.op == "sqrt":
+        return _roots(node)
+    if node.op != "call":
+        return 1
+    return node.args[0].n_out if of_calls else 1
+
+
+def _roots(node: Node) -> int:
+    return ROOTS if isinstance(node.args[0], Node) else NUMBER_ROOTS
+
+
+def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: int = ROOTS) -> tuple[Value, list[Value]]:
     """x and what stands under roots, with sqrt(value) = x sqrt(..) sqrt(..) ...: numbers, and factors that are never negative,
     have roots of their own, so that sqrt(a b) is sqrt(a) sqrt(b) and sqrt(a / b^2) is sqrt(a) / b.
 
-    positive   generators that are not negative
+    positive   generators that are not negative; most: roots on the right
     """
     num, outside = value.num, ring.one
     if any(printed_as_decimal(fraction(c)) for c in num.coeffs()) or len(num) > FACTORED:
@@ -215,15 +242,10 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int]) -> tup
             found += [Value(factor)] * (int(n) % 2)
         else:
             rest = ring.reduced(rest * factor ** int(n))
-    for prime in _PRIMES:
-        if left % prime == 0:
-            left //= prime
-            found.append(ring.number(prime))
-    if left != 1:
-        found.append(ring.number(left))
+    found += [ring.number(prime) for prime, _ in _factors(left)]
     if not rest.is_one() or under:
         found.append(Value(rest, tuple(under)))
-    while len(found) > ROOTS:
+    while len(found) > most:
         found[-2:] = [ring.mul(*found[-2:])]
     return outside, found
 
@@ -234,11 +256,19 @@ def _never_negative(p: Any, positive: Collection[int]) -> bool:
 
 
 def _root_of_square_in(n: int) -> int:
-    """The largest k, but for large primes, whose square divides n."""
-    if isqrt(n) ** 2 == n:
-        return isqrt(n)
-    root = 1
+    """The largest k, but for large primes of long numbers, whose square divides n."""
+    return prod(prime ** (power // 2) for prime, power in _factors(n))
+
+
+def _factors(n: int) -> list[tuple[int, int]]:
+    """Primes of a positive number and their powers; of a long one what is left without the small primes is no prime."""
+    if n.bit_length() <= _BITS:
+        return [(int(prime), int(power)) for prime, power in fmpz(n).factor()]
+    found = []
     for prime in _PRIMES:
-        while n % prime**2 == 0:
-            n, root = n // prime**2, root * prime
-    return root * isqrt(n) if isqrt(n) ** 2 == n else root
+        power = 0
+        while n % prime == 0:
+            n, power = n // prime, power + 1
+        found += [(prime, power)] * (power > 0)
+    root = isqrt(n)
+    return [*found, *([(root, 2)] if root**2 == n else [(n, 1)])]

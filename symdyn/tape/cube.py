@@ -79,6 +79,14 @@ class Cube(Kernel):
             rates.append(rate)
         return rates
 
+    def by_others(self, k: int) -> tuple[int, list[tuple[int, int]]] | None:
+        """By Euler's theorem: the volume and first moments stay as they are where all e grow alike, so that the sum of e_j times
+        their derivatives by e_j is zero."""
+        first, *others = self.indices[k]
+        if self.sizes[0] != 1 or first:
+            return None
+        return 0, [(j, self.indices.index(tuple(sorted((*others, j))))) for j in (1, 2, 3)]
+
     def _results(self, e: Sequence[Any], one: Any, gauss: Any) -> list[Any]:
         """For numbers of any kind, of which `one` is 1 and `gauss` 1/sqrt(3); NaN where the depth is constant or no number."""
         order, zero = self.sizes[0], one - one

@@ -135,13 +135,47 @@ def test_faults(left, right, message):
 
 
 @pytest.mark.parametrize("name", [*sd.systems.names(constrained=False), "four_bar", "slider_crank", "rolling_disc", "sleigh",
-                                  "andrews_squeezer", "particle_on_moving_slope", "spatial_slider_crank", "car_axis"])
+                                  "andrews_squeezer", "particle_on_moving_slope", "spatial_slider_crank", "car_axis", "floating_crane",
+                                  "bicycle"])
 def test_identities_of_the_catalogue(name):
     system = sd.systems.get(name, **({"n": 3} if name == "spatial_chain" else {}))
     eq = system.augmented() if name in sd.systems.names(constrained=True) else system.recursive()
     proofs = eq.prove()
     assert proofs.proved and not proofs.refuted, str(proofs)
     assert len(proofs.claims) >= 6
+
+
+@pytest.mark.parametrize("options", [{"mooring": "linear"}, {"mooring": None, "hydrostatics": "linear", "blades": "lumped"}])
+def test_identities_of_a_floating_turbine(options):
+    proofs = sd.systems.floating_wind_turbine(**options).embedding().prove()
+    assert proofs.proved, str(proofs)
+    assert "rate of energy is the power of the loads" in [claim.name for claim in proofs.claims]
+
+
+def arm_about(*axes):
+    system = sd.System("arm", gravity=[0, 0, -9.81])
+    m, I, c = sd.parameters("m I c")
+    last = system.ground
+    for k, axis in enumerate(axes):
+        body = system.add_body(f"link{k}", mass=m, inertia=[I, 2 * I, 3 * I], com=[c, 0, 0])
+        system.add_joint(sd.Revolute(f"joint{k}", last, body, sd.coordinates(f"q{k}"), axis=axis, parent_point=[c, 0, 0]))
+        last = body
+    return system.recursive()
+
+
+def test_axes_that_are_divided_by_roots_of_numbers_with_common_large_primes():
+    proofs = arm_about([0.31, 0.52, 0.71], [0.6, 0.2, -0.7]).prove()
+    assert proofs.proved and not any(claim.proof.reason for claim in proofs.claims), str(proofs)
+
+
+def test_axes_of_decimal_numbers_are_taken_as_of_unit_length():
+    eq = arm_about([np.sin(0.3), 0, np.cos(0.3)], [0, 1, 0])
+    proofs = eq.prove()
+    assert proofs.proved, str(proofs)
+    reasons = {claim.proof.reason for claim in proofs.claims}
+    assert reasons == {"", "for axes of decimal numbers, divided by their length exactly"}
+    longer = dataclasses.replace(eq, _recorded={**eq._recorded, "energy": eq.quantity("energy") * (1 + 1e-9)}, _printed={})
+    assert longer.prove().refuted
 
 
 def test_euler_parameters_have_unit_length():

@@ -140,6 +140,17 @@ def test_identities(e: np.ndarray) -> None:
     assert (np.abs(first[:, 1:]) <= first[:, :1] / 2 + 1e-16).all()
 
 
+def test_results_that_follow_from_others() -> None:
+    e = random_depths(100, 3)
+    results = Cube((1,), REASON).rows(list(e.T))
+    following = {k: rule for k in range(results.shape[1]) if (rule := Cube((1,), REASON).by_others(k))}
+    assert list(following) == [0, 1, 2, 3]
+    for k, (divisor, pairs) in following.items():
+        total = results[:, k] * e[:, divisor] + sum(e[:, i] * results[:, j] for i, j in pairs)
+        assert np.abs(total).max() < 1e-14 * np.abs(results * np.abs(e).max(axis=1, keepdims=True)).max()
+    assert not any(Cube((order,), REASON).by_others(k) for order in (0, 2) for k in range(4))
+
+
 def test_values_where_the_cut_meets_faces_edges_and_corners() -> None:
     half_prism, third = [1 / 2, -1 / 12, -1 / 12, 0], 1 / 3
     for e, wanted in (
