@@ -21,6 +21,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.spatial.vectors import inner
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import ACCELERATION, is_zero
+from symdyn.tape.tape import reachable
 
 # Terms that a product may have in a proof: what is larger is left to verify().
 BOUND = 100_000
@@ -108,6 +109,10 @@ class _Subject:
             seeds.update(zip(self.u, self.ud, strict=True))
         if by_time:
             seeds.update(given_by_time(self.equations.leaves))
+        for node in reachable(values):
+            if node in self.recorder.slopes:
+                slopes, by = zip(*self.recorder.slopes[node])
+                seeds[node] = sum(slope * rate for slope, rate in zip(slopes, forward(self.recorder, by, seeds)))
         return forward(self.recorder, list(values), seeds)
 
     def by(self, entries: list[Any], leaf: Any) -> list[Any]:

@@ -267,11 +267,12 @@ def _proved_for_directions(differences: Sequence[Any], bound: int, unit_vectors:
 def rounded_directions(entries: Sequence[Any]) -> list[tuple[Fraction, ...]]:
     """Two or three numbers each, without signs, whose squares add up to one but for rounding at sixty digits."""
     left = sorted({abs(a) for node in reachable(entries) for a in node.args
-                   if isinstance(a, Fraction) and 1 / UNIT < a.denominator and abs(a) < 1}, reverse=True)
+                   if isinstance(a, Fraction) and a.denominator * UNIT > 1 and abs(a) < 1}, reverse=True)
     found: list[tuple[Fraction, ...]] = []
     for size in (2, 3):
         for group in combinations(left, size):
-            if 0 < abs(sum(a * a for a in group) - 1) < UNIT and all(a in left for a in group):
+            off = abs(sum((a * a for a in group), Fraction(-1)))
+            if 0 < off < UNIT and all(a in left for a in group):
                 found.append(group)
                 left = [a for a in left if a not in group]
     return found

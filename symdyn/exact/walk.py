@@ -52,11 +52,12 @@ class Exact:
     """
 
     def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = (),
-                 positive: Collection[Node] = (), directions: Sequence[Sequence[Fraction]] = (), of_calls: bool = False) -> None:
+                 positive: Collection[Node] = (), directions: Sequence[Sequence[Fraction]] = (),
+                 of_calls: bool = False) -> None:
         """unit_vectors: groups of leaves whose squares add up to one, such as Euler parameters; positive: leaves that are not
         negative, so that roots of their squares are themselves; directions: groups of positive numbers that are taken as any
-        numbers whose squares add up to one, also in products of two of them; of_calls: whether results of algorithms are expressed by each other where they can
-        be (Kernel.by_others).
+        numbers whose squares add up to one, also in products of two of them; of_calls: whether results of algorithms are
+        expressed by each other where they can be (Kernel.by_others).
 
         Raises TooLarge where a value exceeds the bound on terms, ZeroDivisionError where an entry divides by zero."""
         steps = reachable(entries)
@@ -75,7 +76,8 @@ class Exact:
         free_numbers = [number for direction in directions for number in direction]
         self.ring = ring = Ring(count + len(leaves) + len(free_numbers), self.sines, bound)
         self.leaves = {count + k: leaf for k, leaf in enumerate(leaves)}
-        taken_as = {number: ring.generator(count + len(leaves) + k) for k, number in enumerate(free_numbers)}
+        taken_as: dict[int | Fraction, Value] = {number: ring.generator(count + len(leaves) + k)
+                                                 for k, number in enumerate(free_numbers)}
         self.atoms: dict[int, Atom] = {}
         self._angles = angles
         number_of = {leaf: k for k, leaf in self.leaves.items()}
@@ -191,7 +193,7 @@ class Exact:
 
 
 def _generators(of_calls: bool, node: Node) -> int:
-    """The most generators that a function needs; with the results that others are expressed by, which all are needed for a call."""
+    """The most generators that a function needs; a call has one for each result that others are expressed by."""
     if node.op == "sqrt":
         return _roots(node)
     if node.op != "call":

@@ -78,7 +78,8 @@ class Catenary(Kernel):
 def potential(recorder: Recorder, seabed: bool, results: Sequence[Any], values: Sequence[Any]) -> Any:
     """Elastic and gravity potential energy over w L^2 of a line without friction, from its ends: h = dU/dx, v = dU/dz.
 
-    It is x h + z v less the complementary energy, the integral of T + e T^2 / 2 over the line. Recorded.
+    It is x h + z v less the complementary energy, the integral of T + e T^2 / 2 over the line, which h and v make stationary.
+    Recorded, with its derivatives by x, z and e.
     """
     h, v = results
     x, z, e, _ = values
@@ -87,9 +88,14 @@ def potential(recorder: Recorder, seabed: bool, results: Sequence[Any], values: 
     arc = recorder.apply("asinh", v / sure) - recorder.apply("asinh", b / sure)
     stretched = h * h + (v * v * v - b * b * b) / 3
     taut = x * h + z * v - (v * t - b * a + h * h * arc) / 2 - h * s - e * stretched / 2
-    if not seabed:
-        return taut
-    return recorder.apply("select", recorder.apply("gt", h, 0), taut, z * v - v * v / 2 - e * v * v * v / 6)
+    by_e = -stretched / 2
+    if seabed:
+        above = recorder.apply("gt", h, 0)
+        taut = recorder.apply("select", above, taut, z * v - v * v / 2 - e * v * v * v / 6)
+        by_e = recorder.apply("select", above, by_e, -v * v * v / 6)
+    if isinstance(taut, Node):
+        recorder.slopes[taut] = ((h, x), (v, z), (by_e, e))
+    return taut
 
 
 def _above_zero(recorder: Recorder, h: Any) -> Any:

@@ -38,6 +38,8 @@ class Recorder:
 
     names    node -> the name of the quantity it is, given while deriving
     checks   node -> reason: values that must be positive, such as pivots of the mass matrix
+    slopes   node -> pairs (derivative, by which value): derivatives that are known to be shorter than those by the chain rule,
+             which the steps do not tell, such as those of the potential of what is at rest; for proofs
     """
 
     def __init__(self) -> None:
@@ -46,6 +48,7 @@ class Recorder:
         self._section = ""
         self.names: dict[Node, str] = {}
         self.checks: dict[Node, str] = {}
+        self.slopes: dict[Node, tuple[tuple[Any, Any], ...]] = {}
 
     # -- leaves, names, sections
 

@@ -135,8 +135,8 @@ def test_faults(left, right, message):
 
 
 @pytest.mark.parametrize("name", [*sd.systems.names(constrained=False), "four_bar", "slider_crank", "rolling_disc", "sleigh",
-                                  "andrews_squeezer", "particle_on_moving_slope", "spatial_slider_crank", "car_axis", "floating_crane",
-                                  "bicycle"])
+                                  "andrews_squeezer", "particle_on_moving_slope", "spatial_slider_crank", "car_axis",
+                                  "floating_crane", "bicycle"])
 def test_identities_of_the_catalogue(name):
     system = sd.systems.get(name, **({"n": 3} if name == "spatial_chain" else {}))
     eq = system.augmented() if name in sd.systems.names(constrained=True) else system.recursive()
@@ -145,11 +145,11 @@ def test_identities_of_the_catalogue(name):
     assert len(proofs.claims) >= 6
 
 
-@pytest.mark.parametrize("options", [{"mooring": "linear"}, {"mooring": None, "hydrostatics": "linear", "blades": "lumped"}])
+@pytest.mark.parametrize("options", [{}, {"orientation": "parameters"}, {"mooring": "linear", "blades": "lumped"}])
 def test_identities_of_a_floating_turbine(options):
     proofs = sd.systems.floating_wind_turbine(**options).embedding().prove()
     assert proofs.proved, str(proofs)
-    assert "rate of energy is the power of the loads" in [claim.name for claim in proofs.claims]
+    assert any(claim.name == "rate of energy is the power of the loads" for claim in proofs.claims)
 
 
 def arm_about(*axes):

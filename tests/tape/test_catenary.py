@@ -14,6 +14,7 @@ from scipy.integrate import quad, solve_ivp
 
 from symdyn.backend.source import Content, render
 from symdyn.errors import EvaluationError
+from symdyn.exact.prove import zero
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import CUnit, PythonUnit
 from symdyn.tape import Recorder, Tape
@@ -22,6 +23,8 @@ from symdyn.tape.differentiate import forward
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.node import INPUT
+from symdyn.tape.passes import substitute
+from symdyn.tape.tape import reachable
 
 NAMES = ("x", "z", "e", "c")
 # x, z, e, C_B. Part of the line lies, with friction or without; none lies; slack; far too short; nearly flat.
@@ -191,6 +194,34 @@ def test_a_line_without_friction_has_a_potential(seabed: int, name: str, case: t
     points = sorted({0.0, touch, 1.0})
     energy = sum(quad(density, a, b, epsabs=1e-12, epsrel=1e-11)[0] for a, b in pairwise(points))
     assert float(found["energy"]) == pytest.approx(energy, rel=1e-9, abs=1e-11)
+
+
+@pytest.mark.parametrize("shape", ["free", "lifted", "lying", "slack"])
+def test_the_line_makes_the_potential_stationary(shape: str) -> None:
+    """By exact algebra, for any h, v, x, z and e: its derivatives by h and v are what x and z are off the line's shape."""
+    r = Recorder()
+    h, v, x, z, e = (r.leaf(name, INPUT) for name in "hvxze")
+    U = potential(r, shape != "free", (h, v), (x, z, e, 0))
+    slopes = r.slopes[U]
+    lying, hanging = {"free": (0, v - 1), "lifted": (0, v - 1), "lying": (1 - v, 0), "slack": (1 - v, 0)}[shape]
+    entries: tuple = (U, *(slope for slope, _ in slopes))
+    entries = substitute(entries, {r.apply("max", 1 - v, 0): lying, r.apply("max", v - 1, 0): hanging}, r)
+    taut = r.apply("gt", h, 0)
+    entries = substitute(entries, {r.apply("select", taut, h, 1): h}, r)
+    branch = {node: node.args[2 if shape == "slack" else 1] for node in reachable(entries) if node.op == "select"}
+    entries = substitute(entries, branch, r)
+    U, *given = entries
+    assert not [node for node in reachable(entries) if node.op in ("select", "max")]
+    along = [lying + h * (r.apply("asinh", v / h) - r.apply("asinh", hanging / h)) + e * h,
+             r.sqrt(h * h + v * v) - r.sqrt(h * h + hanging * hanging) + e * (v * v - hanging * hanging) / 2]
+    if shape == "slack":  # what hangs is straight, and the rest lies anywhere
+        along = [x, v + e * v * v / 2]
+    off = [forward(r, [U], {force: 1})[0] for force in (h, v)]
+    assert zero(r, list(zip(off, [x - along[0], z - along[1]])), 1000, positive=[h])
+    by_place = [forward(r, [U], {leaf: 1})[0] for leaf in (x, z, e)]
+    if shape == "slack":
+        by_place[0], given[0] = 0, 0  # h is zero
+    assert zero(r, list(zip(by_place, given)), 1000, positive=[h])
 
 
 def test_friction_takes_the_potential_away() -> None:
