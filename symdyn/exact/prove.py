@@ -36,8 +36,9 @@ STATES, DIGITS, SAME, ROUNDED = 12, 50, 1e-25, 1e-12
 # Of a difference that is rounding no more than this part remains with twice the digits.
 REMAINDER = 1e-10
 DECIMAL = "decimal numbers are the binary fractions next to them, with which the normal forms differ"
-# Axes of decimal numbers are divided by their length at sixty digits; that their squares add up to one is true up to this.
-UNIT = Fraction(1, 10**50)
+# Axes of decimal numbers are divided by their length at sixty digits; that their squares add up to one is true up to this. Their
+# denominators are between these, those of products of them are longer.
+UNIT, LONG = Fraction(1, 10**50), (10**50, 10**70)
 DIRECTIONS = "for axes of decimal numbers, divided by their length exactly"
 # A difference with more terms than this is not written out in a reason.
 WRITTEN = 60
@@ -267,7 +268,7 @@ def _proved_for_directions(differences: Sequence[Any], bound: int, unit_vectors:
 def rounded_directions(entries: Sequence[Any]) -> list[tuple[Fraction, ...]]:
     """Two or three numbers each, without signs, whose squares add up to one but for rounding at sixty digits."""
     left = sorted({abs(a) for node in reachable(entries) for a in node.args
-                   if isinstance(a, Fraction) and a.denominator * UNIT > 1 and abs(a) < 1}, reverse=True)
+                   if isinstance(a, Fraction) and LONG[0] < a.denominator < LONG[1] and abs(a) < 1}, reverse=True)
     found: list[tuple[Fraction, ...]] = []
     for size in (2, 3):
         for group in combinations(left, size):
