@@ -18,6 +18,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ArgumentError, UnsupportedExpression
+from symdyn.exact.common import without_common_steps
 from symdyn.exact.ring import BOUND, TooLarge
 from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.taken import recorded, value_unknown
@@ -237,6 +238,8 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         reason = "the normal forms differ, at no state that was tried do the values"
         reason += _without_relations(exact)
     except TooLarge as error:
+        if _proved_apart(pairs, differences, bound, unit_vectors, not_negative(symbols)):
+            return Proof(True)
         doubtful, exact = list(range(len(pairs))), None
         reason = f"{error}; ask for a part of it, or put numbers in place of parameters"
     except ZeroDivisionError as error:
@@ -252,6 +255,25 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         return Proof(False, True, "the values differ", index(k), where)
     difference = Writer(exact, symbols).write(exact.values[k])
     return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _proved_apart(pairs: Sequence[tuple[Any, Any]], differences: Sequence[Any], bound: int,
+                  unit_vectors: Sequence[Sequence[Node]], positive: Collection[Node]) -> bool:
+    """Whether exact algebra proves each difference zero, for any values of what the sides have in common, or alone; no is no
+    refutation."""
+    left = list(differences)
+    try:
+        short, leaves = without_common_steps(pairs, differences)
+        groups = [[leaves[leaf] for leaf in group] for group in unit_vectors if all(leaf in leaves for leaf in group)]
+        known = {leaves[leaf] for leaf in positive if leaf in leaves}
+        values = Exact(short, bound, groups, known, of_calls=True).values
+        left = [difference for difference, value in zip(differences, values) if len(value.num)]
+    except (TooLarge, ZeroDivisionError):
+        pass
+    try:
+        return not any(len(Exact([e], bound, unit_vectors, positive, of_calls=True).values[0].num) for e in left)
+    except (TooLarge, ZeroDivisionError):
+        return False
 
 
 def _proved_for_directions(differences: Sequence[Any], bound: int, unit_vectors: Sequence[Sequence[Node]],
