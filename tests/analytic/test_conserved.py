@@ -1,5 +1,7 @@
 """What is reported as conserved is constant along simulated motions, and textbook integrals are found."""
 
+import math
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -135,9 +137,21 @@ def test_loads_that_depend_on_reactions_are_rejected():
         system.embedding().conserved()
 
 
-def test_decimal_numbers_decide_nothing():
-    found = sd.systems.get("bicycle").augmented().conserved(undriven=True)
+def test_rounding_of_decimal_numbers_decides_nothing():
+    system = sd.System("arm")
+    m, c = sd.parameters("m c")
+    last = system.ground
+    for k, axis in enumerate(([math.sin(0.3), 0, math.cos(0.3)], [0, math.cos(1.1), math.sin(1.1)])):
+        body = system.add_body(f"link{k}", mass=m, inertia=[m, 2 * m, 3 * m], com=[c, 0, 0])
+        system.add_joint(sd.Revolute(f"joint{k}", last, body, sd.coordinates(f"q{k}"), axis=axis))
+        last = body
+    found = system.recursive().conserved()
     assert "energy: not decided, the sides differ by no more than the rounding of decimal numbers" in str(found)
+
+
+def test_axes_of_decimal_numbers_are_taken_as_of_unit_length():
+    found = sd.systems.get("bicycle").augmented().conserved(undriven=True)
+    assert "proved: for axes of decimal numbers, divided by their length exactly" in str(found)
     driven = sd.systems.get("floating_crane").recursive()
     assert "energy" in str(driven.conserved())
     mixed = sd.systems.get("bicycle").augmented().conserved()
