@@ -41,6 +41,8 @@ DECIMAL = "decimal numbers are the binary fractions next to them, with which the
 # denominators are between these, those of products of them are longer.
 UNIT, LONG = Fraction(1, 10**50), (10**50, 10**70)
 DIRECTIONS = "for axes of decimal numbers, divided by their length exactly"
+# Terms that a product may have where what both sides share is replaced: where that suffices, normal forms are short.
+SHARED = 20_000
 # A difference with more terms than this is not written out in a reason.
 WRITTEN = 60
 
@@ -266,7 +268,7 @@ def _proved_apart(pairs: Sequence[tuple[Any, Any]], differences: Sequence[Any], 
         short, leaves = without_common_steps(pairs, differences)
         groups = [[leaves[leaf] for leaf in group] for group in unit_vectors if all(leaf in leaves for leaf in group)]
         known = {leaves[leaf] for leaf in positive if leaf in leaves}
-        values = Exact(short, bound, groups, known, of_calls=True).values
+        values = Exact(short, min(bound, SHARED), groups, known, of_calls=True).values
         left = [difference for difference, value in zip(differences, values) if len(value.num)]
     except (TooLarge, ZeroDivisionError):
         pass
