@@ -159,7 +159,7 @@ def test_what_to_install(name: str, package: str, program: str, monkeypatch: pyt
 def test_wheel_without_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     installed("cvode")
     monkeypatch.setattr(sundials, "_PARTS", ("core", "nothing"))
-    assert sundials.installed() == ("the libraries libsundials_nothing and so on were not found beside scikit-sundae; take its "
+    assert sundials.installed() == ("the libraries libsundials_nothing and so on were not found next to scikit-sundae; take its "
                                     "wheel: pip install scikit-sundae")
 
 

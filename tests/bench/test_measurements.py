@@ -75,7 +75,7 @@ def test_a_missed_bound_is_a_failure_and_what_is_not_given_is_left_out(monkeypat
     (["pendulum", "loops"], "loops is a measurement of its own, which comes first and alone: symdyn bench loops"),
     (["--progress", "growth"], "growth is a measurement of its own"),
     (["pendulm"], "there is no mechanism 'pendulm'; did you mean pendulum"),
-    (["figures", "--only", "chian"], "there is no group chian of figures; did you mean chain? There are chain, long_chain"),
+    (["figures", "--only", "chian"], "there is no group chian of figures; did you mean chain? There are chain, compilation, "),
     (["flexible", "--only", "of_no_kind_at_all"], "there is no group of_no_kind_at_all of figures; there are rotating_beam"),
     (["sweep", "--count", "9"], "9 motions were asked for; pass 10 or more"),
     (["references", "nothing_of_the_kind"], "there is no mechanism 'nothing_of_the_kind'; there are pendulum"),

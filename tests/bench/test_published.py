@@ -195,7 +195,7 @@ def test_a_stopped_run_goes_on_where_it_was(monkeypatch, tmp_path, capsys):
     before, after = ([(r["tolerance"], r["error"]) for r in m["mechanisms"][1]["lines"][0]["runs"]] for m in (data, whole))
     assert before == after and any(r["seconds"] for r in whole["mechanisms"][1]["lines"][0]["runs"])
     looked[:] = []
-    with pytest.raises(KeyboardInterrupt):  # it was complete: measured anew
+    with pytest.raises(KeyboardInterrupt):  # it was complete: measured again
         published.run(None, [], 1, None, tmp_path)
     looked[:] = []
     with pytest.raises(KeyboardInterrupt):  # other repeats: nothing of it is taken

@@ -180,7 +180,7 @@ def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
     result = run(about, asked, tmp_path)
     assert len(more) == 4 and [r.tolerance for r in result.rows] == [1e-4, 1e-7, 1e-10] and not result.earlier
     assert {r.key: r.error for r in made}.items() <= {r.key: r.error for r in result.rows}.items()
-    run(about, asked, tmp_path)  # complete: measured anew
+    run(about, asked, tmp_path)  # complete: measured again
     assert len(more) == 7
 
 
@@ -256,7 +256,7 @@ def test_what_was_done_before_a_stop_is_kept(pair, drawn, monkeypatch, capsys):
     assert main([*arguments, "--budget", "1e-9"]) == 0  # nothing new; what there is is shown
     told = capsys.readouterr()
     when = json.loads(before)["timed"]
-    assert f"all of it was measured in an earlier run, of {when}; to have it measured anew delete {first}" in told.out
+    assert f"all of it was measured in an earlier run, of {when}; to have it measured again delete {first}" in told.out
     assert made == [] and "double_pendulum was not begun" in told.err and first.read_text() == before
     assert main(arguments) == 0
     told = capsys.readouterr().out
@@ -265,7 +265,7 @@ def test_what_was_done_before_a_stop_is_kept(pair, drawn, monkeypatch, capsys):
     page = (folder / "report.html").read_text()
     assert "pendulum" in page and "double_pendulum" in page
     made[:] = []
-    main(arguments)  # all of it was done: measured anew
+    main(arguments)  # all of it was done: measured again
     assert made == ["pendulum", "double_pendulum"] and "earlier run" not in capsys.readouterr().out
     # Something else is asked for, or the code is another: nothing of it is taken.
     second.unlink()

@@ -54,7 +54,7 @@ def test_a_narrower_command_keeps_what_a_later_one_goes_on_with(bench, tmp_path,
     assert made == [("embedding", 1e-12)] and {r.tolerance for r in both.earlier} == {*WIDE, *NARROW}
     assert {r.key: r.least for r in wide.rows}.items() <= {r.key: r.least for r in both.rows}.items()
     assert stored(tmp_path) == {"": {("embedding", t) for t in (*WIDE, *NARROW, 1e-12)}}
-    # All of it was done: measured anew.
+    # All of it was done: measured again.
     again, made = bench((*WIDE, *NARROW, 1e-12))
     assert len(made) == 5 and not again.earlier
     monkeypatch.setattr(resume, "code", lambda: "another")
