@@ -168,7 +168,7 @@ class Linearized:
         done = iter(substitute(tuple(flat), put, recorder))
         nodes = {name: vector(*[next(done) for _ in range(value.size)]).reshape(value.shape)
                  for name, value in self.nodes.items()}
-        about = {key: sp.sympify(value).subs({self.symbols[known[name_of(k)]]: v for k, v in values.items()})
+        about = {key: sp.sympify(value, strict=True).subs({self.symbols[known[name_of(k)]]: v for k, v in values.items()})
                  for key, value in self.about.items()}
         return replace(self, nodes=nodes, about=about, symbols=more.symbols, _written={})
 
@@ -328,7 +328,7 @@ class _Linearization:
         s = equations.symbols
         names = s.coordinates if m.plain else s.speeds
         independent = [k for k in free if k not in self.dependent]
-        about = {key: sp.sympify(value) for key, value in self.about.items()}
+        about = {key: sp.sympify(value, strict=True) for key, value in self.about.items()}
         return Linearized(equations.name, tuple(names[k] for k in independent), s.inputs, s.states, about, nodes, self.symbols)
 
     def _by(self, entries: Any, leaves: Sequence[Node]) -> np.ndarray:
