@@ -16,7 +16,7 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.runtime.building.compiler import plain, require_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.library import Unit, loaded
 
 
 class Libraries:
@@ -65,11 +65,10 @@ class Libraries:
             source = self.rhs if what == RightSide() else self._source(what)
             self._made[key] = next(iter(source.files.values())), source.metadata
         text, metadata = self._made[key]
-        if self.backend == "c":
-            compiler = require_compiler()
-            seldom = isinstance(what, str) and groups.seldom_called(what)
-            return CUnit(text, metadata, plain(compiler) if seldom else compiler)
-        return PythonUnit.from_source(text, metadata.name)
+        compiler = require_compiler() if self.backend == "c" else None
+        if compiler is not None and isinstance(what, str) and groups.seldom_called(what):
+            compiler = plain(compiler)
+        return loaded(text, metadata, compiler)
 
     def _holder(self, what: str | RightSide) -> str:
         """The key of what was made with a function; other right-hand sides than the plain one have a "rhs" of their own."""

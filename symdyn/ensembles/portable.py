@@ -13,7 +13,7 @@ from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.errors import SymdynError
 from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.library import Unit, loaded
 from symdyn.runtime.module import Module
 
 
@@ -87,9 +87,8 @@ def _module(backend: str, packed: bytes) -> Module:
             label = what if isinstance(what, str) else what.label
             raise NotSent(f"{metadata.name}: {label} was not sent along; it was not used by the samples that were tried in "
                           "advance. Name it in `functions`")
-        source, of_unit = units[there]["source"], Metadata.of_plain(units[there]["metadata"])
-        return (CUnit(source, of_unit, require_compiler()) if backend == "c"
-                else PythonUnit.from_source(source, of_unit.name))
+        compiler = require_compiler() if backend == "c" else None
+        return loaded(units[there]["source"], Metadata.of_plain(units[there]["metadata"]), compiler)
 
     metadata = ModuleMetadata.of_plain(record["metadata"])
     return Module(metadata, provide, backend)

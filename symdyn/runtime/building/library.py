@@ -224,6 +224,14 @@ class PythonUnit:
             return np.stack([np.broadcast_to(r, t.shape) for r in result], axis=-1)
 
 
+def loaded(text: str, metadata: Metadata, compiler: Compiler | None) -> Unit:
+    """Generated text as loaded code: C by a compiler, a Python module without one.
+
+    Raises CompileError where the compiler rejects the text, CacheError where the cache folder does not take it.
+    """
+    return PythonUnit.from_source(text, metadata.name) if compiler is None else CUnit(text, metadata, compiler)
+
+
 class RowsError(Exception):
     """Why some of many rows cannot be evaluated; first: of these rows the first."""
 

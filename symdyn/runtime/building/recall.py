@@ -21,7 +21,7 @@ from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler, find_compiler, no_compiler_reason, require_compiler
-from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
+from symdyn.runtime.building.library import Unit, loaded
 from symdyn.runtime.building.stored import read_sealed, write_sealed
 from symdyn.runtime.module import Module
 
@@ -70,11 +70,7 @@ class _Memory:
         """A unit from the record, else a derived one, which is put into it."""
         units, key = self.record["units"], key_of(what)
         if key in units:
-            source, metadata = units[key]["source"], Metadata.of_plain(units[key]["metadata"])
-            if self.backend == "c":
-                assert self.compiler is not None
-                return CUnit(source, metadata, self.compiler)
-            return PythonUnit.from_source(source, metadata.name)
+            return loaded(units[key]["source"], Metadata.of_plain(units[key]["metadata"]), self.compiler)
         unit: Any = self.derived.unit(what)
         units[key] = {"source": unit.source, "metadata": unit.metadata.as_plain()}
         self._write()
