@@ -45,7 +45,9 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
         as_path(templates, "of the templates", "my_templates")
     names = groups.written(equations, functions, method if integrator and backend == "c" else None)
     with collector_paused():
-        content = content_of(equations, names, standalone, bound, RightSide(work, baumgarte, method))
+        # The self-test of a file that stands alone exercises its statements one by one.
+        columns = backend == "c" and not standalone and templates is None
+        content = content_of(equations, names, standalone, bound, RightSide(work, baumgarte, method), columns)
         return render(content, backend, templates, standalone, integrator, batch, method, states)
 
 

@@ -75,6 +75,7 @@ class Dialect:
     sincos       sines and cosines taken all at once; None where each is an operation like any other
     call         how numeric algorithms are called; None if the language has none
     parts        how long functions are divided; None if they are not
+    read         format of an assignment of what does not depend on a direction, where statements are those of directions
     zeros        a statement that makes all {n} results zero, before the others of many zeros; None: each is stored
     madd         format of {0}*{1} + {2} in one step; None where a product and a sum are written as they are
     """
@@ -94,6 +95,7 @@ class Dialect:
     parts: Parts | None = None
     call: Call | None = None
     zeros: str | None = None
+    read: str | None = None
 
     def number(self, value: float) -> str:
         """A literal that reads back as exactly this double."""
@@ -118,7 +120,7 @@ def read_dialect(folder: Path) -> Dialect:
         raise SymdynError(f"{path} is not a complete dialect; {'; '.join(faults)}")
     _check_formats(path, table)
     fields = {key: table[key] for key in ("operations", "assign", "load", "store", "check", "comment", "literal", "first",
-                                          "files", "madd", "zeros") if key in table}
+                                          "files", "madd", "zeros", "read") if key in table}
     return Dialect(folder.name, **fields, sincos=SinCos(**table["sincos"]) if "sincos" in table else None,
                    parts=Parts(**table["parts"]) if "parts" in table else None,
                    call=Call(**table["call"]) if "call" in table else None)
@@ -133,6 +135,7 @@ def _check_formats(path: Path, table: dict[str, Any]) -> None:
         *[(f"load.{group}", text, {"k": 0}) for group, text in table["load"].items()],
         *[("operations.madd", table["madd"], {}) for _ in range("madd" in table)],
         *[("zeros", table["zeros"], {"n": 1}) for _ in range("zeros" in table)],
+        *[("read", table["read"], {"name": "a", "value": "b"}) for _ in range("read" in table)],
         *[(f"operations.{op}", text, {}) for op, text in table["operations"].items()],
         *[(f"files.{template}", text, {"name": "a"}) for template, text in table["files"].items()]]
     faults = [f"load.{group} is missing" for group in LOADED if group not in table["load"]]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from symdyn.tape.node import Node
 
-ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c")
+ARGUMENTS = ("t", "q", "u", "z", "ud", "inputs", "p", "c", "v", "change")
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class Function:
     regular, otherwise   for a function that is tried in one way and, where that fails, done in another: both, in place of
                 statements of its own
     inlined     steps that are written where they are used: which products and sums become one depends on it
+    values      of a Jacobian by several columns at once: the function that computes what all columns share, n_v numbers v
+    along       and for each group of arguments the derivatives along a direction in it
     """
 
     name: str
@@ -58,6 +60,8 @@ class Function:
     regular: Function | None = None
     otherwise: Function | None = None
     inlined: frozenset[Node] = frozenset()
+    values: Function | None = None
+    along: tuple[Along, ...] = ()
 
     @property
     def size(self) -> int:
@@ -71,3 +75,16 @@ class Function:
     def count(self) -> int:
         """Operations of one evaluation."""
         return sum(self.operations.values())
+
+
+@dataclass(frozen=True)
+class Along:
+    """The derivatives along a direction in one group of arguments, on vectors with a direction in each lane.
+
+    first, n    the columns of the Jacobian; n is the number of entries of a direction, too
+    function    takes numbers, and the direction in the group `change`
+    """
+
+    first: int
+    n: int
+    function: Function

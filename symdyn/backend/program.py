@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from symdyn.backend.columns import Columns, seeds_of
 from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
-from symdyn.backend.function import ARGUMENTS, Function, Part
+from symdyn.backend.function import ARGUMENTS, Along, Function, Part
 from symdyn.backend.user_functions import called
 from symdyn.backend.writer import STOPPING, Writer, checks_of, cores_of
 from symdyn.tape.external import UserFunction
-from symdyn.tape.node import Node
-from symdyn.tape.tape import Tape, count_of, unsigned
+from symdyn.tape.node import SEED, Node
+from symdyn.tape.tape import Output, Tape, count_of, reachable, unsigned
 
 # Ends of the names of the two ways of a function that is tried in one way first.
 REGULAR, OTHERWISE = "regular", "singular"
@@ -40,14 +41,16 @@ class Program:
 
 
 def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str], places: Mapping[str, tuple[str, int]],
-          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None, like: Program | None = None) -> Program:
+          reasons: Sequence[str] = (), otherwise: Mapping[str, Tape] | None = None, like: Program | None = None,
+          columns: Mapping[str, Columns] | None = None, vectors: Dialect | None = None) -> Program:
     """Write every tape (function name -> tape with one output) in the dialect.
 
     places      leaf name -> (group, place in it)
     otherwise   function name -> the tape for where the first one fails
     like        the same in another dialect, whose rounding this one is to have
+    columns     Jacobians whose tapes are derivatives along directions; vectors: the dialect of these
     """
-    otherwise = otherwise or {}
+    otherwise, columns = otherwise or {}, columns or {}
     whole = Tape(next(iter(tapes.values())).recorder,
                  {name: next(iter(tape.outputs.values())) for name, tape in
                   [*tapes.items(), *((f"{name}_{OTHERWISE}", tape) for name, tape in otherwise.items())]})
@@ -60,10 +63,17 @@ def build(dialect: Dialect, tapes: Mapping[str, Tape], titles: Mapping[str, str]
     hoisted = {node: ("c", k) for node, k in constants.items()}
     inlined = {w.name: w.inlined for f in like.functions for w in (f, f.regular, f.otherwise) if w} if like else {}
     write = partial(_function, dialect, places=places, hoisted=hoisted, codes=codes, late=late, inlined=inlined)
+
+    def written(name: str, tape: Tape, called: str) -> Function:
+        if name in columns and vectors is not None:
+            return _columns(columns[name], called, titles[name], write, partial(
+                _function, vectors, codes=codes, late=set(), inlined={}), places, hoisted)
+        return write(tape, name=called, title=titles[name])
+
     functions = tuple(
-        _either(name, titles[name], write(tape, name=f"{name}_{REGULAR}", title=titles[name]),
+        _either(name, titles[name], written(name, tape, f"{name}_{REGULAR}"),
                 write(otherwise[name], name=f"{name}_{OTHERWISE}", title=titles[name])) if name in otherwise
-        else write(tape, name=name, title=titles[name]) for name, tape in tapes.items())
+        else written(name, tape, name) for name, tape in tapes.items())
     prologue = Writer(dialect, whole, places, {}, codes, late).prologue(constants)
     return Program(functions, prologue, len(constants), tuple(codes), *_kernels(whole))
 
@@ -100,16 +110,45 @@ def _kernels(tape: Tape) -> tuple[dict[str, tuple[int, ...]], tuple[UserFunction
     return largest, called(tape), frozenset(name for name, found in sizes.items() if len(found) == 1)
 
 
+def _columns(columns: Columns, name: str, title: str, write: Callable[..., Function], write_vectors: Callable[..., Function],
+             places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]]) -> Function:
+    """A Jacobian as a function of what all columns share, and functions of directions."""
+    tape = columns.tape
+    moving = [node for node in tape.steps if node.mask & SEED]
+    shared = dict.fromkeys(core for node in moving for core in cores_of(node.args)
+                           if not core.mask & SEED and core.mask and core.op != "leaf" and core not in hoisted)
+    values = write(Tape(tape.recorder, {"v": Output("v", (len(shared),), tuple(shared))}), name=f"{name}_values", title=title,
+                   dividing=moving)
+    stored = {**hoisted, **{node: ("v", k) for k, node in enumerate(shared)}}
+    along = []
+    for k, group in enumerate(columns.groups):
+        entries = columns.entries(k)
+        part = Tape(tape.recorder, {"along": Output("along", (len(entries),), entries)})
+        function = write_vectors(part, hoisted=stored, name=f"{name}_along_{group.name}", title=title,
+                                 places={**places, **seeds_of(group)}, body=[n for n in reachable(entries) if n.mask & SEED])
+        along.append(Along(group.first, len(group.seeds), function))
+    groups = {g for f in (values, *[a.function for a in along]) for g in f.arguments}
+    operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
+    return Function(name, title, (columns.n_rows, columns.n), tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
+                    (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along))
+
+
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],
               codes: Mapping[str, int], late: set[Node], name: str, title: str,
-              inlined: Mapping[str, frozenset[Node]]) -> Function:
-    """One function, in parts if it is long and the dialect divides long ones."""
+              inlined: Mapping[str, frozenset[Node]], body: Sequence[Node] | None = None,
+              dividing: Sequence[Node] = ()) -> Function:
+    """One function, in parts if it is long and the dialect divides long ones.
+
+    body       its steps; None: all that run
+    dividing   steps of other functions whose divisors are checked here
+    """
     wanted = inlined.get(name)
     output = next(iter(tape.outputs.values()))
     running = {*tape.running, *late}
-    body = [n for n in tape.steps if n in running and n not in hoisted and n.op != "leaf"]
+    taken = tape.steps if body is None else body
+    body = [n for n in taken if n in running and n not in hoisted and n.op != "leaf"]
     operations = count_of(body)
-    checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in late)])
+    checks = checks_of(tape, [*tape.running, *(n for n in tape.prologue if n in late), *dividing])
     if dialect.parts is None or len(body) <= dialect.parts.whole:
         writer = Writer(dialect, tape, places, hoisted, codes, late, wanted)
         part = writer.part(body, output.entries, writer.results_of(output.entries), checks)

@@ -19,6 +19,7 @@ import numpy as np
 import symdyn
 from symdyn import panels
 from symdyn.backend.batch import Batch, batch_of
+from symdyn.backend.columns import Columns
 from symdyn.backend.dialect import Dialect, identifier, read_dialect
 from symdyn.backend.function import Function, Part
 from symdyn.backend.integrated import Shape, functions, switches
@@ -39,7 +40,8 @@ from symdyn.tape.tape import Output, Tape
 from symdyn.turning import is_angle, turns
 
 _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z": "const double *z",
-           "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c"}
+           "ud": "const double *ud", "inputs": "const double *inputs", "p": "const double *p", "c": "const double *c",
+           "v": "const double *v", "change": "const symdyn_vector *change"}
 # What the integrator keeps a state on its constraints with, if the unit has all: of positions, of speeds, and their scale.
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
@@ -57,6 +59,7 @@ class Content:
     otherwise     tapes by function name for where the first ones fail
     events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
+    columns       Jacobians whose tapes are derivatives along directions
     """
 
     name: str
@@ -73,6 +76,7 @@ class Content:
     otherwise: Mapping[str, Tape] = field(default_factory=dict)
     events: Sequence[EventRecord] = ()
     event_leaves: Sequence[int] = ()
+    columns: Mapping[str, Columns] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,9 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
-    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise)
+    vectors = read_dialect(folder / "columns") if content.columns else None
+    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.columns,
+                    vectors=vectors)
     lanes = None
     if batch and backend == "c" and "rhs" in content.tapes:
         shipped = next(f / backend / "batch" for f in folders if (f / backend / "batch" / "dialect.toml").is_file())
@@ -215,13 +221,16 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
     # A file with the name of a standard module would be imported in its place by whatever runs beside it.
     # The runtime in C has names that begin with symdyn_.
     name = identifier(content.name, {"symdyn", *sys.stdlib_module_names})
-    written = [way for f in program.functions for way in (f, f.regular, f.otherwise) if way is not None]
+    written = [way for f in program.functions for way in _ways(f)]
     calls = {f.name: ", ".join([*f.arguments, "out"]) for f in written}
     reference = make_reference(content.tapes, groups, content.defaults, calls, content.otherwise, states) if standalone else None
     uses = {f.name: f.arguments for f in program.functions}
 
     def signature(f: Function) -> str:
         return ", ".join([_C_TYPE[g] for g in f.arguments] + ["double *out"])
+
+    def along_signature(part: Function | Part) -> str:
+        return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
 
     def part_signature(part: Part) -> str:
         return "".join(f"{_C_TYPE[g]}, " for g in part.arguments)
@@ -279,6 +288,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "parameters": list(groups["p"]), "metadata": _metadata_lines(metadata),
         "metadata_record": metadata, "n_q": sizes["q"], "n_u": sizes["u"], "n_z": sizes["z"], "n_x": n_x,
         "n_in": sizes["inputs"], "signature": signature, "part_signature": part_signature, "part_call": part_call,
+        "along_signature": along_signature, "uses_columns": any(f.along for f in written),
         "lanes": lanes, "lanes_signature": lanes_signature, "lanes_call": lanes_call,
         "one_call": ", ".join([*("time" if g == "t" else state(g, "one") for g in uses.get("rhs", ())), "result"]),
         "uses_parts": any(f.parts for f in written), "call": lambda f: calls[f.name],
@@ -293,6 +303,12 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "projects": projection is not None or bool(content.unit_groups),
         "tables": _tables(content),
     }
+
+
+def _ways(f: Function) -> list[Function]:
+    """A function and those that it calls."""
+    called = [way for way in (f.regular, f.otherwise, f.values) if way is not None] + [a.function for a in f.along]
+    return [f, *[inner for way in called for inner in _ways(way)]]
 
 
 def _metadata_lines(metadata: Metadata) -> list[tuple[str, str]]:

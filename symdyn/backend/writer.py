@@ -13,10 +13,11 @@ from symdyn.backend.function import ARGUMENTS, Function, Part, Section
 from symdyn.backend.printer import Printer
 from symdyn.errors import SymdynError
 from symdyn.tape.external import UserFunction
-from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SPEED, STATE, TIME, Node, is_zero
+from symdyn.tape.node import ACCELERATION, COORDINATE, INPUT, PARAMETER, SEED, SPEED, STATE, TIME, Node, is_zero
 from symdyn.tape.tape import Tape, count_of, reachable, unsigned
 
-GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p"}
+GROUPS = {TIME: "t", COORDINATE: "q", SPEED: "u", STATE: "z", ACCELERATION: "ud", INPUT: "inputs", PARAMETER: "p",
+          SEED: "change"}
 # Operations that may stop a function.
 STOPPING = ("call", "guard")
 _INLINE_LENGTH = 72
@@ -115,10 +116,11 @@ class Writer:
         for node in sorted((n for n in used if n in self.stored), key=lambda n: self.stored[n]):
             group, place = self.stored[node]
             self.groups.add(group)
-            unnamed = f"k{place + 1}" if group == "c" else f"w{place + 1}"
+            unnamed = f"k{place + 1}" if group == "c" else f"{group}{place + 1}"
             self.text[node] = identifier(self.names.get(node, unnamed), self.taken)
-            load = self.dialect.load["c"] if group == "c" else self.dialect.parts.load  # type: ignore[union-attr]
-            lines.append(self.dialect.assign.format(name=self.text[node], value=load.format(k=place + self.dialect.first)))
+            handed_on = "" if self.dialect.parts is None else self.dialect.parts.load
+            load = self.dialect.load.get(group, handed_on)
+            lines.append(self._assignment(node, load.format(k=place + self.dialect.first)))
             if node in self.demanded and node in self.checks:
                 lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
         return lines
@@ -135,9 +137,14 @@ class Writer:
     def _assign(self, node: Node, name: str, value: str, lines: list[str]) -> None:
         """A variable for a node, and what is demanded of it."""
         self.text[node] = identifier(name, self.taken)
-        lines.append(self.dialect.assign.format(name=self.text[node], value=value))
+        lines.append(self._assignment(node, value))
         if node in self.checks:
             lines.append(self.dialect.check.format(name=self.text[node], code=self.codes[self.checks[node]]))
+
+    def _assignment(self, node: Node, value: str) -> str:
+        """The line that assigns to the variable of a node."""
+        form = self.dialect.assign if self.dialect.read is None or node.mask & SEED else self.dialect.read
+        return form.format(name=self.text[node], value=value)
 
     # -- sines and cosines
 

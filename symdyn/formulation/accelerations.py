@@ -14,8 +14,12 @@ from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.linearization import Varied
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.spatial.vectors import vector
+from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.passes import substitute
+
+# A residual that is zero, leaves in it that stand for unknowns with their values, and what solves for the change of u_dot.
+Implicit = tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]
 
 
 class Solver(Protocol):
@@ -55,7 +59,8 @@ class Motion:
             "accelerations": self.accelerations, "rates": lambda: vector(*self.rates), "N": self.N, "rhs": self.rhs,
             "jacobian_x": lambda: self.jacobian(self.x()),
             "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
-            "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters))}
+            "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters)),
+            **{f"rhs_along_{group}": partial(self.along, group) for group in self.moving()}}
         shared = ("M_tilde", "bias", "accelerations")
         return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
                 **Varied(self).quantities()}
@@ -137,14 +142,13 @@ class Motion:
         rates = forward(self.algebra.recorder, values.ravel().tolist(), self.by_time())
         return vector(*rates).reshape(values.shape)
 
-    def implicit(self) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
+    def implicit(self) -> Implicit:
         """A residual r that is zero, leaves in it that stand for accelerations with their values, and the solver that gives the
         change of u_dot from -dr at constant leaves: here r = M_tilde u_dot + k_tilde - F_tilde."""
         ud, solver = self.recall("accelerations"), self.recall("solver")
         return self.inverse_dynamics().tolist(), dict(zip(self.speed_rates, ud, strict=True)), solver.solve
 
-    def jacobian(self, by: Sequence[Any],
-                 implicit: tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]] | None = None) -> np.ndarray:
+    def jacobian(self, by: Sequence[Any], implicit: Implicit | None = None) -> np.ndarray:
         """d x_dot / d by, exact.
 
         Accelerations are differentiated implicitly, so that the factorization is not differentiated: by `implicit` if given,
@@ -162,5 +166,33 @@ class Motion:
             bottom = jacobian(recorder, self.state_rates(), by, "forward")
             return np.vstack([top, middle, bottom])
 
+    def moving(self) -> dict[str, list[Any]]:
+        """The leaves that x_dot is differentiated by, by group of arguments."""
+        groups = {"q": self.coordinates, "u": self.speeds, "z": [z for z, _ in self.states], "inputs": self.inputs,
+                  "p": self.parameters}
+        return {group: self._leaves(symbols) for group, symbols in groups.items()}
+
+    def seeds(self, group: str) -> dict[Any, Any]:
+        """The leaves of a group with leaves that stand for a direction in it."""
+        recorder = self.algebra.recorder
+        return {leaf: recorder.leaf(seed_name(leaf.args[1]), kinds.SEED) for leaf in self.moving()[group]}
+
+    def along(self, group: str, implicit: Implicit | None = None) -> np.ndarray:
+        """The derivative of x_dot along a direction in one group of arguments, (n_x,), exact; the direction is an argument, too.
+
+        Accelerations are differentiated as in `jacobian`.
+        """
+        recorder, seeds = self.algebra.recorder, self.seeds(group)
+        self.recall("accelerations")  # under its own headings
+        with self.algebra.section("derivative along the direction"):
+            residual, at, solve = implicit or self.implicit()
+            change = vector(*substitute(tuple(forward(recorder, residual, seeds)), at, recorder))
+            return vector(*forward(recorder, self.rates, seeds), *solve(-change), *forward(recorder, self.state_rates(), seeds))
+
     def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
         return [self.algebra.leaves[s] for s in symbols]
+
+
+def seed_name(name: str) -> str:
+    """The name of an argument's entry in a direction; no symbol can have it."""
+    return f"(change of {name})"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from symdyn.backend.metadata import Chart, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
@@ -14,7 +14,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.table import FUNCTIONS, title_of
-from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
+from symdyn.functions.tapes import columns_of, given_rates, has_function, switches, tapes_of
 from symdyn.model.symbols import GivenMotion
 from symdyn.shown import name_of
 from symdyn.tape.balance import balance
@@ -29,17 +29,21 @@ WORK = "(work)"
 
 
 def content_of(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
-               right_side: RightSide) -> Content:
+               right_side: RightSide, columns: bool = False) -> Content:
     """What a backend takes to emit the named functions.
 
     standalone   with what is documented in a file that is written
     bound        parameters that become numbers in the code, by name
+    columns      whether Jacobians may be directional derivatives, several columns at once
     """
     symbols = equations.symbols
-    tapes = tapes_of(equations, names, right_side)
+    found = {name: columns_of(equations, name, right_side) for name in names} if columns else {}
+    several = {name: made for name, made in found.items() if made is not None}
+    one_by_one = tapes_of(equations, [n for n in names if n not in several], right_side)
+    tapes = {n: several[n].tape if n in several else one_by_one[n] for n in names}
     if equations.otherwise is not None:
         there = tapes_of(equations.otherwise, names, right_side)
-        differ = {n: t for n, t in there.items() if _entries(t) != _entries(tapes[n])}
+        differ = {n: t for n, t in there.items() if n in several or _entries(t) != _entries(tapes[n])}
         tapes |= {f"{n} otherwise": t for n, t in differ.items()}
     if bound:
         tapes = _together(tapes, lambda whole: specialize(whole, bound))
@@ -55,7 +59,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
                    [[q.name for q in group] for group in equations.unit_groups], otherwise,
-                   event_records(equations) if "events" in names else (), event_leaves(equations) if BOUNDS in names else ())
+                   event_records(equations) if "events" in names else (), event_leaves(equations) if BOUNDS in names else (),
+                   {name: replace(made, tape=tapes[name]) for name, made in several.items()})
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symdyn.backend.columns import Columns, Group
 from symdyn.backend.right_side import RightSide
+from symdyn.formulation.accelerations import seed_name
 from symdyn.formulation.constraints.motion import residual_names
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
@@ -68,6 +70,39 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
             by_x = np.column_stack([by_x, np.zeros(len(by_x), dtype=object)])
         tapes["jacobian_x"] = Tape.of(equations.recorder, jacobian_x=by_x)
     return tapes
+
+
+def columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
+    """The derivatives along directions that a Jacobian of x_dot consists of; None where its columns one by one take less, and for
+    other functions."""
+    groups = _GROUPS.get(name)
+    field = "rhs_baumgarte" if right_side.baumgarte else "rhs"
+    if groups is None or f"{field}_along_q" not in equations.quantities:
+        return None
+    work = right_side.work and name == "jacobian_x"
+    made: list[Group] = []
+    entries: list[np.ndarray] = []
+    first = 0
+    for group, leaves in zip(groups, _names(equations, groups), strict=True):
+        if leaves:
+            made.append(Group(group, tuple(map(seed_name, leaves)), first))
+            entries += [equations.quantity(f"{field}_along_{group}"), *[equations.quantity(f"power_along_{group}")] * work]
+            first += len(leaves)
+    if not made:
+        return None
+    n_rows = sum(map(len, entries)) // len(made)
+    tape = Tape.of(equations.recorder, **{name: np.concatenate(entries)})
+    columns = Columns(tape, tuple(made), n_rows, first + work)  # nothing depends on the work
+    return columns if columns.pays() else None
+
+
+_GROUPS = {"jacobian_x": ("q", "u", "z"), "jacobian_inputs": ("inputs",), "jacobian_params": ("p",)}
+
+
+def _names(equations: Equations, groups: Sequence[str]) -> list[list[str]]:
+    symbols = equations.symbols
+    held = {"q": symbols.coordinates, "u": symbols.speeds, "z": symbols.states, "inputs": symbols.inputs, "p": symbols.parameters}
+    return [[s.name for s in held[group]] for group in groups]
 
 
 def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:

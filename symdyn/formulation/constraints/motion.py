@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.accelerations import Motion
+from symdyn.formulation.accelerations import Implicit, Motion
 from symdyn.formulation.constraints.null_space import NullSpaceSolver
 from symdyn.formulation.constraints.rows import Row
 from symdyn.formulation.constraints.saddle import KernelSolver, RangeSolver, SaddleSolver, SubsetSolver, least_multipliers
@@ -66,6 +66,7 @@ class Constrained(Motion):
             "C_scale": self.C_scale, "length": lambda: self.length,
             "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
             "rhs_baumgarte": self.rhs_baumgarte, "jacobian_x_baumgarte": self.jacobian_x_baumgarte,
+            **{f"rhs_baumgarte_along_{group}": partial(self.along_baumgarte, group) for group in self.moving()},
             "residual": self.residual}
         return {**super().quantities(), **own}
 
@@ -177,7 +178,7 @@ class Constrained(Motion):
         forces = self.quantities()  # of the formulation that this is mixed into
         return np.concatenate([forces["F_tilde"]() - forces["k_tilde"](), self.F_d()])
 
-    def implicit(self, baumgarte: bool = False) -> tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]:
+    def implicit(self, baumgarte: bool = False) -> Implicit:
         """As for Motion, r = [M u_dot + k - F + C_r^T lam; C_r u_dot - F_d] with the multipliers held, too.
 
         baumgarte   of the accelerations with Baumgarte's stabilization
@@ -228,6 +229,10 @@ class Constrained(Motion):
     def jacobian_x_baumgarte(self) -> np.ndarray:
         """Derivative of rhs_baumgarte by x."""
         return self.jacobian(self.x(), self.implicit(baumgarte=True))
+
+    def along_baumgarte(self, group: str) -> np.ndarray:
+        """Derivative of rhs_baumgarte along a direction in one group of arguments."""
+        return self.along(group, self.implicit(baumgarte=True))
 
     def residual(self) -> np.ndarray:
         """Residual of the stabilized index-2 form of Gear, Gupta and Leimkuhler (1985), for q_dot, u_dot, z_dot, lam, mu.

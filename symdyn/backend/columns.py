@@ -1,0 +1,103 @@
+"""Jacobians by directional derivatives, several columns at once: a direction in each SIMD lane.
+
+A column of a Jacobian is the derivative along one direction. Columns share all that does not depend on the direction: it is
+computed once, as numbers. What is left is linear in the direction and the same for every column, so it is written once, on
+vectors: far fewer statements than all columns one by one, and as many columns a statement as the processor has lanes.
+
+Source: Griewank and Walther, Evaluating Derivatives, 2nd ed., section 3.1 (vector forward mode).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from symdyn.tape.node import SEED, Node
+from symdyn.tape.tape import Tape, reachable
+
+# What vectors of directions are combined by; what selects between them does not depend on the direction.
+LINEAR = frozenset({"leaf", "neg", "add", "sub", "mul", "div", "select"})
+# Lanes that the choice counts with: registers of 256 bits.
+LANES = 4
+# From how many steps of all columns one by one on, and how many times those of all together, it is faster: calls, and the numbers
+# that are kept for the directions, take time, too. Measured over the catalogue: 0.87 to 0.93 of the speed for what is below,
+# 1.15 to 1.66 times the speed for what is above.
+LEAST, GAIN = 800, 1.5
+
+
+@dataclass(frozen=True)
+class Group:
+    """Directions in one group of arguments.
+
+    name    of the group; seeds: leaves that stand for the entries of a direction, by name, in the order of the columns
+    first   the first of their columns
+    """
+
+    name: str
+    seeds: tuple[str, ...]
+    first: int
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A Jacobian with n_rows rows and n columns: for each group, one after the other, n_rows derivatives along a direction.
+
+    tape   with one output: these derivatives of all groups
+    """
+
+    tape: Tape
+    groups: tuple[Group, ...]
+    n_rows: int
+    n: int
+
+    def entries(self, k: int) -> tuple[object, ...]:
+        """The derivatives along a direction in group k."""
+        whole = next(iter(self.tape.outputs.values())).entries
+        return whole[k * self.n_rows:(k + 1) * self.n_rows]
+
+    def pays(self) -> bool:
+        """Whether this is faster than column by column, each with the steps that its column needs."""
+        one_by_one = self.one_by_one()
+        return one_by_one >= max(LEAST, GAIN * self.together()) and all(map(_linear, self._moving()))
+
+    def together(self) -> int:
+        """Steps on vectors that are executed for all columns."""
+        return sum(-(-len(group.seeds) // LANES) * sum(_counted(n) for n in reachable(self.entries(k)))
+                   for k, group in enumerate(self.groups))
+
+    def one_by_one(self) -> int:
+        """Steps that all columns need if each is computed by itself: those that depend on its direction."""
+        places = {name: 1 << k for group in self.groups for k, name in enumerate(group.seeds)}
+        needs: dict[Node, int] = {}
+        total = 0
+        for k in range(len(self.groups)):
+            for node in reachable(self.entries(k)):
+                if node.mask & SEED and node not in needs:
+                    needs[node] = places[node.args[1]] if node.op == "leaf" else _together(needs, node)
+                    total += needs[node].bit_count() * _counted(node)
+        return total
+
+    def _moving(self) -> list[Node]:
+        return [node for node in self.tape.steps if node.mask & SEED]
+
+
+def _linear(node: Node) -> bool:
+    chosen = node.op == "select" and isinstance(node.args[0], Node) and bool(node.args[0].mask & SEED)
+    return node.op in LINEAR and not chosen
+
+
+def _counted(node: Node) -> bool:
+    return bool(node.mask & SEED) and node.op not in ("leaf", "neg")
+
+
+def _together(needs: Mapping[Node, int], node: Node) -> int:
+    found = 0
+    for a in node.args:
+        if isinstance(a, Node):
+            found |= needs.get(a, 0)
+    return found
+
+
+def seeds_of(group: Group) -> dict[str, tuple[str, int]]:
+    """Where the leaves of a direction are read: name -> (group of arguments, index)."""
+    return {name: ("change", k) for k, name in enumerate(group.seeds)}
