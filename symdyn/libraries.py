@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symdyn.backend.metadata import Metadata
 from symdyn.backend.right_side import RightSide, key_of
 from symdyn.backend.source import Source
@@ -15,6 +17,7 @@ from symdyn.emission import emit, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
+from symdyn.functions.tapes import all_columns_of
 from symdyn.runtime.building.compiler import plain, require_compiler
 from symdyn.runtime.building.library import Unit, loaded
 
@@ -76,6 +79,11 @@ class Libraries:
         with_it = (key for key, (_, metadata) in self._made.items()
                    if what in metadata.shapes and (key == plain_side or not key.startswith("{")) and key != groups.BATCH)
         return next(with_it, key_of(what)) if isinstance(what, str) else key_of(what)
+
+    def structure(self, name: str) -> np.ndarray | None:
+        """Where a matrix of derivatives may differ from zero; None for other functions and for what has no columns."""
+        columns = all_columns_of(self.equations, name, RightSide())
+        return None if columns is None else columns.structure().reshape(*columns.shape, columns.n)
 
     def write(self, folder: Path) -> list[Path]:
         return write_source(emit(self.equations, self.backend, templates=self.templates, specialize=self.specialize), folder)

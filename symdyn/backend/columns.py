@@ -11,6 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
+
+import numpy as np
 
 from symdyn.tape.node import SEED, Node
 from symdyn.tape.tape import Tape, reachable
@@ -40,15 +43,21 @@ class Group:
 
 @dataclass(frozen=True)
 class Columns:
-    """A Jacobian with n_rows rows and n columns: for each group, one after the other, n_rows derivatives along a direction.
+    """A Jacobian of n columns: for each group, one after the other, the derivatives of all rows along a direction.
 
-    tape   with one output: these derivatives of all groups
+    tape    with one output: these derivatives of all groups
+    shape   of what is differentiated; each of its entries is a row
     """
 
     tape: Tape
     groups: tuple[Group, ...]
-    n_rows: int
+    shape: tuple[int, ...]
     n: int
+
+    @property
+    def n_rows(self) -> int:
+        """Number of entries that are differentiated."""
+        return prod(self.shape)
 
     def entries(self, k: int) -> tuple[object, ...]:
         """The derivatives along a direction in group k."""
@@ -67,15 +76,28 @@ class Columns:
 
     def one_by_one(self) -> int:
         """Steps that all columns need if each is computed by itself: those that depend on its direction."""
-        places = {name: 1 << k for group in self.groups for k, name in enumerate(group.seeds)}
+        return sum(needed.bit_count() * _counted(node) for k in range(len(self.groups))
+                   for node, needed in self._needs(k).items())
+
+    def structure(self) -> np.ndarray:
+        """Where the matrix may differ from zero, (n_rows, n) of bool."""
+        result = np.zeros((self.n_rows, self.n), dtype=bool)
+        for k, group in enumerate(self.groups):
+            needs = self._needs(k)
+            for i, entry in enumerate(self.entries(k)):
+                needed = needs.get(entry, 0) if isinstance(entry, Node) else 0
+                for column in range(len(group.seeds)):
+                    result[i, group.first + column] = needed >> column & 1
+        return result
+
+    def _needs(self, k: int) -> dict[Node, int]:
+        """The steps of the derivatives along a direction in group k that depend on it, each with its entries, as bits."""
+        places = {name: 1 << column for column, name in enumerate(self.groups[k].seeds)}
         needs: dict[Node, int] = {}
-        total = 0
-        for k in range(len(self.groups)):
-            for node in reachable(self.entries(k)):
-                if node.mask & SEED and node not in needs:
-                    needs[node] = places[node.args[1]] if node.op == "leaf" else _together(needs, node)
-                    total += needs[node].bit_count() * _counted(node)
-        return total
+        for node in reachable(self.entries(k)):
+            if node.mask & SEED:
+                needs[node] = places[node.args[1]] if node.op == "leaf" else _together(needs, node)
+        return needs
 
     def _moving(self) -> list[Node]:
         return [node for node in self.tape.steps if node.mask & SEED]

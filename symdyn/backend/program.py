@@ -129,7 +129,7 @@ def _columns(columns: Columns, name: str, title: str, write: Callable[..., Funct
         along.append(Along(group.first, len(group.seeds), function))
     groups = {g for f in (values, *[a.function for a in along]) for g in f.arguments}
     operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
-    return Function(name, title, (columns.n_rows, columns.n), tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
+    return Function(name, title, (*columns.shape, columns.n), tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
                     (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along))
 
 

@@ -13,10 +13,12 @@ import sympy as sp
 from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.linearization import Varied
 from symdyn.formulation.trees.mass_matrix import factorize
+from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
 from symdyn.tape import node as kinds
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.passes import substitute
+from symdyn.tape.recorder import Recorder
 
 # A residual that is zero, leaves in it that stand for unknowns with their values, and what solves for the change of u_dot.
 Implicit = tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]
@@ -60,7 +62,7 @@ class Motion:
             "jacobian_x": lambda: self.jacobian(self.x()),
             "jacobian_inputs": lambda: self.jacobian(self._leaves(self.inputs)),
             "jacobian_params": lambda: self.jacobian(self._leaves(self.parameters)),
-            **{f"rhs_along_{group}": partial(self.along, group) for group in self.moving()}}
+            "unknowns": self.unknowns, **{f"unknowns_along_{group}": partial(self.along, group) for group in self.groups()}}
         shared = ("M_tilde", "bias", "accelerations")
         return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
                 **Varied(self).quantities()}
@@ -166,31 +168,39 @@ class Motion:
             bottom = jacobian(recorder, self.state_rates(), by, "forward")
             return np.vstack([top, middle, bottom])
 
-    def moving(self) -> dict[str, list[Any]]:
-        """The leaves that x_dot is differentiated by, by group of arguments."""
-        groups = {"q": self.coordinates, "u": self.speeds, "z": [z for z, _ in self.states], "inputs": self.inputs,
-                  "p": self.parameters}
-        return {group: self._leaves(symbols) for group, symbols in groups.items()}
+    def unknowns(self) -> np.ndarray:
+        """What the equations are solved for: accelerations, and with constraints multipliers."""
+        return self.recall("accelerations")  # type: ignore[no-any-return]
 
-    def seeds(self, group: str) -> dict[Any, Any]:
-        """The leaves of a group with leaves that stand for a direction in it."""
-        recorder = self.algebra.recorder
-        return {leaf: recorder.leaf(seed_name(leaf.args[1]), kinds.SEED) for leaf in self.moving()[group]}
+    def groups(self) -> dict[str, list[Any]]:
+        """The leaves by which quantities are differentiated, by group of arguments."""
+        states = [z for z, _ in self.states]
+        held = {"q": self.coordinates, "u": self.speeds, "z": states, "inputs": self.inputs, "p": self.parameters, "t": [time]}
+        return {group: self._leaves(symbols) for group, symbols in held.items()}
 
-    def along(self, group: str, implicit: Implicit | None = None) -> np.ndarray:
-        """The derivative of x_dot along a direction in one group of arguments, (n_x,), exact; the direction is an argument, too.
+    def along(self, group: str) -> np.ndarray:
+        """The derivative of the unknowns along a direction in one group of arguments; the direction is an argument, too.
 
-        Accelerations are differentiated as in `jacobian`.
+        As in `jacobian` from the derivative of a residual, so that the factorization is not differentiated.
         """
-        recorder, seeds = self.algebra.recorder, self.seeds(group)
-        self.recall("accelerations")  # under its own headings
+        residual, at, solve = self.implicit()
+        return self.solved_along(group, residual, at, lambda change: solve(-change))
+
+    def solved_along(self, group: str, residual: Sequence[Any], at: Mapping[Any, Any],
+                     solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """What `solve` makes of the derivative of a residual along a direction, at the values of the unknowns."""
+        recorder = self.algebra.recorder
         with self.algebra.section("derivative along the direction"):
-            residual, at, solve = implicit or self.implicit()
-            change = vector(*substitute(tuple(forward(recorder, residual, seeds)), at, recorder))
-            return vector(*forward(recorder, self.rates, seeds), *solve(-change), *forward(recorder, self.state_rates(), seeds))
+            change = forward(recorder, residual, direction(recorder, self.groups()[group]))
+            return solve(vector(*substitute(tuple(change), at, recorder)))
 
     def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
         return [self.algebra.leaves[s] for s in symbols]
+
+
+def direction(recorder: Recorder, leaves: Sequence[Any]) -> dict[Any, Any]:
+    """For each leaf one that stands for its entry in a direction."""
+    return {leaf: recorder.leaf(seed_name(leaf.args[1]), kinds.SEED) for leaf in leaves}
 
 
 def seed_name(name: str) -> str:

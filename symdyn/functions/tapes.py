@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from symdyn.backend.columns import Columns, Group
 from symdyn.backend.right_side import RightSide
-from symdyn.formulation.accelerations import seed_name
 from symdyn.formulation.constraints.motion import residual_names
+from symdyn.formulation.derivatives import BY, UNKNOWNS, along, derivative, derivative_named, seeds_in
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
-from symdyn.functions.table import DERIVATIVES, STATICS, VARIATIONS, quantity_of
+from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
 from symdyn.tape.balance import balance
 from symdyn.tape.jumps import Jump, jumps
 from symdyn.tape.tape import Output, Tape
@@ -21,6 +22,9 @@ from symdyn.tape.tape import Output, Tape
 
 def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
+    found = derivative_named(name)
+    if found is not None and name not in equations.quantities:
+        return found[0] in ALL and derivative_named(found[0]) is None and has_function(equations, found[0])
     if name == "outputs":
         return any(q.startswith("output_") for q in equations.quantities)
     if name == "switches":
@@ -47,6 +51,10 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape(equations.recorder, {name: Output.of(name, surfaces)})
     if name in (BOUNDS, RANGES):
         return event_bounds(equations, name)
+    found = derivative_named(name)
+    if found is not None and name not in equations.quantities:
+        differentiated = _only_output(tape_as_derived(equations, found[0])).array()
+        return Tape.of(equations.recorder, **{name: derivative(equations, differentiated, found[1])})
     if name != "outputs":
         return equations.tape(quantity_of(name))
     values = [equations.quantity(q).ravel() for q in equations.quantities if q.startswith("output_")]
@@ -73,36 +81,45 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
 
 
 def columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
-    """The derivatives along directions that a Jacobian of x_dot consists of; None where its columns one by one take less, and for
-    other functions."""
-    groups = _GROUPS.get(name)
-    field = "rhs_baumgarte" if right_side.baumgarte else "rhs"
-    if groups is None or f"{field}_along_q" not in equations.quantities:
+    """The derivatives along directions that a matrix of derivatives consists of; None where its columns one by one take less, and
+    for other functions."""
+    columns = all_columns_of(equations, name, right_side)
+    return columns if columns is not None and columns.pays() else None
+
+
+def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
+    """The derivatives along directions that a matrix of derivatives consists of; None for other functions."""
+    found = _JACOBIANS.get(name) or derivative_named(name)
+    if found is None:
         return None
+    of, by = found
+    stabilized = right_side.baumgarte and name == "jacobian_x"
+    values = equations.quantity("rhs_baumgarte") if stabilized else _only_output(tape_as_derived(equations, of)).array()
+    entries = values.ravel().tolist()
     work = right_side.work and name == "jacobian_x"
-    made: list[Group] = []
-    entries: list[np.ndarray] = []
-    first = 0
-    for group, leaves in zip(groups, _names(equations, groups), strict=True):
-        if leaves:
-            made.append(Group(group, tuple(map(seed_name, leaves)), first))
-            entries += [equations.quantity(f"{field}_along_{group}"), *[equations.quantity(f"power_along_{group}")] * work]
-            first += len(leaves)
-    if not made:
+    if work:
+        entries += equations.quantity("power").ravel().tolist()
+    groups: list[Group] = []
+    changes: list[Any] = []
+    n = 0
+    for group in BY[by]:
+        seeds = seeds_in(equations, group)
+        if seeds:
+            groups.append(Group(group, seeds, n))
+            changes += along(equations, entries, group, "unknowns_baumgarte" if stabilized else UNKNOWNS)
+            n += len(seeds)
+    if not groups or not entries:
         return None
-    n_rows = sum(map(len, entries)) // len(made)
-    tape = Tape.of(equations.recorder, **{name: np.concatenate(entries)})
-    columns = Columns(tape, tuple(made), n_rows, first + work)  # nothing depends on the work
-    return columns if columns.pays() else None
+    tape = Tape(equations.recorder, {name: Output(name, (len(changes),), tuple(changes))})
+    shape = (len(entries),) if work else values.shape
+    return Columns(tape, tuple(groups), shape, n + work)  # nothing depends on the work
 
 
-_GROUPS = {"jacobian_x": ("q", "u", "z"), "jacobian_inputs": ("inputs",), "jacobian_params": ("p",)}
+def _only_output(tape: Tape) -> Output:
+    return next(iter(tape.outputs.values()))
 
 
-def _names(equations: Equations, groups: Sequence[str]) -> list[list[str]]:
-    symbols = equations.symbols
-    held = {"q": symbols.coordinates, "u": symbols.speeds, "z": symbols.states, "inputs": symbols.inputs, "p": symbols.parameters}
-    return [[s.name for s in held[group]] for group in groups]
+_JACOBIANS = {f"jacobian_{by}": ("rhs", by) for by in ("x", "inputs", "params")}
 
 
 def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:

@@ -52,11 +52,25 @@ _TIMES = (float, np.float64)
 
 
 class Jacobian(NamedTuple):
-    """Derivatives of x_dot by the state (n_x, n_x), the inputs (n_x, n_in) and the parameters (n_x, n_p)."""
+    """Derivatives of a function by the state (..., n_x), the inputs (..., n_in) and the parameters (..., n_p); None for what was
+    not requested. Before the last axis stands the shape of the function: of x_dot (n_x,)."""
 
-    x: np.ndarray | None
-    inputs: np.ndarray | None
-    params: np.ndarray | None
+    x: np.ndarray | None = None
+    inputs: np.ndarray | None = None
+    params: np.ndarray | None = None
+
+
+class FurtherDerivatives(NamedTuple):
+    """The same, with derivatives by time (..., 1) and given accelerations (..., n_u), where these were requested."""
+
+    x: np.ndarray | None = None
+    inputs: np.ndarray | None = None
+    params: np.ndarray | None = None
+    t: np.ndarray | None = None
+    ud: np.ndarray | None = None
+
+
+_BY = "x, inputs, params, t and ud"
 
 
 class Module:
@@ -290,20 +304,68 @@ class Module:
         """The user's named outputs."""
         return self.split_outputs(self.evaluate("outputs", t, x, params, inputs))
 
-    def jacobian(self, t: float, x: States, params: States | None = None, inputs: States | None = (),
-                 wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
-        """Exact derivatives of x_dot by state, inputs and parameters; `wrt` leaves out what is not needed.
+    def jacobian(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
+                 wrt: Sequence[str] = ("x", "inputs", "params"), of: str = "rhs",
+                 ud: States = ()) -> Jacobian | FurtherDerivatives:
+        """Exact derivatives of a function, by default of x_dot, by state, inputs and parameters.
 
-        With Euler parameters the derivatives by the state hold along changes that keep their norm.
+        wrt   by what: of "x", "inputs", "params", "t" (the others held), "ud" (accelerations, of functions that take them)
+        of    the name of a function, such as "inverse_dynamics", "lam", "reactions", "outputs", "energy"; each derivative has the
+              shape of the function with one axis more
+        ud    accelerations (n_u,) of functions that take them
+        t, x, params, inputs and ud are those of `evaluate`; of rows of states there are rows of derivatives. With C several
+        columns are computed at once where that is faster, a direction in each SIMD lane. Accelerations and multipliers are
+        differentiated through what they are solved from, so that no factorization is differentiated.
+
+        With Euler parameters the derivatives by the state hold along changes that keep their norm. Raises ArgumentError for what
+        there are no derivatives of or by.
+
+        >>> import symdyn as sd
+        >>> module = sd.systems.pendulum().embedding().compile()
+        >>> module.jacobian(0, [0, 0]).x.round(4).tolist()
+        [[0.0, 1.0], [-14.715, 0.0]]
+        >>> module.jacobian(0, [0, 0], of="inverse_dynamics", wrt=["ud"], ud=[0]).ud.shape
+        (1, 1)
         """
         if not isinstance(wrt, (list, tuple)):
-            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of x, inputs and params")
-        unknown = [w for w in wrt if not isinstance(w, str) or w not in Jacobian._fields]
+            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of {_BY}")
+        unknown = [w for w in wrt if not isinstance(w, str) or w not in FurtherDerivatives._fields]
         if unknown:
-            raise ArgumentError(f"{self.name}: jacobian by {', '.join(map(name_of, unknown))} asked for; there are x, inputs and "
-                                "params")
-        return Jacobian(*[self.evaluate(f"jacobian_{w}", t, x, params, inputs) if w in wrt else None
-                          for w in Jacobian._fields])
+            raise ArgumentError(f"{self.name}: jacobian by {', '.join(map(name_of, unknown))} asked for; there are "
+                                f"{_BY}")
+        names = self._derivatives(of)
+        if "ud" in wrt and "ud" not in self._unit(of).metadata.arguments[of]:
+            raise ArgumentError(f"{self.name}: jacobian of {of} by ud asked for, and {of} takes no accelerations; leave ud "
+                                "out of wrt")
+        found = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
+        return FurtherDerivatives(**found) if {"t", "ud"}.intersection(wrt) else Jacobian(**found)
+
+    def sparsity(self, wrt: str = "x", of: str = "rhs") -> np.ndarray:
+        """Where the derivatives of a function by one of x, inputs, params, t, ud may differ from zero: bool, shaped as
+        `jacobian(of=of, wrt=[wrt])` gives them.
+
+        It is read off the statements: True for an entry that is zero by numbers only. Raises ArgumentError as `jacobian`.
+
+        >>> import symdyn as sd
+        >>> sd.systems.cart_pole().embedding().compile().sparsity().astype(int).tolist()
+        [[0, 0, 1, 0], [0, 0, 0, 1], [0, 1, 1, 1], [0, 1, 1, 1]]
+        """
+        if not isinstance(wrt, str) or wrt not in FurtherDerivatives._fields:
+            raise ArgumentError(f"{self.name}: sparsity by {shown(wrt)} asked for; there are {_BY}")
+        name = self._derivatives(of)[wrt]
+        structure = getattr(self._provider, "structure", None)
+        if structure is None:
+            raise ArgumentError(f"{self.name}: this module was put together without equations, so the structure of its "
+                                "derivatives is unknown; compile equations")
+        found = structure(name)
+        return found if found is not None else np.zeros(self.shape(name), dtype=bool)
+
+    def _derivatives(self, of: Any) -> dict[str, str]:
+        """By what a function is differentiated -> the name of the function that does."""
+        text(of, f"{self.name}: the name of the function to differentiate", "inverse_dynamics")
+        self._unit(of)
+        own = {f"{by}": f"jacobian_{by}" for by in ("x", "inputs", "params") if of == "rhs"}
+        return {by: own.get(by, f"{of}_by_{by}") for by in FurtherDerivatives._fields}
 
     def function(self, name: str) -> Callable[..., np.ndarray]:
         """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states."""

@@ -313,7 +313,7 @@ def test_jacobian_by_some(double: Any) -> None:
     only = double.jacobian(0.0, X, wrt=("params",))
     assert only.x is None and only.inputs is None and only.params.shape == (4, 8)
     assert double.jacobian(0.0, X).inputs.shape == (4, 0)
-    with pytest.raises(ArgumentError, match="jacobian by u asked for; there are x, inputs and params"):
+    with pytest.raises(ArgumentError, match="jacobian by u asked for; there are x, inputs, params, t and ud"):
         double.jacobian(0.0, X, wrt=("x", "u"))
 
 

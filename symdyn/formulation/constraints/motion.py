@@ -66,7 +66,8 @@ class Constrained(Motion):
             "C_scale": self.C_scale, "length": lambda: self.length,
             "position_correction": self.position_correction, "velocity_correction": self.velocity_correction,
             "rhs_baumgarte": self.rhs_baumgarte, "jacobian_x_baumgarte": self.jacobian_x_baumgarte,
-            **{f"rhs_baumgarte_along_{group}": partial(self.along_baumgarte, group) for group in self.moving()},
+            "unknowns_baumgarte": lambda: np.concatenate(self.recall("stabilized")),
+            **{f"unknowns_baumgarte_along_{group}": partial(self.along, group, True) for group in self.groups()},
             "residual": self.residual}
         return {**super().quantities(), **own}
 
@@ -183,13 +184,27 @@ class Constrained(Motion):
 
         baumgarte   of the accelerations with Baumgarte's stabilization
         """
-        (ud, lam), saddle, C_r = self.recall("stabilized" if baumgarte else "solution"), self.recall("saddle"), self.C_r()
+        residual, at = self.saddle_residual(baumgarte)
+        saddle, n_u = self.recall("saddle"), len(self.speeds)
+        return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
+
+    def saddle_residual(self, baumgarte: bool = False) -> tuple[list[Any], dict[Any, Any]]:
+        """This residual, and the leaves in it that stand for accelerations and multipliers with their values."""
+        (ud, lam), C_r = self.recall("stabilized" if baumgarte else "solution"), self.C_r()
         held = [self.algebra.recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
         forces = self.inverse_dynamics() + (C_r.T @ vector(*held) if held else 0)
         residual = [*forces, *(C_r @ self.speed_rates - (self._pulled() if baumgarte else self._right()))]
-        at = dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
-        n_u = len(ud)
-        return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
+        return residual, dict(zip([*self.speed_rates, *held], [*ud, *lam], strict=True))
+
+    def unknowns(self) -> np.ndarray:
+        """Accelerations and multipliers; where rows depend on each other, those of a solution."""
+        return np.concatenate(self.recall("solution"))
+
+    def along(self, group: str, baumgarte: bool = False) -> np.ndarray:
+        """As for Motion, with multipliers."""
+        saddle, n_u = self.recall("saddle"), len(self.speeds)
+        return self.solved_along(group, *self.saddle_residual(baumgarte),
+                                 lambda change: np.concatenate(saddle.solve(-change[:n_u], -change[n_u:])))
 
     # -- staying on the manifold
 
@@ -229,10 +244,6 @@ class Constrained(Motion):
     def jacobian_x_baumgarte(self) -> np.ndarray:
         """Derivative of rhs_baumgarte by x."""
         return self.jacobian(self.x(), self.implicit(baumgarte=True))
-
-    def along_baumgarte(self, group: str) -> np.ndarray:
-        """Derivative of rhs_baumgarte along a direction in one group of arguments."""
-        return self.along(group, self.implicit(baumgarte=True))
 
     def residual(self) -> np.ndarray:
         """Residual of the stabilized index-2 form of Gear, Gupta and Leimkuhler (1985), for q_dot, u_dot, z_dot, lam, mu.

@@ -83,7 +83,6 @@ class TreeQuantities(Motion):
                "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
                "joint_points": self.joint_points, "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
-               **{f"power_along_{group}": partial(self.power_along, group) for group in self.moving()},
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
         if self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
@@ -218,10 +217,6 @@ class TreeQuantities(Motion):
     def power_x(self) -> np.ndarray:
         """Derivative of the power by the state, (n_x,)."""
         return vector(*reverse(self.algebra.recorder, self.power(), self.x()))
-
-    def power_along(self, group: str) -> np.ndarray:
-        """Derivative of the power along a direction in one group of arguments, (1,)."""
-        return vector(*forward(self.algebra.recorder, [self.power()], self.seeds(group)))
 
     def expression(self, e: sp.Expr) -> Any:
         later = [q for q in quantities_in([e]) if q.level == 2]

@@ -1,0 +1,93 @@
+"""Derivatives of any quantity: along a direction in one group of arguments, and by all entries of a group.
+
+Accelerations and multipliers in a quantity are differentiated through what they are solved from (`Motion.along`), not through
+the factorization. A function's name says what is differentiated and by what: lam_by_x, energy_by_params, inverse_dynamics_by_ud.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.accelerations import direction, seed_name
+from symdyn.formulation.equations import Equations
+from symdyn.model.symbols import time
+from symdyn.tape.differentiate import forward, reverse
+from symdyn.tape.node import ACCELERATION, Node
+from symdyn.tape.passes import substitute
+from symdyn.tape.tape import reachable, unsigned
+
+# By what functions are differentiated -> the groups of arguments that this is.
+BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
+# The quantity whose entries the equations are solved for.
+UNKNOWNS = "unknowns"
+
+
+def derivative_named(name: str) -> tuple[str, str] | None:
+    """What a function of this name differentiates, and by what; None for other functions."""
+    of, _, by = name.rpartition("_by_")
+    return (of, by) if of and by in BY else None
+
+
+def names_of(equations: Equations, group: str) -> list[str]:
+    """Names of the leaves in a group of arguments."""
+    return [leaf.args[1] for leaf in leaves_of(equations, group)]
+
+
+def leaves_of(equations: Equations, group: str) -> list[Node]:
+    """The leaves by which a group of arguments differentiates."""
+    symbols = equations.symbols
+    if group == "ud":
+        return [equations.recorder.leaf(f"{u.name}_dot", ACCELERATION) for u in symbols.speeds]
+    held = {"q": symbols.coordinates, "u": symbols.speeds, "z": symbols.states, "inputs": symbols.inputs,
+            "p": symbols.parameters, "t": (time,)}
+    return [equations.leaves[s] for s in held[group]]
+
+
+def along(equations: Equations, entries: Sequence[Any], group: str, unknowns: str = UNKNOWNS) -> list[Any]:
+    """The derivatives of entries along a direction in a group of arguments, whose entries are leaves (see seed_name).
+
+    unknowns   the quantity whose entries are differentiated through what they are solved from; Baumgarte's right-hand side has
+               another one
+    """
+    seeds = direction(equations.recorder, leaves_of(equations, group))
+    if group != "ud" and unknowns in equations.quantities:
+        values = equations.quantity(unknowns).tolist()
+        used = _used(entries, values)
+        if used:
+            changes = equations.quantity(f"{unknowns}_along_{group}").tolist()
+            seeds |= {unsigned(v): -d if v.op == "neg" else d for v, d in zip(values, changes, strict=True)
+                      if isinstance(v, Node)}
+    return forward(equations.recorder, entries, seeds)
+
+
+def derivative(equations: Equations, values: np.ndarray, by: str) -> np.ndarray:
+    """The derivatives of an array of values, with one more axis for what they are differentiated by."""
+    entries = values.ravel().tolist()
+    leaves = [leaf for group in BY[by] for leaf in leaves_of(equations, group)]
+    result = np.zeros((len(entries), len(leaves)), dtype=object)
+    solved = equations.quantity(UNKNOWNS).tolist() if UNKNOWNS in equations.quantities and by != "ud" else []
+    if len(entries) < len(leaves) and not _used(entries, solved):
+        for i, entry in enumerate(entries):
+            result[i] = reverse(equations.recorder, entry, leaves)
+    else:
+        made = {group: tuple(along(equations, entries, group)) for group in BY[by]}
+        places = [(group, leaf) for group in BY[by] for leaf in leaves_of(equations, group)]
+        for k, (group, chosen) in enumerate(places):
+            seeds = direction(equations.recorder, leaves_of(equations, group))
+            result[:, k] = substitute(made[group], {seed: int(leaf is chosen) for leaf, seed in seeds.items()},
+                                      equations.recorder)
+    return result.reshape(*values.shape, len(leaves))
+
+
+def seeds_in(equations: Equations, group: str) -> tuple[str, ...]:
+    """The names of the entries of a direction in a group of arguments."""
+    return tuple(map(seed_name, names_of(equations, group)))
+
+
+def _used(entries: Sequence[Any], values: Sequence[Any]) -> bool:
+    """Whether what is computed of entries passes one of the values."""
+    wanted = {unsigned(v) for v in values if isinstance(v, Node) and unsigned(v).op != "leaf"}
+    return bool(wanted) and not wanted.isdisjoint(reachable(entries))
