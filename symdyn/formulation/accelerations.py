@@ -10,15 +10,14 @@ from typing import Any, Protocol
 import numpy as np
 import sympy as sp
 
+from symdyn.formulation.adjoint import Adjoint
 from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.linearization import Varied
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
-from symdyn.tape import node as kinds
-from symdyn.tape.differentiate import forward, jacobian
+from symdyn.tape.differentiate import direction, forward, jacobian
 from symdyn.tape.passes import substitute
-from symdyn.tape.recorder import Recorder
 
 # A residual that is zero, leaves in it that stand for unknowns with their values, and what solves for the change of u_dot.
 Implicit = tuple[list[Any], dict[Any, Any], Callable[[np.ndarray], np.ndarray]]
@@ -65,7 +64,7 @@ class Motion:
             "unknowns": self.unknowns, **{f"unknowns_along_{group}": partial(self.along, group) for group in self.groups()}}
         shared = ("M_tilde", "bias", "accelerations")
         return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
-                **Varied(self).quantities()}
+                **Varied(self).quantities(), **Adjoint(self).quantities()}
 
     def M_tilde(self) -> np.ndarray:
         raise NotImplementedError
@@ -183,26 +182,23 @@ class Motion:
 
         As in `jacobian` from the derivative of a residual, so that the factorization is not differentiated.
         """
-        residual, at, solve = self.implicit()
-        return self.solved_along(group, residual, at, lambda change: solve(-change))
+        return self.solved_along(group, *self.residual_of_unknowns())
 
-    def solved_along(self, group: str, residual: Sequence[Any], at: Mapping[Any, Any],
-                     solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """What `solve` makes of the derivative of a residual along a direction, at the values of the unknowns."""
+    def solved_along(self, group: str, residual: Sequence[Any], at: Mapping[Any, Any]) -> np.ndarray:
+        """The change of the unknowns that keeps a residual at zero along a direction; at: the values of the unknowns."""
         recorder = self.algebra.recorder
         with self.algebra.section("derivative along the direction"):
             change = forward(recorder, residual, direction(recorder, self.groups()[group]))
-            return solve(vector(*substitute(tuple(change), at, recorder)))
+            return self.solve_unknowns(-vector(*substitute(tuple(change), at, recorder)))
+
+    def residual_of_unknowns(self) -> tuple[list[Any], dict[Any, Any]]:
+        """A residual that is zero, and the leaves in it that stand for the unknowns, in their order, with their values."""
+        residual, at, _ = self.implicit()
+        return residual, at
+
+    def solve_unknowns(self, right: np.ndarray) -> np.ndarray:
+        """The change of the unknowns that changes the residual by `right`; its matrix is symmetric."""
+        return self.recall("solver").solve(right)  # type: ignore[no-any-return]
 
     def _leaves(self, symbols: Sequence[sp.Symbol]) -> list[Any]:
         return [self.algebra.leaves[s] for s in symbols]
-
-
-def direction(recorder: Recorder, leaves: Sequence[Any]) -> dict[Any, Any]:
-    """For each leaf one that stands for its entry in a direction."""
-    return {leaf: recorder.leaf(seed_name(leaf.args[1]), kinds.SEED) for leaf in leaves}
-
-
-def seed_name(name: str) -> str:
-    """The name of an argument's entry in a direction; no symbol can have it."""
-    return f"(change of {name})"

@@ -11,16 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.formulation.accelerations import direction, seed_name
 from symdyn.formulation.equations import Equations
 from symdyn.model.symbols import time
-from symdyn.tape.differentiate import forward, reverse
+from symdyn.spatial.vectors import vector
+from symdyn.tape.differentiate import direction, forward, reverse, seed_name
 from symdyn.tape.node import ACCELERATION, Node
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import reachable, unsigned
 
 # By what functions are differentiated -> the groups of arguments that this is.
 BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
+# By what a weighted sum of the rates is differentiated, once or twice.
+WEIGHTED = ("x", "inputs", "params")
 # The quantity whose entries the equations are solved for.
 UNKNOWNS = "unknowns"
 
@@ -80,6 +82,57 @@ def derivative(equations: Equations, values: np.ndarray, by: str) -> np.ndarray:
             result[:, k] = substitute(made[group], {seed: int(leaf is chosen) for leaf, seed in seeds.items()},
                                       equations.recorder)
     return result.reshape(*values.shape, len(leaves))
+
+
+def gradient(equations: Equations, wrt: Sequence[str], along: str | None = None) -> list[Any]:
+    """The gradient of w^T x_dot by these of x, inputs and params, one after the other; along: its derivative along a direction in
+    a group of arguments."""
+    whole = iter(equations.quantity("adjoint" if along is None else f"adjoint_along_{along}").tolist())
+    pieces = {by: [next(whole) for group in BY[by] for _ in leaves_of(equations, group)] for by in WEIGHTED}
+    return [entry for by in wrt for entry in pieces[by]]
+
+
+def second_named(name: str) -> tuple[str, tuple[str, ...]] | None:
+    """What a function of weighted rates is, and by what it differentiates: adjoint_x, hessian_x_inputs, hessian_product_x."""
+    for kind in ("hessian_product", "hessian", "adjoint"):
+        wrt = tuple(name.removeprefix(f"{kind}_").split("_"))
+        if name.startswith(f"{kind}_") and wrt == tuple(by for by in WEIGHTED if by in wrt):
+            return kind, wrt
+    return None
+
+
+def weighted(equations: Equations, kind: str, wrt: Sequence[str]) -> np.ndarray:
+    """The gradient of w^T x_dot, its matrix of second derivatives, or the product of this and a direction."""
+    if kind == "adjoint":
+        return vector(*gradient(equations, wrt))
+    return hessian(equations, wrt) if kind == "hessian" else hessian_product(equations, wrt)
+
+
+def hessian_product(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
+    """The derivative of the gradient along a direction whose entries are arguments, (change of ...) one after the other."""
+    total: list[Any] = []
+    for by in wrt:
+        for group in BY[by]:
+            leaves = leaves_of(equations, group)
+            if leaves:
+                seeds = direction(equations.recorder, leaves)
+                given = {seed: equations.recorder.leaf(seed.args[1], ACCELERATION) for seed in seeds.values()}
+                change = substitute(tuple(gradient(equations, wrt, group)), given, equations.recorder)
+                total = [a + b for a, b in zip(total, change, strict=True)] if total else list(change)
+    return vector(*total)
+
+
+def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
+    """The matrix of second derivatives of w^T x_dot, column by column."""
+    columns = []
+    for by in wrt:
+        for group in BY[by]:
+            leaves = leaves_of(equations, group)
+            seeds = direction(equations.recorder, leaves)
+            for chosen in leaves:
+                unit = {seed: int(leaf is chosen) for leaf, seed in seeds.items()}
+                columns.append(substitute(tuple(gradient(equations, wrt, group)), unit, equations.recorder))
+    return np.array(columns, dtype=object).T.reshape(len(columns), len(columns))
 
 
 def seeds_in(equations: Equations, group: str) -> tuple[str, ...]:

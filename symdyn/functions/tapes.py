@@ -9,8 +9,19 @@ import numpy as np
 
 from symdyn.backend.columns import Columns, Group
 from symdyn.backend.right_side import RightSide
+from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.constraints.motion import residual_names
-from symdyn.formulation.derivatives import BY, UNKNOWNS, along, derivative, derivative_named, seeds_in
+from symdyn.formulation.derivatives import (
+    BY,
+    UNKNOWNS,
+    along,
+    derivative,
+    derivative_named,
+    gradient,
+    second_named,
+    seeds_in,
+    weighted,
+)
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
@@ -22,6 +33,8 @@ from symdyn.tape.tape import Output, Tape
 
 def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
+    if second_named(name) is not None:
+        return "adjoint" in equations.quantities
     found = derivative_named(name)
     if found is not None and name not in equations.quantities:
         return found[0] in ALL and derivative_named(found[0]) is None and has_function(equations, found[0])
@@ -51,6 +64,9 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape(equations.recorder, {name: Output.of(name, surfaces)})
     if name in (BOUNDS, RANGES):
         return event_bounds(equations, name)
+    second = second_named(name)
+    if second is not None:
+        return Tape(equations.recorder, {name: Output.of(name, weighted(equations, *second))})
     found = derivative_named(name)
     if found is not None and name not in equations.quantities:
         differentiated = _only_output(tape_as_derived(equations, found[0])).array()
@@ -89,8 +105,11 @@ def columns_of(equations: Equations, name: str, right_side: RightSide) -> Column
 
 def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
     """The derivatives along directions that a matrix of derivatives consists of; None for other functions."""
+    second = second_named(name)
+    if second is not None and second[0] == "hessian":
+        return _columns_of_hessian(equations, name, second[1])
     found = _JACOBIANS.get(name) or derivative_named(name)
-    if found is None:
+    if found is None or second is not None:
         return None
     of, by = found
     stabilized = right_side.baumgarte and name == "jacobian_x"
@@ -115,6 +134,19 @@ def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Co
     return Columns(tape, tuple(groups), shape, n + work)  # nothing depends on the work
 
 
+def _columns_of_hessian(equations: Equations, name: str, wrt: Sequence[str]) -> Columns:
+    groups: list[Group] = []
+    changes: list[Any] = []
+    n = 0
+    for group in [group for by in wrt for group in BY[by]]:
+        seeds = seeds_in(equations, group)
+        if seeds:
+            groups.append(Group(group, seeds, n))
+            changes += gradient(equations, wrt, group)
+            n += len(seeds)
+    return Columns(Tape(equations.recorder, {name: Output(name, (len(changes),), tuple(changes))}), tuple(groups), (n,), n)
+
+
 def _only_output(tape: Tape) -> Output:
     return next(iter(tape.outputs.values()))
 
@@ -133,6 +165,10 @@ def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
     given = [f"{s.name}_dot" for s in symbols.speeds]
     if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
         given += multiplier_names(n_c)
+    if any(second_named(n) for n in names):
+        given += weight_names([*symbols.coordinates, *symbols.speeds, *symbols.states])
+        wrt = next((second[1] for n in names if (second := second_named(n)) and second[0] == "hessian_product"), ())
+        given += [seed for by in wrt for group in BY[by] for seed in seeds_in(equations, group)]
     if any(n in VARIATIONS for n in names):
         given += variation_names(symbols, n_c, "second_variation" in names)
     return given

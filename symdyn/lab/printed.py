@@ -26,7 +26,9 @@ from symdyn.formulation.equations import Equations
 BOUND = 1e-9
 # Operations of a quantity that is printed.
 MOST = 200
-# Quantities that take more arguments than a state, accelerations, inputs and parameters.
+# Derivatives along directions and of weighted sums: directions and weights are no symbols.
+DIRECTIONAL = ("unknowns", "adjoint")
+# Other quantities that take more arguments than a state, accelerations, inputs and parameters.
 OTHERS = ("variation", "second_variation", "outputs_variation", "residual", "rhs_baumgarte", "jacobian_x_baumgarte", "balance",
           "stiffness", "damping", "N_dot", "reactions_by_lam")
 
@@ -130,7 +132,7 @@ def compare(equations: Equations, states: int = 3, simplify: bool = False, most:
     for numbers in drawn:
         _normalize(equations, moving, numbers)
     for name in equations.quantities:
-        if name in OTHERS or equations.tape(name).operations > most:
+        if name in OTHERS or name.startswith(DIRECTIONAL) or equations.tape(name).operations > most:
             continue
         try:
             explicit = equations.explicit(name, simplify)

@@ -340,6 +340,74 @@ class Module:
         found = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
         return FurtherDerivatives(**found) if {"t", "ud"}.intersection(wrt) else Jacobian(**found)
 
+    def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
+                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
+        """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs and parameters, at the cost of about two
+        evaluations of x_dot.
+
+        weights   (n_x,), in the order of the state, or rows of them
+        wrt       by what: of "x", "inputs", "params"
+        The others as for `jacobian`. Raises ArgumentError for weights and names that do not fit, SymdynError where rates of
+        states depend on multipliers.
+
+        >>> import symdyn as sd
+        >>> module = sd.systems.pendulum().embedding().compile()
+        >>> module.adjoint(0, [0, 0], [0, 1], wrt=["x"]).x.round(4).tolist()
+        [-14.715, 0.0]
+        """
+        self._weighted(wrt, "adjoint")
+        given = self._with_weights(weights, (), 0)
+        return Jacobian(**{w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt})
+
+    def hessian(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
+                wrt: Sequence[str] = ("x",), along: States | None = None) -> np.ndarray:
+        """Exact second derivatives of a weighted sum of the rates, weights^T x_dot: (n, n), symmetric.
+
+        weights   (n_x,), in the order of the state, or rows of them
+        wrt       by what: of "x", "inputs", "params", in this order; n is the number of all of them
+        along     (n,) a direction: the product of the matrix and it, (n,), without the matrix
+        The others as for `jacobian`. With Euler parameters the second derivatives hold along changes that keep their norm. Raises
+        ArgumentError for weights, directions and names that do not fit, SymdynError where rates of states depend on multipliers.
+
+        >>> import symdyn as sd
+        >>> module = sd.systems.pendulum().embedding().compile()
+        >>> module.hessian(0, [1.5707963267948966, 0], [0, 1]).round(4).tolist()
+        [[14.715, 0.0], [0.0, 0.0]]
+        >>> module.hessian(0, [1.5707963267948966, 0], [0, 1], along=[2, 0]).round(4).tolist()
+        [29.43, 0.0]
+        """
+        self._weighted(wrt, "hessian")
+        chosen = [by for by in Jacobian._fields if by in wrt]
+        sizes = self.metadata.sizes
+        n = sum({"x": sizes.x, "inputs": sizes.inputs, "params": sizes.p}[by] for by in chosen)
+        kind = "hessian" if along is None else "hessian_product"
+        given = self._with_weights(weights, () if along is None else along, 0 if along is None else n)
+        return self.evaluate(f"{kind}_{'_'.join(chosen)}", t, x, params, inputs, given)
+
+    def _weighted(self, wrt: Any, what: str) -> None:
+        """Raise ArgumentError for what the weighted rates are not differentiated by."""
+        if not isinstance(wrt, (list, tuple)) or not wrt:
+            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of x, inputs and params")
+        unknown = [w for w in wrt if not isinstance(w, str) or w not in Jacobian._fields]
+        if unknown:
+            raise ArgumentError(f"{self.name}: {what} by {', '.join(map(name_of, unknown))} asked for; there are x, inputs and "
+                                "params")
+
+    def _with_weights(self, weights: Any, along: Any, n: int) -> np.ndarray:
+        """What weighted functions take in place of accelerations: zeros for these, weights, a direction."""
+        rows = []
+        for what, value, size in (("weights", weights, self.metadata.sizes.x), ("along", along, n)):
+            numbers = real_of(value, self.name, f"{what} must be numbers")
+            if numbers.ndim > 2 or numbers.shape[-1:] != (size,) or not np.isfinite(numbers).all():
+                raise ArgumentError(f"{self.name}: {what} has the shape {numbers.shape}; pass {size} finite numbers, or "
+                                    "rows of them")
+            rows.append(numbers)
+        length = max(len(np.atleast_2d(r)) for r in rows)
+        flat = [np.zeros(self.metadata.sizes.u), *rows]
+        if all(r.ndim == 1 for r in rows):
+            return np.concatenate(flat)
+        return np.column_stack([np.broadcast_to(r, (length, r.shape[-1])) for r in flat])
+
     def sparsity(self, wrt: str = "x", of: str = "rhs") -> np.ndarray:
         """Where the derivatives of a function by one of x, inputs, params, t, ud may differ from zero: bool, shaped as
         `jacobian(of=of, wrt=[wrt])` gives them.

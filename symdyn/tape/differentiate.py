@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.shown import shown
-from symdyn.tape.node import Node, is_zero
+from symdyn.tape.node import SEED, Node, is_zero
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
@@ -43,6 +43,16 @@ def forward(recorder: Recorder, entries: Sequence[Any], seeds: Mapping[Node, Any
             total = total + partials[k] * tangent[node.args[k]]
         tangent[node] = total
     return [tangent.get(e, 0) if isinstance(e, Node) else 0 for e in entries]
+
+
+def direction(recorder: Recorder, leaves: Sequence[Node]) -> dict[Node, Node]:
+    """For each leaf one that stands for its entry in a direction: seeds of `forward`."""
+    return {leaf: recorder.leaf(seed_name(leaf.args[1]), SEED) for leaf in leaves}
+
+
+def seed_name(name: str) -> str:
+    """The name of a leaf's entry in a direction; no symbol can have it."""
+    return f"(change of {name})"
 
 
 def _call(recorder: Recorder, node: Node, tangent: dict[Any, Any]) -> None:

@@ -184,12 +184,9 @@ class Constrained(Motion):
 
         baumgarte   of the accelerations with Baumgarte's stabilization
         """
-        residual, at = self.saddle_residual(baumgarte)
-        saddle, n_u = self.recall("saddle"), len(self.speeds)
-        return residual, at, lambda right: saddle.solve(right[:n_u], right[n_u:])[0]
+        return *self.residual_of_unknowns(baumgarte), lambda right: self.solve_unknowns(right)[:len(self.speeds)]
 
-    def saddle_residual(self, baumgarte: bool = False) -> tuple[list[Any], dict[Any, Any]]:
-        """This residual, and the leaves in it that stand for accelerations and multipliers with their values."""
+    def residual_of_unknowns(self, baumgarte: bool = False) -> tuple[list[Any], dict[Any, Any]]:
         (ud, lam), C_r = self.recall("stabilized" if baumgarte else "solution"), self.C_r()
         held = [self.algebra.recorder.leaf(f"lam{k + 1}", kinds.SEED) for k in range(len(lam))]
         forces = self.inverse_dynamics() + (C_r.T @ vector(*held) if held else 0)
@@ -202,9 +199,11 @@ class Constrained(Motion):
 
     def along(self, group: str, baumgarte: bool = False) -> np.ndarray:
         """As for Motion, with multipliers."""
-        saddle, n_u = self.recall("saddle"), len(self.speeds)
-        return self.solved_along(group, *self.saddle_residual(baumgarte),
-                                 lambda change: np.concatenate(saddle.solve(-change[:n_u], -change[n_u:])))
+        return self.solved_along(group, *self.residual_of_unknowns(baumgarte))
+
+    def solve_unknowns(self, right: np.ndarray) -> np.ndarray:
+        n_u = len(self.speeds)
+        return np.concatenate(self.recall("saddle").solve(right[:n_u], right[n_u:]))
 
     # -- staying on the manifold
 
