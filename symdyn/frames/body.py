@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -21,6 +21,10 @@ from symdyn.frames.tree import Axes, angular_motion, demand_frames, rotation_bet
 from symdyn.model.symbols import symbols_of
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from symdyn.given import Inertia, Scalar
+    from symdyn.given import Vector as Components
+
 
 class Body:
     """A rigid body fixed to a frame; `Frame.body` makes it.
@@ -34,7 +38,7 @@ class Body:
     Source: lecture, chapters 2.1 and 2.2.
     """
 
-    def __init__(self, frame: Axes, mass: Any, inertia: Any, com: Any = (0, 0, 0)) -> None:
+    def __init__(self, frame: Axes, mass: Scalar, inertia: Inertia, com: Components = (0, 0, 0)) -> None:
         take = Quantities(f"body of frame {frame.name}")
         self.mass = take.mass(mass)
         self.given_inertia = sp.ImmutableMatrix(take.inertia("inertia", inertia))

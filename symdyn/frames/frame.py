@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -11,6 +11,10 @@ from symdyn.frames.point import Point
 from symdyn.frames.tree import Axes, angular_motion, demand_frames, rotation_between
 from symdyn.frames.vector import Vector
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Inertia, Matrix, Scalar
+    from symdyn.given import Vector as Components
 
 
 class Frame(Axes):
@@ -27,22 +31,23 @@ class Frame(Axes):
     Source: lecture, chapters 1.2, 1.6 and 1.7.
     """
 
-    def __init__(self, name: str, parent: Frame | None = None, rotation: Any = None, origin: Any = (0, 0, 0)) -> None:
+    def __init__(self, name: str, parent: Frame | None = None, rotation: Matrix | None = None,
+                 origin: Components = (0, 0, 0)) -> None:
         super().__init__(name, parent, rotation, origin)
 
-    def frame(self, name: str, rotation: Any = None, origin: Any = (0, 0, 0)) -> Frame:
+    def frame(self, name: str, rotation: Matrix | None = None, origin: Components = (0, 0, 0)) -> Frame:
         """A frame described in this one; arguments and errors as for `Frame`."""
         return Frame(name, self, rotation, origin)
 
-    def point(self, name: str, at: Any = (0, 0, 0)) -> Point:
+    def point(self, name: str, at: Components = (0, 0, 0)) -> Point:
         """A point given from this frame's origin by components in this frame (3,), m; they may move. Raises ModelError."""
         return Point(name, self, at)
 
-    def vector(self, components: Any, name: str = "v") -> Vector:
+    def vector(self, components: Components, name: str = "v") -> Vector:
         """A free vector, such as a force, given by components in this frame (3,). Raises ModelError."""
         return Vector(name, self, components)
 
-    def body(self, mass: Any, inertia: Any, com: Any = (0, 0, 0)) -> Body:
+    def body(self, mass: Scalar, inertia: Inertia, com: Components = (0, 0, 0)) -> Body:
         """A rigid body fixed to this frame: mass kg, inertia (3, 3) about the centre of mass, these axes, kg m^2, com (3,) m.
 
         Raises ArgumentError, telling all faults.
@@ -76,7 +81,7 @@ class Frame(Axes):
         seen_from, components = self._defaults(seen_from, components)
         return sp.Matrix(angular_motion(seen_from, self, components, 2)[1])
 
-    def position(self, of: Any = None, components: Frame | None = None) -> sp.Matrix:
+    def position(self, of: Axes | Point | None = None, components: Frame | None = None) -> sp.Matrix:
         """This frame's origin from another's, (3, 1), m; as `Point.position`."""
         return self.point(self.name).position(of, components)
 

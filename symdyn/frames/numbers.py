@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -18,8 +18,11 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import record_expression
 from symdyn.tape.tape import Tape
 
+if TYPE_CHECKING:
+    from symdyn.given import Motions, Scalar, Times
 
-def numbers(value: Any, values: Mapping[Any, Any] | None = None, t: Any = None) -> Any:
+
+def numbers(value: Scalar | sp.MatrixBase, values: Motions | None = None, t: Times | None = None) -> float | np.ndarray:
     """The number of an expression, or the numbers of a matrix.
 
     values   symbol or name -> number, or an expression in sd.t and other symbols that have values, from which rates

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import sympy as sp
 
 from symdyn.frames.numbers import numbers
 from symdyn.report.simplify import simplified
+
+if TYPE_CHECKING:
+    from symdyn.given import Array, Motions, Times
 
 # Seconds that tidying up for print may take, for all parts together.
 PATIENCE = 2.0
@@ -36,20 +39,21 @@ class _Parts:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name in self._labels}
 
     @property
-    def total(self) -> Any:
+    def total(self) -> Array:
         """The sum of the parts."""
         first, *others = self._named().values()
         for other in others:
             first = first + other
         return first
 
-    def subs(self, *args: Any, **options: Any) -> Any:
+    def subs(self, *args: Any, **options: Any) -> Self:
         """The same with symbols replaced, as SymPy's subs."""
         return replace(self, **{name: part.subs(*args, **options) for name, part in self._named().items()})
 
-    def at(self, values: Any = None, t: Any = None) -> Any:
+    def at(self, values: Motions | None = None, t: Times | None = None) -> Self:
         """The same in numbers: arrays (3,), or (n_t, 3) at an array of times; values, t and errors as for `numbers`."""
-        return replace(self, **{name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()})
+        found: dict[str, Any] = {name: numbers(sp.Matrix(part), values, t) for name, part in self._named().items()}
+        return replace(self, **found)
 
     def _readable(self) -> dict[str, Any]:
         parts = {**self._named(), "total": self.total}
@@ -79,9 +83,9 @@ class VelocityParts(_Parts):
     transport   omega x r
     """
 
-    origin: Any
-    relative: Any
-    transport: Any
+    origin: Array
+    relative: Array
+    transport: Array
     _labels = {"origin": "origin", "relative": "relative", "transport": "transport"}
     _heading = "velocity of {P} seen from {n}, by way of {b}, components in {c}"
     _symbol = r"{{}}^{{{c}}}\mathbf{{v}}_{{{P}}}"
@@ -98,11 +102,11 @@ class AccelerationParts(_Parts):
     coriolis      2 omega x v_rel
     """
 
-    origin: Any
-    relative: Any
-    euler: Any
-    centripetal: Any
-    coriolis: Any
+    origin: Array
+    relative: Array
+    euler: Array
+    centripetal: Array
+    coriolis: Array
     _labels = {"origin": "origin", "relative": "relative", "euler": "Euler", "centripetal": "centripetal",
                "coriolis": "Coriolis"}
     _heading = "acceleration of {P} seen from {n}, by way of {b}, components in {c}"
@@ -119,10 +123,10 @@ class InertialForces(_Parts):
     coriolis      -2 m omega x v_rel
     """
 
-    origin: Any
-    euler: Any
-    centrifugal: Any
-    coriolis: Any
+    origin: Array
+    euler: Array
+    centrifugal: Array
+    coriolis: Array
     _labels = {"origin": "origin", "euler": "Euler", "centrifugal": "centrifugal", "coriolis": "Coriolis"}
     _heading = "inertial forces on {P} felt in {b}, inertial is {n}, components in {c}"
     _symbol = r"{{}}^{{{c}}}\mathbf{{F}}_{{{P},\text{{inertial}}}}"

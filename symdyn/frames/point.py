@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
@@ -14,6 +14,10 @@ from symdyn.frames.parts import AccelerationParts, InertialForces, VelocityParts
 from symdyn.frames.rates import taken
 from symdyn.frames.tree import ZERO, Axes, along, angular_motion, demand_frames, point_motion
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Motions, Scalar, Times
+    from symdyn.given import Vector as Components
 
 _ORDERS = {"position": 0, "velocity": 1, "acceleration": 2}
 
@@ -29,7 +33,7 @@ class Point:
     Source: lecture, chapters 1.5 to 1.8.
     """
 
-    def __init__(self, name: str, frame: Axes, at: Any) -> None:
+    def __init__(self, name: str, frame: Axes, at: Components) -> None:
         faults = FrameFaults(f"point {name}" if isinstance(name, str) else "a point")
         faults.name(name, "point")
         self.name = name
@@ -37,7 +41,7 @@ class Point:
         self.given = faults.column(at, "position")
         faults.demand_none()
 
-    def position(self, of: Any = None, components: Axes | None = None) -> sp.Matrix:
+    def position(self, of: Axes | Point | None = None, components: Axes | None = None) -> sp.Matrix:
         """The position of this point from the origin of a frame, or from another point, (3, 1), m.
 
         of           a frame (default: the first of the tree) or a Point
@@ -90,7 +94,7 @@ class Point:
             euler=sp.Matrix(alpha.cross(r)), centripetal=sp.Matrix(omega.cross(omega.cross(r))),
             coriolis=sp.Matrix(2 * omega.cross(v_rel)))
 
-    def inertial_forces(self, mass: Any, frame: Axes | None = None, components: Axes | None = None,
+    def inertial_forces(self, mass: Scalar, frame: Axes | None = None, components: Axes | None = None,
                         inertial: Axes | None = None) -> InertialForces:
         """What an observer in a moving frame b must add to the forces: m a_rel = F + total; N.
 
@@ -106,8 +110,8 @@ class Point:
         return InertialForces(parts.point, parts.through, parts.seen_from, parts.components, origin=-m * parts.origin,
                               euler=-m * parts.euler, centrifugal=-m * parts.centripetal, coriolis=-m * parts.coriolis)
 
-    def path(self, seen_from: Axes | None = None, t: Any = None, values: Any = None, quantity: str = "position",
-             components: Axes | None = None) -> np.ndarray:
+    def path(self, seen_from: Axes | None = None, t: Times | None = None, values: Motions | None = None,
+             quantity: str = "position", components: Axes | None = None) -> np.ndarray:
         """Where it is over time as seen from a frame, (n_t, 3), m: what an observer there draws.
 
         t          (n_t,) times, s
@@ -120,8 +124,7 @@ class Point:
         if t is None or np.ndim(t) != 1:
             raise ArgumentError(f"t is {shown(t)}; pass an array of times (n_t,), such as numpy.linspace(0, 2)")
         order = _ORDERS[quantity]
-        result: np.ndarray = numbers(sp.Matrix(self._motion(seen_from, components, order)[order]), values, t)
-        return result
+        return np.asarray(numbers(sp.Matrix(self._motion(seen_from, components, order)[order]), values, t))
 
     def _motion(self, seen_from: Axes | None, components: Axes | None, order: int) -> list[sp.ImmutableMatrix]:
         seen_from = self.frame.path[0] if seen_from is None else seen_from

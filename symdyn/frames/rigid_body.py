@@ -8,12 +8,16 @@ omega, alpha and the accelerations are seen from the inertial frame. SI units.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy as sp
 
 from symdyn.frames.product import times
 from symdyn.frames.quantities import Quantities
+
+if TYPE_CHECKING:
+    from symdyn.given import Array, Matrix, Scalar
+    from symdyn.given import Vector as Components
 
 
 class ForceSystem(NamedTuple):
@@ -25,7 +29,7 @@ class ForceSystem(NamedTuple):
 
 # -- inertia
 
-def inertia_about(I_G: Any, mass: Any, r: Any) -> Any:
+def inertia_about(I_G: Matrix, mass: Scalar, r: Components) -> Array:
     """The inertia about a point O from that about the centre of mass G: I_O = I_G + m (r.r 1 - r r^T), (3, 3), kg m^2.
 
     I_G    (3, 3) about G, kg m^2
@@ -40,7 +44,7 @@ def inertia_about(I_G: Any, mass: Any, r: Any) -> Any:
     return take.given_back(I + m * _of_particle(r))
 
 
-def inertia_about_com(I_O: Any, mass: Any, r: Any) -> Any:
+def inertia_about_com(I_O: Matrix, mass: Scalar, r: Components) -> Array:
     """The inertia about the centre of mass G from that about O: I_G = I_O - m (r.r 1 - r r^T), (3, 3), kg m^2.
 
     Arguments and errors as for `inertia_about`; also where what is left is the inertia of no body, because r is too long.
@@ -54,7 +58,7 @@ def inertia_about_com(I_O: Any, mass: Any, r: Any) -> Any:
     return take.given_back(result)
 
 
-def rotated_inertia(R: Any, I: Any) -> Any:
+def rotated_inertia(R: Matrix, I: Matrix) -> Array:
     """The same inertia in other axes: R I R^T, (3, 3), where R takes components to the new axes (nI = nR_b bI bR_n).
 
     Raises NotARotation with numbers if R is no rotation, ArgumentError for faults of I.
@@ -66,7 +70,7 @@ def rotated_inertia(R: Any, I: Any) -> Any:
     return take.given_back(times(R, I, R.T))
 
 
-def point_inertia(masses: Sequence[Any], positions: Sequence[Any]) -> Any:
+def point_inertia(masses: Sequence[Scalar], positions: Sequence[Components]) -> Array:
     """The inertia of particles about the point that their positions start from: sum m (r.r 1 - r r^T), (3, 3), kg m^2.
 
     masses      (n,) kg
@@ -80,7 +84,7 @@ def point_inertia(masses: Sequence[Any], positions: Sequence[Any]) -> Any:
     return take.given_back(sum((m * _of_particle(r) for m, r in particles), sp.zeros(3, 3)))
 
 
-def center_of_mass(masses: Sequence[Any], positions: Sequence[Any]) -> Any:
+def center_of_mass(masses: Sequence[Scalar], positions: Sequence[Components]) -> Array:
     """sum m r / sum m, (3,), m; arguments and errors as for `point_inertia`, and ArgumentError for masses that add up to 0."""
     take = Quantities("center_of_mass")
     particles = take.particles(masses, positions)
@@ -93,7 +97,8 @@ def center_of_mass(masses: Sequence[Any], positions: Sequence[Any]) -> Any:
 
 # -- momentum and energy
 
-def angular_momentum(inertia: Any, omega: Any, mass: Any = 0, r_G: Any = (0, 0, 0), velocity: Any = (0, 0, 0)) -> Any:
+def angular_momentum(inertia: Matrix, omega: Components, mass: Scalar = 0, r_G: Components = (0, 0, 0),
+                     velocity: Components = (0, 0, 0)) -> Array:
     """The moment of momentum about a point O of the body: H_O = I_O omega + m r_G x v_O, (3,), kg m^2/s.
 
     inertia    (3, 3) about O; about the centre of mass, and at a point at rest, the second term is not there
@@ -111,7 +116,7 @@ def angular_momentum(inertia: Any, omega: Any, mass: Any = 0, r_G: Any = (0, 0, 
     return take.given_back(I * w + m * r.cross(v))
 
 
-def kinetic_energy(mass: Any, inertia: Any, velocity: Any, omega: Any, r_G: Any = (0, 0, 0)) -> Any:
+def kinetic_energy(mass: Scalar, inertia: Matrix, velocity: Components, omega: Components, r_G: Components = (0, 0, 0)) -> Scalar:
     """T = m v_O^2 / 2 + m v_O . (omega x r_G) + omega^T I_O omega / 2, J; the same number in n- and in b-components.
 
     inertia, velocity   I_O (3, 3) and v_O (3,) of one point O of the body; r_G (3,) from there to the centre of mass
@@ -128,8 +133,8 @@ def kinetic_energy(mass: Any, inertia: Any, velocity: Any, omega: Any, r_G: Any 
 
 # -- equations of motion
 
-def moment_equation(inertia: Any, omega: Any, alpha: Any, mass: Any = 0, r_G: Any = (0, 0, 0),
-                    acceleration: Any = (0, 0, 0)) -> Any:
+def moment_equation(inertia: Matrix, omega: Components, alpha: Components, mass: Scalar = 0, r_G: Components = (0, 0, 0),
+                    acceleration: Components = (0, 0, 0)) -> Array:
     """The moment that the motion needs about a point O of the body, (3,), N m:
 
     M_O = I_O alpha + omega x I_O omega + m r_G x a_O.
@@ -149,7 +154,8 @@ def moment_equation(inertia: Any, omega: Any, alpha: Any, mass: Any = 0, r_G: An
     return take.given_back(times(I, w_rate) + w.cross(times(I, w)) + m * r.cross(a))
 
 
-def force_equation(mass: Any, acceleration: Any, omega: Any = (0, 0, 0), alpha: Any = (0, 0, 0), r_G: Any = (0, 0, 0)) -> Any:
+def force_equation(mass: Scalar, acceleration: Components, omega: Components = (0, 0, 0), alpha: Components = (0, 0, 0),
+                   r_G: Components = (0, 0, 0)) -> Array:
     """The force that the motion needs, (3,), N: F = m a_G = m (a_O + alpha x r_G + omega x (omega x r_G)).
 
     Arguments as for `moment_equation`; O = G if r_G is left out. Raises ArgumentError, telling all faults.
@@ -162,7 +168,8 @@ def force_equation(mass: Any, acceleration: Any, omega: Any = (0, 0, 0), alpha: 
     return take.given_back(m * (a + w_rate.cross(r) + w.cross(w.cross(r))))
 
 
-def planar_moment_equation(inertia: Any, alpha: Any, mass: Any = 0, r_G: Any = (0, 0), acceleration: Any = (0, 0)) -> Any:
+def planar_moment_equation(inertia: Scalar, alpha: Scalar, mass: Scalar = 0, r_G: Components = (0, 0),
+                           acceleration: Components = (0, 0)) -> Scalar:
     """About z at a point O: M_O = I_O alpha + m (x_G a_y - y_G a_x), N m; at the centre of mass I_G alpha.
 
     inertia             I_O about z, kg m^2, a number or expression
@@ -178,7 +185,8 @@ def planar_moment_equation(inertia: Any, alpha: Any, mass: Any = 0, r_G: Any = (
     return take.given_back(I * w_rate + m * (r[0] * a[1] - r[1] * a[0]))
 
 
-def planar_force_equation(mass: Any, acceleration: Any, omega: Any = 0, alpha: Any = 0, r_G: Any = (0, 0)) -> Any:
+def planar_force_equation(mass: Scalar, acceleration: Components, omega: Scalar = 0, alpha: Scalar = 0,
+                          r_G: Components = (0, 0)) -> Array:
     """In the plane: F = m a_G = m (a_O + alpha [-y_G, x_G] - omega^2 r_G), (2,), N.
 
     Arguments as for `planar_moment_equation`; omega rad/s. Raises ArgumentError, telling all faults.
@@ -191,7 +199,7 @@ def planar_force_equation(mass: Any, acceleration: Any, omega: Any = 0, alpha: A
     return take.given_back(m * (a + w_rate * sp.Matrix([-r[1], r[0]]) - w**2 * r))
 
 
-def equivalent_force_system(force: Any, r: Any, moment: Any = (0, 0, 0)) -> ForceSystem:
+def equivalent_force_system(force: Components, r: Components, moment: Components = (0, 0, 0)) -> ForceSystem:
     """A force and a moment at P as they act at another point G of the body: the same force, and M_G = M_P + r x F.
 
     force    (3,) at P, N

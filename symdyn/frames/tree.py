@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -21,6 +21,10 @@ from symdyn.frames.product import times
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tidy import tidy
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Matrix
+    from symdyn.given import Vector as Components
 
 ZERO = sp.ImmutableMatrix(sp.zeros(3, 1))
 
@@ -33,7 +37,7 @@ class Axes:
     path    from the first of the tree to this one
     """
 
-    def __init__(self, name: str, parent: Any, rotation: Any, origin: Any) -> None:
+    def __init__(self, name: str, parent: Axes | None, rotation: Matrix | None, origin: Components) -> None:
         faults = FrameFaults(f"frame {name}" if isinstance(name, str) else "a frame")
         faults.name(name, "frame")
         if parent is not None and not isinstance(parent, Axes):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
+import numpy as np
 import sympy as sp
 
 from symdyn.frames.checks import FrameFaults
@@ -11,6 +12,10 @@ from symdyn.frames.numbers import numbers
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tree import Axes, along, angular_motion, demand_frames
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Motions, Times
+    from symdyn.given import Vector as Components
 
 
 class Vector:
@@ -21,7 +26,7 @@ class Vector:
     Source: lecture, chapters 1.5 and 1.6.
     """
 
-    def __init__(self, name: str, frame: Axes, components: Any) -> None:
+    def __init__(self, name: str, frame: Axes, components: Components) -> None:
         faults = FrameFaults(f"vector {name}" if isinstance(name, str) else "a vector")
         faults.name(name, "vector")
         self.name = name
@@ -46,9 +51,9 @@ class Vector:
         own = sp.ImmutableMatrix(3, 1, differentiated(self.given))
         return sp.Matrix(along(own, self.frame, components) + omega.cross(along(self.given, self.frame, components)))
 
-    def at(self, values: Any = None, components: Axes | None = None, t: Any = None) -> Any:
+    def at(self, values: Motions | None = None, components: Axes | None = None, t: Times | None = None) -> np.ndarray:
         """Its components as numbers, (3,), or (n_t, 3) at an array of times; values, t and errors as for `numbers`."""
-        return numbers(self.components(self.frame if components is None else components), values, t)
+        return np.asarray(numbers(self.components(self.frame if components is None else components), values, t))
 
     def __repr__(self) -> str:
         return f"Vector({shown(self.name)}, {list(self.given)} in {shown(self.frame.name)})"

@@ -155,7 +155,7 @@ def _elevator() -> list[Formula]:
         Formula("Newton's law, falling", (m * z.ddot * k, -m * g * k), (m * rdd_PE, weight), line=419, also=(417,)),
         Formula("acceleration, falling", -g * k, rdd_PE.xreplace(g_down), line=421, latex=r"\ddot{r}_{P/E}"),
         Formula("acceleration of O, falling", -g * k, rdd_OE.xreplace(g_down), line=442, latex=r"\ddot{r}_{O/E}"),
-        Formula("forces, falling", -m * g * k + m * g * k, weight + inertial.xreplace(g_down), line=444),
+        Formula("forces, falling", -m * g * k + m * g * k, weight + sp.Matrix(inertial).xreplace(g_down), line=444),
         Formula("weight felt, falling", 0 * k, m * P.acceleration(seen_from=b), line=446),
         Formula("Newton's law on the scale", (m * z.ddot * k, -m * g * k + N * k), (m * rdd_PE, weight + N * k), line=466,
                 also=(492,)),

@@ -62,7 +62,7 @@ def _determination() -> list[Formula]:
     i, j = sp.Matrix([0, 0, 1]), sp.Matrix([0, 1, 0])
     given = sp.Matrix.hstack(i, j, i.cross(j))
     found = sd.rotation.to_euler(given, "ZYX")
-    back = sd.rotation.from_euler("ZYX", found.at(first=psi))
+    back = sp.Matrix(sd.rotation.from_euler("ZYX", found.at(first=psi)))
     n = sp.Symbol("n", integer=True)
     at_lock = sp.Matrix([[0, -sin(psi + phi), -cos(psi + phi)], [0, cos(psi + phi), -sin(psi + phi)], [1, 0, 0]])
     up = proofs.Proof("entry of R", "R_31 = -sin theta must be 1 for n = 0, 1, 2 and 3.",

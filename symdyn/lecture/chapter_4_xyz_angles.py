@@ -58,7 +58,7 @@ def _lock() -> list[Formula]:
     G_lock = sd.rotation.euler_rates("XYZ", (phi, sp.pi / 2, psi))
     return [
         Formula("omega at 90 degrees", printed, at_lock, line=6446, latex=r"{}^n\omega_{b_3/n}"),
-        Formula("det G at 90 degrees", sp.S.Zero, G_lock.det(), line=6449, latex=r"\det G"),
+        Formula("det G at 90 degrees", sp.S.Zero, sp.Matrix(G_lock).det(), line=6449, latex=r"\det G"),
         Formula("angle of lock", sp.pi / 2, sd.rotation.gimbal_lock("XYZ").second[1], line=6438, also=(6575,), latex=r"\theta"),
     ]
 

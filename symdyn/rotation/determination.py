@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -20,6 +20,9 @@ from symdyn.rotation.matrices import turn
 from symdyn.rotation.proper import as_floats, deviation, only_floats, rotation_matrix
 from symdyn.rotation.sequence import EulerSequence, sequence_of
 from symdyn.rotation.zero import vanishes
+
+if TYPE_CHECKING:
+    from symdyn.given import Angle, Array, Matrix
 
 # Distance from lock, rad, below which R does not tell first and third angle apart; of an R that is orthogonal to d: 2 d.
 LOCKED = 1e-15
@@ -41,13 +44,13 @@ class EulerSolutions(Sequence[Any]):
     """
 
     sequence: str
-    locked: Any
-    angles: Any
-    other: Any
-    distance: Any
-    sign: Any
-    value: Any
-    R: Any
+    locked: bool | np.ndarray
+    angles: Array
+    other: Array
+    distance: Angle
+    sign: int | np.ndarray | None
+    value: Angle | None
+    R: Array
 
     def __len__(self) -> int:
         return 2
@@ -56,16 +59,16 @@ class EulerSolutions(Sequence[Any]):
         return (self.angles, self.other)[index]
 
     @property
-    def fixed(self) -> Any:
+    def fixed(self) -> str | np.ndarray:
         """A sentence on what R fixes; with leading axes an array of sentences."""
         of = EulerSequence(self.sequence)
         if not isinstance(self.locked, np.ndarray):
             return _sentence(of, self.locked, self.distance, self.sign, self.value)
-        flat = [_sentence(of, *one) for one in zip(self.locked.flat, self.distance.flat, self.sign.flat, self.value.flat,
-                                                   strict=True)]
+        facts = [np.asarray(one).flat for one in (self.locked, self.distance, self.sign, self.value)]
+        flat = [_sentence(of, *one) for one in zip(*facts, strict=True)]
         return np.array(flat, dtype=object).reshape(self.locked.shape)
 
-    def at(self, first: Any = None, third: Any = None) -> Any:
+    def at(self, first: Angle | None = None, third: Angle | None = None) -> Array:
         """The member (3,) of the family with this first, or this third, angle, rad.
 
         Raises RotationError if the rotation is not at gimbal lock, where no angle is free, or not one of the two is given.
@@ -102,7 +105,7 @@ class EulerSolutions(Sequence[Any]):
         return f"{self.sequence} angles {_row(self.angles)} or {_row(self.other)} rad"
 
 
-def to_euler(R: Any, sequence: str) -> EulerSolutions:
+def to_euler(R: Matrix, sequence: str) -> EulerSolutions:
     """The Euler angles of a rotation R (3, 3): both solutions, or at gimbal lock the family; see EulerSolutions.
 
     Numbers may have leading axes. Locked is what is nearer to lock than 1e-15 rad, or than twice the largest entry of
@@ -199,7 +202,8 @@ def _short(square: Any) -> Any:
 
 def _as_expressions(found: EulerSolutions, R: Any) -> EulerSolutions:
     value = None if found.value is None else sp.Float(found.value)
-    return EulerSolutions(found.sequence, found.locked, sp.Matrix(found.angles.tolist()), sp.Matrix(found.other.tolist()),
+    return EulerSolutions(found.sequence, found.locked, sp.Matrix(np.asarray(found.angles).tolist()),
+                          sp.Matrix(np.asarray(found.other).tolist()),
                           found.distance, found.sign, value, R)
 
 

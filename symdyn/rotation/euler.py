@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -14,11 +14,14 @@ from symdyn.rotation.sequence import EulerSequence, gimbal_lock, sequence_of
 from symdyn.rotation.zero import vanishes
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from symdyn.given import Array, Vector
+
 # Sine or cosine of the second angle that G^-1 is divided by: below, more than half of the digits are lost.
 LOCK = 1e-8
 
 
-def from_euler(sequence: str, angles: Any) -> Any:
+def from_euler(sequence: str, angles: Vector) -> Array:
     """R (3, 3) = R_1(a) R_2(b) R_3(c) of three successive rotations about body axes; it takes components in b to those in n.
 
     sequence   one of the twelve, "ZYX" is yaw, pitch, roll
@@ -30,7 +33,7 @@ def from_euler(sequence: str, angles: Any) -> Any:
     return R_1 @ R_2 @ R_3
 
 
-def euler_rates(sequence: str, angles: Any, frame: str = "n") -> Any:
+def euler_rates(sequence: str, angles: Vector, frame: str = "n") -> Array:
     """G (3, 3) with omega = G gamma_dot, gamma_dot the rates of the angles in the order of the sequence.
 
     frame   the components of omega: "n" or "b"
@@ -48,7 +51,7 @@ def euler_rates(sequence: str, angles: Any, frame: str = "n") -> Any:
     return algebra.matrix([[column[row] for column in columns] for row in range(3)])
 
 
-def euler_rates_inverse(sequence: str, angles: Any, frame: str = "n") -> Any:
+def euler_rates_inverse(sequence: str, angles: Vector, frame: str = "n") -> Array:
     """G^-1 (3, 3) with gamma_dot = G^-1 omega; arguments as for euler_rates.
 
     Raises GimbalLock where the sine (proper sequences) or cosine (Tait-Bryan) of the second angle is below 1e-8 in numbers,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -13,12 +13,15 @@ from symdyn.rotation.algebra import Algebra, Expressions, algebra_of
 from symdyn.rotation.zero import all_zero
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from symdyn.given import Angle, Array, Axis, Matrix, Vector
+
 # How far the length of a vector given as a unit vector, or of Euler parameters, may be from 1; how far from zero the entries
 # of S + S^T of a skew-symmetric S of size 1.
 UNIT = 1e-9
 
 
-def about(axis: Any, angle: Any, *, unit: bool = False) -> Any:
+def about(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
     """R (3, 3), the rotation about an axis by an angle, rad: it takes components in b to components in n.
 
     axis    "X", "Y", "Z" (or 0, 1, 2), or a vector (3,) of any length but zero, in n- or b-components, which are the same
@@ -44,7 +47,7 @@ def about(axis: Any, angle: Any, *, unit: bool = False) -> Any:
                            [v * x * z - s * y, v * y * z + s * x, c + v * z * z]])
 
 
-def from_axis_angle(axis: Any, angle: Any, *, unit: bool = False) -> Any:
+def from_axis_angle(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
     """R (3, 3) from axis and angle, rad: the same as about(axis, angle)."""
     return about(axis, angle, unit=unit)
 
@@ -106,14 +109,14 @@ def norm(v: np.ndarray) -> np.ndarray:
         return np.sqrt((v * v).sum(axis=-1))
 
 
-def skew(v: Any) -> Any:
+def skew(v: Vector) -> Array:
     """S (3, 3) with S a = v x a; numbers may have leading axes. Raises ArgumentError for anything but three components."""
     algebra = algebra_of(v)
     x, y, z = algebra.components(algebra.read(v, (3,), "the vector"))
     return algebra.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-def vee(S: Any) -> Any:
+def vee(S: Matrix) -> Array:
     """v (3,) with S = skew(v): the inverse of skew; numbers may have leading axes.
 
     Raises ArgumentError if numbers are not skew-symmetric to 1e-9 of their size. Of expressions with symbols this is not
@@ -134,7 +137,7 @@ def _check_skew(rows: list[list[Any]]) -> None:
                             f"{UNIT:g} of its size {size:.3g}); (S - S^T) / 2 is its skew-symmetric part")
 
 
-def infinitesimal(delta: Any) -> Any:
+def infinitesimal(delta: Vector) -> Array:
     """1 + skew(delta) (3, 3): the rotation by a small vector delta (3,), rad, to first order.
 
     Small rotations add and commute; the error is of second order, so that the matrix is no rotation, only near one.

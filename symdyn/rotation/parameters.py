@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -14,22 +14,25 @@ from symdyn.rotation.matrices import UNIT, axis_number, norm, unit_axis
 from symdyn.rotation.proper import as_floats, only_floats, rotation_matrix
 from symdyn.rotation.zero import all_zero, vanishes
 
+if TYPE_CHECKING:
+    from symdyn.given import Angle, Array, Axis, Matrix, Vector
 
-def E(p: Any) -> Any:
+
+def E(p: Vector) -> Array:
     """E (3, 4) of any four numbers: R = E E_bar^T, omega in n-components is 2 E p_dot. Source: lecture, chapter 4.5."""
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(algebra.read(p, (4,), "p"))
     return algebra.matrix([[-e1, e0, -e3, e2], [-e2, e3, e0, -e1], [-e3, -e2, e1, e0]])
 
 
-def E_bar(p: Any) -> Any:
+def E_bar(p: Vector) -> Array:
     """E_bar (3, 4) of any four numbers: R = E E_bar^T, omega in b-components is 2 E_bar p_dot. Source: lecture, chapter 4.5."""
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(algebra.read(p, (4,), "p"))
     return algebra.matrix([[-e1, e0, e3, -e2], [-e2, -e3, e0, e1], [-e3, e2, -e1, e0]])
 
 
-def from_parameters(p: Any) -> Any:
+def from_parameters(p: Vector) -> Array:
     """R (3, 3) = E E_bar^T of Euler parameters (4,), theta0 first; numbers may have leading axes.
 
     Numbers are divided by their norm, so that R is a rotation to the last digit; symbols are taken to be of norm 1.
@@ -40,7 +43,7 @@ def from_parameters(p: Any) -> Any:
     return E(p) @ algebra.transposed(E_bar(p))
 
 
-def to_parameters(R: Any) -> Any:
+def to_parameters(R: Matrix) -> Array:
     """Euler parameters (4,), theta0 first, of a rotation R (3, 3); numbers may have leading axes.
 
     Of p and -p, which are the same rotation, that with theta0 > 0, or with the first of theta1, theta2, theta3 that is not
@@ -63,7 +66,7 @@ def to_parameters(R: Any) -> Any:
     return _of_positive_sign(normalized(p))
 
 
-def compose(p: Any, r: Any) -> Any:
+def compose(p: Vector, r: Vector) -> Array:
     """Euler parameters (4,) of the product of two rotations: R(compose(p, r)) = R(p) R(r).
 
     The norm of numbers is kept at 1; they may have leading axes. Raises NotNormalized.
@@ -76,14 +79,14 @@ def compose(p: Any, r: Any) -> Any:
                                           a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w]))
 
 
-def inverse(p: Any) -> Any:
+def inverse(p: Vector) -> Array:
     """Euler parameters (4,) of the inverse rotation: theta0 and the others with a minus. Raises NotNormalized."""
     algebra = algebra_of(p)
     e0, e1, e2, e3 = algebra.components(unit_parameters(algebra, p))
     return algebra.vector([e0, -e1, -e2, -e3])
 
 
-def normalized(p: Any) -> Any:
+def normalized(p: Vector) -> Array:
     """p (4,) divided by its norm; numbers may have leading axes. Raises NotNormalized for zero, which has no direction."""
     algebra = algebra_of(p)
     p = algebra.read(p, (4,), "p")
@@ -99,7 +102,7 @@ def normalized(p: Any) -> Any:
     return scaled / norm(scaled)[..., None]
 
 
-def omega_from_parameters(p: Any, pd: Any, frame: str = "n") -> Any:
+def omega_from_parameters(p: Vector, pd: Vector, frame: str = "n") -> Array:
     """omega (3,) = 2 E p_dot in n-components, 2 E_bar p_dot in b-components.
 
     p, pd   (4,); what of pd is along p, which would change the norm, has no effect; numbers may have leading axes
@@ -110,7 +113,7 @@ def omega_from_parameters(p: Any, pd: Any, frame: str = "n") -> Any:
     return algebra.times(2 * (E(p) if in_n else E_bar(p)), pd)
 
 
-def parameters_rate(p: Any, omega: Any, frame: str = "n") -> Any:
+def parameters_rate(p: Vector, omega: Vector, frame: str = "n") -> Array:
     """p_dot (4,) = E^T omega / 2 of omega (3,) in n-components, E_bar^T omega / 2 in b-components; the norm of p stays.
 
     Numbers may have leading axes. Raises NotNormalized. Source: lecture, chapter 4.5.
@@ -120,7 +123,7 @@ def parameters_rate(p: Any, omega: Any, frame: str = "n") -> Any:
     return algebra.times(algebra.transposed(E(p) if in_n else E_bar(p)), omega) / 2
 
 
-def parameters_of_axis_angle(axis: Any, angle: Any, *, unit: bool = False) -> Any:
+def parameters_of_axis_angle(axis: Axis, angle: Angle, *, unit: bool = False) -> Array:
     """Euler parameters (4,) = (cos(angle / 2), a sin(angle / 2)); axis, angle and unit as for about.
 
     An angle beyond pi or below -pi gives a negative theta0. Raises ZeroAxis. Source: lecture, chapter 4.5.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
 from symdyn.errors import NotARotation
 from symdyn.rotation.algebra import Algebra, Expressions, Numbers, algebra_of
+
+if TYPE_CHECKING:
+    from symdyn.given import Array, Matrix
 
 # Largest entry of |R^T R - 1| that passes as rounding.
 ORTHOGONAL = 1e-9
@@ -39,7 +42,7 @@ def deviation(R: np.ndarray) -> np.ndarray:
     return abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
 
 
-def nearest(R: Any) -> Any:
+def nearest(R: Matrix) -> Array:
     """The rotation (3, 3) nearest to a matrix of numbers that is one but for rounding or measurement, by singular values.
 
     Numbers may have leading axes; a SymPy matrix of numbers gives SymPy floats.

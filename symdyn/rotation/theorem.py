@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -11,6 +11,9 @@ from symdyn.rotation.algebra import Expressions, algebra_of
 from symdyn.rotation.parameters import to_parameters, unit_parameters
 from symdyn.rotation.proper import as_floats, only_floats, rotation_matrix
 from symdyn.rotation.zero import vanishes
+
+if TYPE_CHECKING:
+    from symdyn.given import Matrix, Vector
 
 # Angles this near to 0 or pi, rad, are that: R does not tell them apart.
 ROUNDING = 1e-15
@@ -45,7 +48,7 @@ _AT_ZERO = "the angle is 0: there is no rotation, and the axis is arbitrary"
 _AT_PI = "the angle is pi: the sign of the axis is arbitrary"
 
 
-def axis_angle(R: Any) -> AxisAngle:
+def axis_angle(R: Matrix) -> AxisAngle:
     """(axis, angle) of a rotation R (3, 3): unit vector (3,) and rad in [0, pi], with a `.note` on what is arbitrary.
 
     Numbers may have leading axes. At angle 0 the axis is arbitrary, and "X" is given; at pi its sign is. Numbers go by the
@@ -69,7 +72,7 @@ def axis_angle(R: Any) -> AxisAngle:
     return _symbolic(to_parameters(R))
 
 
-def axis_angle_of_parameters(p: Any) -> AxisAngle:
+def axis_angle_of_parameters(p: Vector) -> AxisAngle:
     """(axis, angle) of Euler parameters (4,): unit vector (3,) and rad in [0, pi], with a `.note` on what is arbitrary.
 
     Numbers may have leading axes. p and -p give the same. Expressions with symbols: angle 2 atan2(|v|, theta0) in [0, 2 pi]

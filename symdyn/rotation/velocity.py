@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -13,11 +13,14 @@ from symdyn.rotation.algebra import Expressions, algebra_of
 from symdyn.rotation.euler import frame_of
 from symdyn.rotation.proper import rotation_matrix
 
+if TYPE_CHECKING:
+    from symdyn.given import Array, Matrix
+
 # What of the size of R_dot R^T may not be skew-symmetric: as much as differences of R leave.
 RATE = 1e-6
 
 
-def angular_velocity(R: Any, frame: str = "n", *, R_dot: Any = None) -> Any:
+def angular_velocity(R: Matrix, frame: str = "n", *, R_dot: Matrix | None = None) -> Array:
     """omega (3,), rad per unit of time, of b seen from n: skew(omega) = R_dot R^T in n-components, R^T R_dot in b-components.
 
     R       (3, 3), from b to n, of coordinates (whose rates are their .dot), of SymPy's functions of t, and of t itself;
