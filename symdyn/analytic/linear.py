@@ -39,6 +39,7 @@ from symdyn.tape.tape import Tape, reachable
 if TYPE_CHECKING:
     from symdyn.analytic.stability import Characteristic
     from symdyn.formulation.equations import Equations
+    from symdyn.given import Named, Scalar
 
 # Terms that a product may have in an entry, seconds in which a matrix is written; digits of the numbers by which dependent speeds
 # are chosen.
@@ -150,7 +151,7 @@ class Linearized:
 
         return characteristic(self)
 
-    def with_values(self, values: Mapping[Any, Any]) -> Linearized:
+    def with_values(self, values: Named[Scalar]) -> Linearized:
         """The same with numbers, or expressions in other parameters, for parameters by symbol or name.
 
         Raises ArgumentError for what is no parameter of it and for values that are no expressions."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -16,6 +16,9 @@ from symdyn.comparison.points import DIGITS, REMAINDER, Expressions, context, po
 from symdyn.comparison.values import Value, by_name, canonical, renaming, taken
 from symdyn.errors import CaseError, SymdynError
 from symdyn.model.symbols import symbols_of
+
+if TYPE_CHECKING:
+    from symdyn.given import Matrix, Named, Scalar
 
 POINTS = 4
 # With decimal fractions in it, the residual of a right formula is the rounding of a float, and that of a wrong one stands out.
@@ -146,13 +149,13 @@ def _minus(formula: Any, value: Any, what: str) -> Any:
     return own.as_sympy() - other_one.as_sympy()
 
 
-def other(sentence: str, value: Any) -> Proof:
+def other(sentence: str, value: Scalar | Matrix) -> Proof:
     """Another formulation gives `value`, of the formula's shape; or a function that returns it."""
     return Proof("another formulation", sentence,
                  lambda formula: _minus(formula, value() if callable(value) else value, "what the other formulation gives"))
 
 
-def limit(sentence: str, at: Mapping[Any, Any], value: Any) -> Proof:
+def limit(sentence: str, at: Named[Scalar], value: Scalar | Matrix) -> Proof:
     """With these values of symbols the formula must become `value`, of its shape.
 
     Raises CaseError for values that are no expressions.
@@ -173,7 +176,7 @@ def limit(sentence: str, at: Mapping[Any, Any], value: Any) -> Proof:
     return Proof("limit", sentence, residual)
 
 
-def dimensions(sentence: str, units: Mapping[Any, Sequence[float]], unit: Sequence[float]) -> Proof:
+def dimensions(sentence: str, units: Named[Sequence[float]], unit: Sequence[float]) -> Proof:
     """The formula must have the unit (kg, m, s) when its symbols have theirs: units = {m: (1, 0, 0), v: (0, 1, -1), ...}.
 
     Symbols that are left out are pure numbers. Every unit is made smaller by a factor of its own, and the value must follow.
@@ -277,8 +280,8 @@ def _one_each(symbols: set[sp.Symbol]) -> list[sp.Symbol]:
     return list(chosen.values())
 
 
-def energy_balance(sentence: str, coordinates: Sequence[sp.Symbol], energy: Any, equations: Callable[[Any], Any] | None = None,
-                   power: Any = 0) -> Proof:
+def energy_balance(sentence: str, coordinates: Sequence[sp.Symbol], energy: Scalar, equations: Callable[[Any], Any] | None = None,
+                   power: Scalar = 0) -> Proof:
     """The accelerations that solve the equations must change the energy at the rate `power`.
 
     coordinates   whose second derivatives the equations determine

@@ -6,7 +6,7 @@ import difflib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,11 @@ from symdyn.ensembles.archive import reading
 from symdyn.ensembles.store import RESULT, read_failures
 from symdyn.errors import ArgumentError
 from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from symdyn.given import Key, PathName
 
 
 class Ensemble:
@@ -43,7 +48,7 @@ class Ensemble:
         self.units: dict[str, str] = about["units"]
         self.count: int = about["count"]
 
-    def __getitem__(self, name: Any) -> np.ndarray:
+    def __getitem__(self, name: Key) -> np.ndarray:
         """An outcome, or values of what was sampled, (count, ...); not a number where a member failed.
 
         Raises ArgumentError for an unknown name.
@@ -74,7 +79,7 @@ class Ensemble:
         """Members that failed, each with index, values and message; the first few, or all."""
         return read_failures(self.path, most)
 
-    def plot(self, path: Any = None, scatter: Sequence[tuple[str, str]] | None = None) -> Any:
+    def plot(self, path: PathName | None = None, scatter: Sequence[tuple[str, str]] | None = None) -> Figure:
         """Quantiles of every trace over time, and pairs of (sampled, outcome) as points; returns the matplotlib figure, and saves
         it if a path is given. Raises MissingExtra without matplotlib, ArgumentError for unknown names."""
         from symdyn.ensembles.picture import draw

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,14 @@ from symdyn.runtime.inputs.inputs import varies_over_time
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from symdyn.ensembles.samples import SampleValues
+    from symdyn.given import PathName, Row, Times, Values
+    from symdyn.model.system import System
+    from symdyn.runtime.module import InputValues
+
 # Samples in a chunk, unless there are few samples or it is asked otherwise; chunks that few samples are divided into.
 CHUNK, PARTS = 1000, 16
 # Samples that are simulated in advance, to know the shapes of outcomes and what code workers need.
@@ -41,12 +49,14 @@ TRIED = 8
 VECTORS_FROM = 2000
 
 
-def ensemble(system: Any, samples: Any, t: Any = None, outcomes: Any = None, *, q: Any = None, u: Any = None, z: Any = None,
-             params: Any = None, inputs: Any = None, executor: Any = None, chunk: int | None = None, path: Any = None,
+def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times | None = None, outcomes: Any = None, *,
+             q: Values | None = None, u: Values | None = None, z: Values | None = None, params: Values | None = None,
+             inputs: InputValues | None = None, executor: Any = None, chunk: int | None = None, path: PathName | None = None,
              resume: bool = False, progress: bool = False, consistent: bool = False, outstanding: int | None = None,
-             functions: tuple[str, ...] = (), rtol: float | None = None, atol: Any = None, method: Any = None,
-             max_step: float | None = None, first_step: float | None = None, max_steps: int | None = None,
-             stabilization: Any = None, events: Any = None, event_spacing: float | None = None) -> Ensemble:
+             functions: tuple[str, ...] = (), rtol: float | None = None, atol: float | Row | None = None,
+             method: str | type | None = None, max_step: float | None = None, first_step: float | None = None,
+             max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
+             events: bool | str | Sequence[str] | None = None, event_spacing: float | None = None) -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,13 @@ from symdyn.ensembles.axes import SMALLEST, Axis, read_axis
 from symdyn.errors import ArgumentError
 from symdyn.runtime.memory import in_bytes
 from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Named, Row
+
+    # A number, a list, or what describes a distribution or spaced values: {"from": ..., "to": ..., "count": ...}.
+    SampleValue: TypeAlias = float | Row | Mapping[str, float] | Mapping[str, str | float]
+    SampleValues: TypeAlias = Named[float] | Named[Row] | Named[SampleValue]
 
 SAMPLINGS = ("paired", "grid", "random", "latin_hypercube", "sobol")
 # Rounds of the network that permutes numbers; from four on it is as good as random.
@@ -39,7 +46,7 @@ class Samples:
     Raises ArgumentError with all that is wrong.
     """
 
-    def __init__(self, values: Mapping[Any, Any], sampling: str | None = None, count: int | None = None, seed: int = 0,
+    def __init__(self, values: SampleValues, sampling: str | None = None, count: int | None = None, seed: int = 0,
                  where: str = "samples") -> None:
         faults: list[str] = []
         axes: dict[str, Axis] = {}

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -30,6 +30,10 @@ from symdyn.tape.node import Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import printed_as_decimal
 from symdyn.tape.tape import Tape, reachable
+
+if TYPE_CHECKING:
+    from symdyn.formulation.equations import Equations
+    from symdyn.given import Matrix, Scalar
 
 # States that are tried to refute a claim, digits of the evaluation; relative differences up to SAME are none, and up to ROUNDED
 # of the largest entry they may come from decimal numbers, which are rounded to doubles.
@@ -61,7 +65,7 @@ class Proof:
     refuted: bool = False
     reason: str = ""
     index: tuple[int, ...] | None = None
-    state: Mapping[Any, float] = field(default_factory=dict)
+    state: Mapping[sp.Symbol, float] = field(default_factory=dict)
     difference: Any = None
 
     def __bool__(self) -> bool:
@@ -80,7 +84,7 @@ class Proof:
         return str(self)
 
 
-def prove(a: Any, b: Any = 0) -> Proof:
+def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0) -> Proof:
     """Whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
 
     a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too

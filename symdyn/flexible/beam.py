@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from symdyn.flexible.modal_body import ModalBody
 from symdyn.flexible.shape import Basis, Shape
 from symdyn.flexible.table import Table, numbers, table
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Matrix, Row
 
 _INTEGRATIONS = ("exact", "stations")
 _MOST_MODES, _MOST_DRAWN = 40, 100_000
@@ -45,9 +48,9 @@ class Beam:
     centrifugal and gravity stiffening; see ModalBody for what is neglected. Raises ModelError with all faults.
     """
 
-    def __init__(self, stations: Any, mass_per_length: Any, stiffness: Any, shapes: Sequence[Shape] | int, *,
-                 length: float | None = None, axis: str = "z", twist: Any = None, damping_ratio: Any = 0.0,
-                 integration: str = "exact", draw: int = 21, name: str = "beam") -> None:
+    def __init__(self, stations: Row, mass_per_length: float | Row, stiffness: float | Row | tuple[Row, Row],
+                 shapes: Sequence[Shape] | int, *, length: float | None = None, axis: str = "z", twist: Row | None = None,
+                 damping_ratio: float | Row = 0.0, integration: str = "exact", draw: int = 21, name: str = "beam") -> None:
         faults: list[str] = []
         self.name, self.axis, self.integration = str(name), axis, integration
         if not isinstance(axis, str) or axis not in AXES:
@@ -78,8 +81,8 @@ class Beam:
         X = np.linspace(0, self.table.length, self._draw)
         return integrate(self.table, basis, self.axis, self._ratios, self.integration, X, self.name, names)
 
-    def modes(self, count: int, *, tip_mass: float = 0.0, tip_com: Any = (0, 0, 0), tip_inertia: Any = None,
-              omega: Any = (0, 0, 0), gravity: Any = (0, 0, 0)) -> list[Shape]:
+    def modes(self, count: int, *, tip_mass: float = 0.0, tip_com: Row = (0, 0, 0), tip_inertia: Matrix | None = None,
+              omega: Row = (0, 0, 0), gravity: Row = (0, 0, 0)) -> list[Shape]:
         """The shapes of the first modes of the clamped beam, by finite elements on its table; the largest deflection is 1.
 
         The tip body, the angular velocity of the root and gravity are as for `clamped`; gyroscopic terms are left out, so

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PPoly
 
 from symdyn.flexible.table import numbers, rising
 from symdyn.shown import name_of
+
+if TYPE_CHECKING:
+    from symdyn.given import Row
 
 # A shape is not clamped if the slope that its samples have at the clamp is more than this part of their largest slope.
 _LARGEST_SLOPE = 0.25
@@ -31,8 +34,9 @@ class Shape:
     twisted blades do. Faults are told by the Beam that gets the shape.
     """
 
-    def __init__(self, direction: str, coefficients: Any = None, *, powers: Any = None, stations: Any = None, values: Any = None,
-                 slopes: Any = None, curvatures: Any = None, name: str = "") -> None:
+    def __init__(self, direction: str, coefficients: Row | None = None, *, powers: Sequence[int] | None = None,
+                 stations: Row | None = None, values: Row | None = None, slopes: Row | None = None,
+                 curvatures: Row | None = None, name: str = "") -> None:
         self.name = str(name)
         self.faults: list[str] = []
         self.parts: tuple[tuple[str, PPoly | BPoly, bool], ...] = ()  # direction, curve over xi or station, sampled

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from symdyn.analytic.units import UnitReport
+    from symdyn.exact.mechanism import Proofs
     from symdyn.formulation.identification.quantities import BaseParameters
+    from symdyn.given import Numbers
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
     from symdyn.verification import Verification
@@ -278,7 +280,7 @@ class Equations:
         return self.compile(backend="numpy").function(name)
 
     def compile(self, backend: str | None = None, templates: str | os.PathLike[str] | None = None,
-                specialize: Mapping[Any, float] | None = None) -> Module:
+                specialize: Numbers | None = None) -> Module:
         """A numeric module.
 
         backend      "c" or "numpy"; default: C if a compiler is found, else NumPy, and `module.fallback` says why
@@ -292,7 +294,7 @@ class Equations:
         return compile_equations(self, backend, templates, specialize)
 
     def write(self, folder: str | os.PathLike[str], backend: str = "c", functions: Sequence[str] | None = None,
-              templates: str | os.PathLike[str] | None = None, specialize: Mapping[Any, float] | None = None,
+              templates: str | os.PathLike[str] | None = None, specialize: Numbers | None = None,
               integrator: bool = True, work: bool = False, baumgarte: bool = False, batch: bool = False,
               method: str = "dop853") -> list[Path]:
         """Write generated files that stand alone into a folder; returns their paths. No compiler is needed.
@@ -326,13 +328,13 @@ class Equations:
 
         return base_parameters(self)
 
-    def verify(self, states: int = 5, digits: int = 30, params: Mapping[Any, float] | None = None) -> Verification:
+    def verify(self, states: int = 5, digits: int = 30, params: Numbers | None = None) -> Verification:
         """Prove the equations sound by identities at random states; see symdyn.verification.verify."""
         from symdyn.verification import verify
 
         return verify(self, states, digits, params)
 
-    def prove(self, other: Equations | None = None) -> Any:
+    def prove(self, other: Equations | None = None) -> Proofs:
         """Decide identities of the equations by exact algebra, for every state; see symdyn.exact.mechanism.
 
         other   equations of the same mechanism that were derived separately, in the same coordinates: whether both are the same;

@@ -223,7 +223,7 @@ def statics() -> Iterator[Figure]:
     """Equilibria from random starts, and natural periods compared with those of free decay."""
     module = turbine(rotor="fixed").embedding().compile()
     reach = np.radians(20)
-    found = module.equilibria(100, {**dict.fromkeys("xyz", 3.0), **dict.fromkeys(("psi", "theta", "phi"), reach)})
+    found = module.equilibria(100, dict.fromkeys("xyz", 3.0) | dict.fromkeys(("psi", "theta", "phi"), float(reach)))
     yield "equilibria that 100 starts lead to", len(found), "", ""
     yield "starts that lead nowhere", len(found.failures), "", "<= 0"
     yield "most iterations of a start", int(found.iterations.max()), "", "<= 25"

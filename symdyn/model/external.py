@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -14,6 +14,9 @@ from symdyn.model.python_text import text_of
 from symdyn.shown import shown
 from symdyn.tape.external import UserFunction
 from symdyn.tape.reserved import OF_FUNCTIONS
+
+if TYPE_CHECKING:
+    from symdyn.given import Scalar
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _HEAD = r"\bstatic\s+(?:inline\s+)?int\s+{}\s*\(\s*const\s+double\s*\*\s*\w+\s*,\s*double\s*\*\s*\w+\s*\)\s*\{{"
@@ -48,8 +51,8 @@ class External:
     """
 
     def __init__(self, name: str, arguments: Sequence[str], results: int = 1, *, c: str | None = None,
-                 python: Callable[..., Any] | None = None, python_source: str = "", derivative: External | None = None,
-                 precise: Callable[..., Any] | None = None, texts: Mapping[str, str] | None = None, reason: str = "",
+                 python: Callable[..., object] | None = None, python_source: str = "", derivative: External | None = None,
+                 precise: Callable[..., object] | None = None, texts: Mapping[str, str] | None = None, reason: str = "",
                  operations: int = 1) -> None:
         faults = Faults()
         taken = _arguments(name, arguments, results, operations, faults)
@@ -72,7 +75,7 @@ class External:
             derivative=below, cost=operations, numbers=python, digits=precise,
             reason=reason or f"the function {name} failed or gave what is not finite")
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: Scalar) -> sp.Expr | tuple[sp.Expr, ...]:
         """Its result at these arguments, numbers or expressions; of several results a tuple. Raises ModelError."""
         f = self.function
         if len(arguments) != len(f.arguments):

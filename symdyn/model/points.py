@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from symdyn.model.bodies import Body
 from symdyn.model.quantity import Quantity, component
 
 if TYPE_CHECKING:
-    from symdyn.given import Vector
+    from symdyn.given import BodyOrName, Vector
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Point:
                "bias_acceleration", (6,), planar (3,): rows of the point's velocity first, then of the body's omega
     """
 
-    body: Any
-    at: Any
+    body: BodyOrName
+    at: Vector
     quantity: str = "position"
 
     def __getitem__(self, index: int) -> Quantity:

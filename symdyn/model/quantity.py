@@ -196,7 +196,7 @@ def multiplier(name: str) -> Quantity:
     return Quantity(Measure("multiplier", (_name(name, "sd.multiplier"),)))
 
 
-def reaction(joint: JointOrName, frame: Any = None) -> sp.ImmutableMatrix:
+def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.ImmutableMatrix:
     """What a joint transmits to its child, (6, 1): force (N), then moment about the joint's point on the child (N m).
 
     frame   a body in whose axes the components are taken; default: the n-frame

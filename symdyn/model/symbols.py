@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from functools import cache
 from inspect import getattr_static
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -17,6 +17,9 @@ from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ModelError
 from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Scalar
 
 time = sp.Symbol("t")
 
@@ -238,7 +241,7 @@ def described(symbol: sp.Symbol) -> str:
     return f"{kinds.get(type(symbol), 'a parameter')} {f'with {assumptions}' if assumptions else 'without assumptions'}"
 
 
-def partial_rate(value: Any) -> Any:
+def partial_rate(value: Scalar) -> sp.Expr:
     """The partial derivative by t of an expression or matrix: coordinates, their derivatives, speeds and inputs are constant.
 
     What is left of `symdyn.rate` where nothing moves, such as the C_t of a constraint; `value.diff(symdyn.t)` is the total

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from symdyn.formulation.printed.independent_speeds import MotionEquations
     from symdyn.formulation.trees.embedding import EmbeddedEquations
     from symdyn.formulation.trees.recursive import RecursiveEquations
-    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Numbers, Scalar, Values, Vector
+    from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Named, Numbers, Scalar, Values, Vector
     from symdyn.model.shapes import Shape
     from symdyn.runtime.module import Module
 
@@ -294,7 +294,7 @@ class System:
             self.constraints.append(Constraint(label, taken))
 
     def add_event(self, name: str, value: Scalar, direction: int = 0, stop: bool = False,
-                  reset: Mapping[Any, Scalar] | None = None) -> None:
+                  reset: Named[Scalar] | None = None) -> None:
         """An event where a value passes zero: its time and state are found and recorded in every simulation.
 
         Within every step the value is sampled as finely as it varies, so that zeros close together are found as well (see

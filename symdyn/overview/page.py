@@ -34,6 +34,7 @@ from symdyn.stress.run import stress
 from symdyn.stress.subject import Subject, named
 
 if TYPE_CHECKING:
+    from symdyn.given import PathName
     from symdyn.report.text import Report
 
 BUDGET = 20.0
@@ -44,8 +45,8 @@ STILL = ("The motion stands still, so that there is one state only to look at; s
 Told = Callable[[str], None]
 
 
-def full_report(system: Any, path: Any, budget: float = BUDGET, formulation: str = "auto", coordinates: str = "relative",
-                tune: bool = False, verify: bool = True, told: Told = lambda text: None) -> Path:
+def full_report(system: System | Equations, path: PathName, budget: float = BUDGET, formulation: str = "auto",
+                coordinates: str = "relative", tune: bool = False, verify: bool = True, told: Told = lambda text: None) -> Path:
     """Write everything about a mechanism into one HTML file that works offline; returns its path.
 
     system        a System, equations such as those of sd.embedding, or a name that sd.bench takes

@@ -20,6 +20,7 @@ from symdyn.tape.tape import Output
 
 if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
+    from symdyn.given import Matrix, Scalar
 
 # Letters in a line of an A4 page at 11 pt, roughly.
 WIDTH = 80
@@ -62,7 +63,7 @@ def without_macros(text: str) -> str:
     return text.replace(r"\bigl[", r"\mathopen{\big[}").replace(r"\bigr]", r"\mathclose{\big]}")
 
 
-def latex(value: Any, name: str = "", shorthand: bool = False, width: int = WIDTH) -> Typeset:
+def latex(value: Scalar | Matrix | Equations, name: str = "", shorthand: bool = False, width: int = WIDTH) -> Typeset:
     """An expression or matrix in LaTeX.
 
     name        code name of the quantity, for the left side: "M_tilde"; see symdyn.report.notation

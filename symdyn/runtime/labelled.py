@@ -50,7 +50,7 @@ class Labelled(np.ndarray):
             raise ArgumentError(f"there is no {name!r}; there are {', '.join(known) or 'none'}")
         return known.index(name)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, float | list[float]]:
         """Entries of a vector, or rows of a matrix, by name."""
         return dict(zip(self.names[0] if self.names else (), np.asarray(self).tolist(), strict=True))
 

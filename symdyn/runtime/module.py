@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -28,7 +28,8 @@ from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
-    from symdyn.given import Names, States, Times
+    from symdyn.given import Key, Named, Names, Numbers, PathName, Row, States, Times, Values
+    from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
     from symdyn.runtime.inputs.inputs import Inputs
     from symdyn.runtime.labelled import Labelled
@@ -40,13 +41,18 @@ if TYPE_CHECKING:
     from symdyn.statics.linearize import Linearization
     from symdyn.statics.stability import Stability
 
+    # A number; a table over time, as a pair of times and values or as Table; a function of (t, x); a controller whose values are
+    # held.
+    InputValue: TypeAlias = float | Table | tuple[Row, Row] | Callable[[float, np.ndarray], float] | Sampled
+    # Values of all inputs in one of these ways, or one for each by name.
+    InputValues: TypeAlias = (Row | Table | tuple[Row, Row | Sequence[Row]] | Callable[[float, np.ndarray], float | Row] | Sampled
+                              | Named[InputValue] | Numbers)
+    # Of coordinates by name or symbol: least and most, or r for (-r, r).
+    Ranges: TypeAlias = Named[float] | Named[tuple[float, float]] | Named[float | tuple[float, float]]
+    # A state: in order, by name or symbol, as (q, u), or with all that belongs to it.
+    Start: TypeAlias = Values | tuple[Row, Row] | Equilibrium | Solution
+
 Provider = Callable[[str | RightSide], Unit]
-Numbers = Sequence[float] | np.ndarray
-# In order, or by name or symbol.
-Values = Sequence[float] | np.ndarray | Mapping[Any, Any]
-# Numbers; tables over time, as pairs of times and values or as Table; functions of (t, x); controllers whose values are held; or
-# mappings from names to these.
-InputValues = Values | Table | tuple[Any, Any] | Callable[[float, np.ndarray], Any] | Sampled
 # Times that the generated code takes as they are.
 _TIMES = (float, np.float64)
 
@@ -85,7 +91,7 @@ class Module:
     """
 
     def __init__(self, metadata: ModuleMetadata, provider: Provider, backend: str, fallback: str = "",
-                 writer: Callable[[Path], list[Path]] | None = None, reporter: Callable[[], Any] | None = None) -> None:
+                 writer: Callable[[Path], list[Path]] | None = None, reporter: Callable[[], Report] | None = None) -> None:
         self.metadata = metadata
         self.name: str = metadata.name
         self.backend = backend
@@ -186,7 +192,7 @@ class Module:
         """Inputs (n_in,) with the motions of a run; None where the module follows none."""
         return None if self._left_out is None else self._left_out(t)
 
-    def mass_matrix(self, *at: Any, x: States | None = None, q: States | None = None, params: States | None = None,
+    def mass_matrix(self, *at: States | None, x: States | None = None, q: States | None = None, params: States | None = None,
                     t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """M_tilde (n_u, n_u): mass_matrix(t, x, params), where coordinates alone do for x, or mass_matrix(q, params, t=0).
 
@@ -197,14 +203,14 @@ class Module:
         call = ordered(self, "mass_matrix", at, named, ("q", "params", "t", "inputs"))
         return self._called("mass_matrix", call)
 
-    def k_tilde(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+    def k_tilde(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                 params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0)."""
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "k_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("k_tilde", call)
 
-    def F_tilde(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+    def F_tilde(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                 params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """F_tilde (n_u,), generalized forces of all loads and gravity: F_tilde(t, x, params, inputs) or
         F_tilde(q, u, params, t=0, inputs=())."""
@@ -212,22 +218,22 @@ class Module:
         call = ordered(self, "F_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("F_tilde", call)
 
-    def J(self, *at: Any, x: States | None = None, q: States | None = None, params: States | None = None, t: Times | None = None,
-          inputs: States | None = None) -> np.ndarray:
+    def J(self, *at: States | None, x: States | None = None, q: States | None = None, params: States | None = None,
+          t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """J (6 n_b, n_u), planar (3 n_b, n_u), with [v_G; omega] of every body = J u, n-frame: J(t, x, params) or
         J(q, params, t=0)."""
         named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "J", at, named, ("q", "params", "t", "inputs"))
         return self._called("J", call)
 
-    def energy(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+    def energy(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0)."""
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "energy", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("energy", call)
 
-    def inverse_dynamics(self, *at: Any, x: States | None = None, q: States | None = None, u: States | None = None,
+    def inverse_dynamics(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                          ud: States | None = None, params: States | None = None, t: Times | None = None,
                          inputs: States | None = None, lam: States | None = None) -> np.ndarray:
         """tau (n_u,) = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam, what must be added along the speeds for the accelerations
@@ -266,7 +272,7 @@ class Module:
                              () if call.inputs is None else call.inputs, () if call.ud is None else call.ud)
 
     def actuation(self, t: float, q: States, u: States, ud: States, params: States | None = None, inputs: States | None = None, *,
-                  z: States | None = None, start: Any = None, project: bool = False, keep: Names = ()) -> Actuation:
+                  z: States | None = None, start: Values | None = None, project: bool = False, keep: Names = ()) -> Actuation:
         """The inputs that make a motion, with the multipliers of its constraints: inverse dynamics by the inputs.
 
         q, u, ud   coordinates (n_q,), speeds (n_u,) and their rates (n_u,), in order, or by name or symbol (ud by the names of
@@ -477,7 +483,7 @@ class Module:
 
         return consistent(self, q, u, params, t, keep, inputs)
 
-    def rank(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> Any:
+    def rank(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> int | np.ndarray:
         """Number of independent constraints: rank of the scaled Jacobian C_scale C_r, of one state or rows of states.
 
         Columns of angular velocities are divided by the mechanism's length; singular values below 1e-8 of the largest are zero.
@@ -495,9 +501,9 @@ class Module:
 
     # -- motion
 
-    def simulate(self, t: Numbers | None = None, q: Values | None = None, u: Values | None = None,
+    def simulate(self, t: Row | None = None, q: Values | None = None, u: Values | None = None,
                  params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None,
-                 rtol: float = 1e-8, atol: float | Numbers | None = None, method: str | type | None = None,
+                 rtol: float = 1e-8, atol: float | Row | None = None, method: str | type | None = None,
                  steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
                  progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
                  events: bool | str | Sequence[str] = True, event_spacing: float = 0.0, interpolation: str = "linear",
@@ -548,9 +554,9 @@ class Module:
                         stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
                         extend=extend)
 
-    def simulate_batch(self, q: Values | Numbers | None = None, u: Values | Numbers | None = None,
-                       params: Values | Numbers | None = None, *, z: Values | Numbers | None = None, t: Numbers | None = None,
-                       inputs: InputValues | None = None, rtol: float = 1e-8, atol: float | Numbers | None = None,
+    def simulate_batch(self, q: Values | None = None, u: Values | None = None,
+                       params: Values | None = None, *, z: Values | None = None, t: Row | None = None,
+                       inputs: InputValues | None = None, rtol: float = 1e-8, atol: float | Row | None = None,
                        max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
                        max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
@@ -586,7 +592,7 @@ class Module:
 
     # -- statics and linearization
 
-    def equilibrium(self, free: Names | None = None, fixed: Mapping[Any, Any] | None = None, start: Any = None,
+    def equilibrium(self, free: Names | None = None, fixed: Numbers | None = None, start: Start | None = None,
                     params: States | None = None, t: float = 0.0, inputs: States | None = None,
                     unknown_params: Names | None = None, max_iterations: int = 100) -> Equilibrium:
         """A state of rest, or of steady motion with prescribed speeds, near a start: Newton's method with exact derivatives.
@@ -613,8 +619,8 @@ class Module:
 
         return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
 
-    def equilibria(self, starts: int | Sequence[Any] = 100, ranges: Mapping[Any, Any] | None = None, seed: int = 0,
-                   start: Any = None, free: Names | None = None, fixed: Mapping[Any, Any] | None = None,
+    def equilibria(self, starts: int | Sequence[Start] = 100, ranges: Ranges | None = None, seed: int = 0,
+                   start: Start | None = None, free: Names | None = None, fixed: Numbers | None = None,
                    params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
                    unknown_params: Names | None = None, max_iterations: int = 100) -> Equilibria:
         """Equilibria from many starts.
@@ -632,9 +638,9 @@ class Module:
 
         return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
-    def linearize(self, at: Any = None, params: States | None = None, t: float | None = None, inputs: States | None = None,
-                  free: Names | None = None, fixed: Mapping[Any, Any] | None = None, coordinates: Names | None = None,
-                  hold: Names | None = None) -> Linearization:
+    def linearize(self, at: Start | None = None, params: States | None = None, t: float | None = None,
+                  inputs: States | None = None, free: Names | None = None, fixed: Numbers | None = None,
+                  coordinates: Names | None = None, hold: Names | None = None) -> Linearization:
         """The linear equations about a state on the manifold of the constraints, by exact derivatives.
 
         at            an Equilibrium, with all that belongs to it; a Solution, at its time nearest to t; x in order; (q, u); or by
@@ -650,9 +656,9 @@ class Module:
 
         return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold)
 
-    def stability(self, at: Any = None, params: States | None = None, t: float = 0.0, inputs: States | None = None,
-                  free: Names | None = None, fixed: Mapping[Any, Any] | None = None, hold: Names | None = None,
-                  period: float | None = None, start: Any = None) -> Stability:
+    def stability(self, at: Start | None = None, params: States | None = None, t: float = 0.0, inputs: States | None = None,
+                  free: Names | None = None, fixed: Numbers | None = None, hold: Names | None = None,
+                  period: float | None = None, start: Start | None = None) -> Stability:
         """Whether small disturbances of a state of rest, a steady motion or a periodic motion die out, with the evidence.
 
         at       an Equilibrium; or the state, as for `linearize`; where it is not on a steady motion, the periodic motion near
@@ -671,9 +677,9 @@ class Module:
 
         return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
 
-    def campbell(self, speed: Any, values: float | Numbers, free: Names | None = None, fixed: Mapping[Any, Any] | None = None,
-                 start: Any = None, params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
-                 blades: Sequence[Sequence[Any]] = (), azimuth: Any = None, azimuths: int = 12, max_iterations: int = 100,
+    def campbell(self, speed: Key, values: Times, free: Names | None = None, fixed: Numbers | None = None,
+                 start: Start | None = None, params: Values | None = None, t: float = 0.0, inputs: Values | None = None,
+                 blades: Sequence[Sequence[Key]] = (), azimuth: Key | None = None, azimuths: int = 12, max_iterations: int = 100,
                  frame: str = "fixed", averaged: bool = False) -> Campbell:
         """Natural frequencies over a rotor's speed.
 
@@ -699,7 +705,7 @@ class Module:
 
     # -- about the module
 
-    def report(self) -> Any:
+    def report(self) -> Report:
         """What was generated, what was skipped and why, operation counts; prints as text."""
         if self._reporter is None:
             raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
@@ -708,7 +714,7 @@ class Module:
 
         return replace(self._reporter(), many=many_at_once(self, UNIT in self._units))
 
-    def write(self, folder: Any) -> list[Path]:
+    def write(self, folder: PathName) -> list[Path]:
         """Write the generated files, complete with header, example and reference vectors; returns their paths."""
         if self._writer is None:
             raise ArgumentError(f"{self.name} was loaded from files; copy them, or compile the equations it came from")

@@ -31,6 +31,7 @@ from symdyn.statics.terms import Place, coordinate_names
 from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
+    from symdyn.given import Key
     from symdyn.runtime.module import Module
 
 # Forces that no input makes may be this part of the single terms of the equations: rounding of motions that inputs do make.
@@ -92,7 +93,7 @@ class Actuation:
         """Whether no other values of the inputs that were sought make the motion (near these, where they enter nonlinearly)."""
         return self.rank == len(self.found)
 
-    def __getitem__(self, name: Any) -> float:
+    def __getitem__(self, name: Key) -> float:
         """An input or a multiplier by name or symbol. Raises ArgumentError for an unknown name."""
         known = name_of(name)
         for values in (self.inputs, self.multipliers):
@@ -108,11 +109,11 @@ class Actuation:
         width = max([4, *map(len, known)])
         many = "unique" if self.unique else f"those of least norm of {len(self.found)} for {self.rank} freedoms"
         lines = [f"{self.module.name}: inputs that make the motion at t = {self.t:.9g} s, {many}"]
-        for name, value in self.inputs.to_dict().items():
+        for name, value in zip(self.inputs.names[0], self.inputs, strict=True):
             note = "  kept" if name in self.kept else ""
             lines.append(f"  {name:<{width}} = {value + 0.0:>15.8g} {units.get(name, '')}{note}".rstrip())
         lines += ["multipliers of the constraints, whose force is -C_r^T lambda"] if self.multipliers.names[0] else []
-        for name, value in self.multipliers.to_dict().items():
+        for name, value in zip(self.multipliers.names[0], self.multipliers, strict=True):
             note = "" if name in self.determined else " least norm: dependent constraints share it"
             lines.append(f"  {name:<{width}} = {value + 0.0:>15.8g}{note}".rstrip())
         lines.append(f"residual {self.residual:.3g} N or N m, rank {self.rank} of {self.freedoms} freedoms, condition "

@@ -29,7 +29,11 @@ from symdyn.statics.stability import of_manifold
 from symdyn.statics.terms import Place
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from symdyn.given import PathName
     from symdyn.runtime.module import Module
+    from symdyn.statics.equilibrium import Equilibrium
 
 # State matrices in multi-blade coordinates are the same at all azimuths if entries differ by this part of the largest, scaled.
 CONSTANT = 1e-9
@@ -60,7 +64,7 @@ class Campbell:
     eigenvalues: np.ndarray
     names: tuple[str, ...]
     modes: tuple[Modes, ...]
-    equilibria: tuple[Any, ...]
+    equilibria: tuple[Equilibrium, ...]
     frame: str = "fixed"
     held: tuple[str, ...] = ()
     varies: float = 0.0
@@ -82,7 +86,7 @@ class Campbell:
             raise ArgumentError(f"{self.title}: there is no mode {shown(name)}; there are {', '.join(self.names)}")
         return np.asarray(self.frequencies[:, self.names.index(name)])
 
-    def plot(self, path: Any = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Any:
+    def plot(self, path: PathName | None = None, harmonics: Sequence[float] = (1, 3, 6), highest: float | None = None) -> Figure:
         """The diagram up to a frequency (Hz), with lines of multiples of the rotor's speed, as a figure; saved to a path.
 
         By default modes that are far above the others and the lines are left out, which the legend reports. Needs matplotlib.

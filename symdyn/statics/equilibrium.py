@@ -30,6 +30,7 @@ from symdyn.statics.uniqueness import demand_stiffness
 from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
+    from symdyn.given import Key
     from symdyn.runtime.module import Module
 
 # Steady motion must fulfil the constraints up to this part of its speed.
@@ -204,7 +205,7 @@ class Equilibrium:
             kind = "equilibrium whose stability is not decided"
         return f"{kind} after {counted(self.iterations, 'iteration')}, forces to {self.residual_norm:.3g} N or N m"
 
-    def __getitem__(self, name: Any) -> float:
+    def __getitem__(self, name: Key) -> float:
         """A coordinate, speed, extra state, parameter or input by name or symbol. Raises ArgumentError for an unknown name."""
         name = name_of(name)
         metadata = self.module.metadata

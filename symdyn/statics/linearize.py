@@ -25,8 +25,13 @@ from symdyn.statics.steady import Steadiness, steadiness
 from symdyn.statics.terms import Place, coordinate_names, rest
 
 if TYPE_CHECKING:
+    from control import StateSpace as ControlStateSpace
+    from scipy.signal import StateSpace as ScipyStateSpace
+
+    from symdyn.given import Key
     from symdyn.runtime.module import Module
-    from symdyn.statics.regulator import Regulator
+    from symdyn.statics.modes import Mode
+    from symdyn.statics.regulator import Regulator, Weights
     from symdyn.statics.stability import Stability
 
 
@@ -168,7 +173,7 @@ class Linearization:
 
     # -- control
 
-    def lqr(self, Q: Any, R: Any) -> Regulator:
+    def lqr(self, Q: Weights, R: Weights) -> Regulator:
         """The gain K of in' = -K x' with the least integral of x'^T Q x' + in'^T R in' from any start.
 
         Q   weights of the states x' (see `states`): a matrix (m, m), its diagonal (m,), or numbers by name or symbol, 0 where
@@ -188,7 +193,7 @@ class Linearization:
         self._demand_steady("a regulator was")
         return lqr(self, Q, R)
 
-    def deviation(self, t: float, x: Any) -> np.ndarray:
+    def deviation(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
         """x' (m,), how far a state x = [q; u; z] of the mechanism (in order, or by name or symbol) is from the motion linearized
         about, at the time t: of independent displacements, independent speeds and free extra states, to first order.
 
@@ -211,13 +216,13 @@ class Linearization:
         v = np.linalg.lstsq(place.N, off[:n_q], rcond=None)[0]
         return np.concatenate([v[manifold.displacements], off[n_q:n_q + n_u][manifold.speeds], off[n_q + n_u:][manifold.states]])
 
-    def to_scipy(self) -> Any:
+    def to_scipy(self) -> ScipyStateSpace:
         """The equations as a scipy.signal.StateSpace, with the states as its outputs where the system has no outputs."""
-        from scipy.signal import StateSpace as ScipyStateSpace
+        from scipy.signal import StateSpace
 
-        return ScipyStateSpace(self.A, self.B, *self._observed()[:2])
+        return StateSpace(self.A, self.B, *self._observed()[:2])
 
-    def to_control(self) -> Any:
+    def to_control(self) -> ControlStateSpace:
         """The equations as a control.StateSpace of python-control, with names of states, inputs and outputs; with the states as
         its outputs where the system has no outputs. Raises MissingExtra where python-control is not installed."""
         try:
@@ -234,7 +239,7 @@ class Linearization:
             return self.C_out, self.D, self.outputs
         return np.eye(len(self.states)), np.zeros(self.B.shape), tuple(f"y_{n}" for n in self.states)
 
-    def derivative(self, mode: Any, parameter: Any) -> Sensitivity:
+    def derivative(self, mode: int | Mode, parameter: Key) -> Sensitivity:
         """Exact derivatives of a mode's eigenvalue, frequency and damping by a parameter.
 
         mode        number or name in `modes()`; parameter: name or symbol

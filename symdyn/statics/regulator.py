@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import scipy.linalg
@@ -22,7 +22,11 @@ from symdyn.runtime.labelled import Labelled
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.given import Key, Matrix, Numbers, Row
     from symdyn.statics.linearize import Linearization
+
+    # A matrix, its diagonal, or numbers of some by name or symbol.
+    Weights: TypeAlias = Matrix | Row | Numbers
 
 # Parts of vectors below this part of the largest are rounding: what an input does not reach, entries that differ in symmetry.
 NOTHING = 1e-9
@@ -58,13 +62,13 @@ class Regulator:
     R: np.ndarray
     driven: tuple[str, ...]
 
-    def __call__(self, t: float, x: Any) -> np.ndarray:
+    def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
         found: np.ndarray = self.linear.inputs.copy()
         names = self.linear.module.metadata.inputs
         found[[names.index(n) for n in self.driven]] -= np.asarray(self.K) @ self.linear.deviation(t, x)
         return found
 
-    def __getitem__(self, inputs: Any) -> Callable[[float, np.ndarray], Any]:
+    def __getitem__(self, inputs: Key | tuple[Key, ...]) -> Callable[[float, np.ndarray], float | np.ndarray]:
         """The function of (t, x) of one input, which returns a number, or of a tuple of them. Raises ArgumentError for inputs
         that have no weights."""
         wanted = [name_of(i) for i in (inputs if isinstance(inputs, tuple) else (inputs,))]

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -31,12 +31,15 @@ from symdyn.model.loop_check import constraint_faults
 from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import inner, zeros
 
+if TYPE_CHECKING:
+    from symdyn.given import Matrix, Numbers, Scalar, Vector
+
 # Starts from which consistent states are looked for.
 STARTS = 8
 
 
-def augmented(coordinates: Sequence[Any], mass: Any, force: Any, constraints: Any, name: str = "system",
-              defaults: Mapping[Any, float] | None = None, initial: Mapping[Any, float] | None = None,
+def augmented(coordinates: Sequence[sp.Symbol], mass: Matrix, force: Vector, constraints: Mapping[str, Scalar] | Sequence[Scalar],
+              name: str = "system", defaults: Numbers | None = None, initial: Numbers | None = None,
               names: Sequence[str] | None = None) -> AugmentedEquations:
     """Augmented equations of given coordinates and constraints between them.
 

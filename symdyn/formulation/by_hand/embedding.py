@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -25,9 +25,12 @@ from symdyn.model.symbols import Coordinate, GivenMotion, time
 from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape.differentiate import jacobian
 
+if TYPE_CHECKING:
+    from symdyn.given import Matrix, Numbers, Vector
 
-def embedding(coordinates: Sequence[Any], position: Any, mass: Any, force: Any = None, name: str = "system",
-              defaults: dict[Any, float] | None = None) -> EmbeddedEquations:
+
+def embedding(coordinates: Sequence[sp.Symbol], position: Vector, mass: Matrix, force: Vector = None, name: str = "system",
+              defaults: Numbers | None = None) -> EmbeddedEquations:
     """Embedded equations of a position map.
 
     coordinates   generalized coordinates q, (n_q,)

@@ -21,6 +21,7 @@ from symdyn.tape.sympy_bridge import expand
 
 if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
+    from symdyn.given import Numbers
 
 
 class Identification:
@@ -95,7 +96,7 @@ class BaseParameters:
 
         return simplified(self._explicit("base_regressor"), self.equations.simplify_seconds)
 
-    def values(self, params: Any = None) -> np.ndarray:
+    def values(self, params: Numbers | None = None) -> np.ndarray:
         """pi_b in numbers, (n,), from parameters in order or by symbol or name; what is left out takes its default.
 
         Raises ArgumentError naming what is missing, unknown or not a finite number.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from symdyn.errors import SymdynError
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.shown import name_of
+
+if TYPE_CHECKING:
+    from symdyn.given import Key
 
 
 class AugmentedEquations(MotionEquations):
@@ -71,7 +74,7 @@ class AugmentedEquations(MotionEquations):
         rows = self.C_r * self.accelerations
         return (*motion, *[sp.Eq(a, b, evaluate=False) for a, b in zip(rows, self.F_d, strict=True)])
 
-    def without_multipliers(self, dependent: Sequence[Any] | sp.Symbol | str) -> tuple[sp.Eq, ...]:
+    def without_multipliers(self, dependent: Sequence[Key] | Key) -> tuple[sp.Eq, ...]:
         """The equations of motion with the multipliers eliminated by the rows of dependent speeds.
 
         dependent   n_c coordinates or speeds, as symbols or names, such that their columns of C_r make a regular matrix; a

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from symdyn.formulation.equations import Equations
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
 
     from symdyn.analytic.conserved import ConservedQuantities
     from symdyn.analytic.equilibria import EquilibriumPoints
     from symdyn.analytic.linear import Linearized
     from symdyn.formulation.printed.provenance import Explanation
+    from symdyn.given import Named, Names, Scalar
 
 
 class MotionEquations(Equations):
@@ -135,7 +135,7 @@ class MotionEquations(Equations):
 
         return conserved(self, undriven)
 
-    def linearized(self, about: Mapping[Any, Any] | None = None, hold: Any = ()) -> Linearized:
+    def linearized(self, about: Named[Scalar] | None = None, hold: Names = ()) -> Linearized:
         """M, C, K, A, B about a state of rest or a steady motion, explicit in the parameters, with its conditions.
 
         about   coordinates, speeds, states, inputs by symbol or name -> numbers or expressions in parameters; left out: zero
@@ -145,7 +145,7 @@ class MotionEquations(Equations):
 
         return linearized(self, about, hold)
 
-    def equilibria(self, fixed: Mapping[Any, Any] | None = None, values: Mapping[Any, Any] | None = None) -> EquilibriumPoints:
+    def equilibria(self, fixed: Named[Scalar] | None = None, values: Named[Scalar] | None = None) -> EquilibriumPoints:
         """All states of rest, or of steady motion, in closed form, where their conditions can be solved.
 
         fixed    coordinates that are held, inputs, speeds of a steady motion -> numbers or expressions in parameters

@@ -20,7 +20,7 @@ from symdyn.tape.cube import Cube
 from symdyn.tape.node import is_zero
 
 if TYPE_CHECKING:
-    from symdyn.given import BodyOrName, Scalar
+    from symdyn.given import BodyOrName, Scalar, Vector
 
 # Of the whole volume: less is rounding.
 LEAST = 1e-9
@@ -33,8 +33,8 @@ class Box:
     size    (3,) lengths of its edges along x, y, z, m, positive; center: (3,) its middle, body axes, m
     """
 
-    size: Any
-    center: Any = (0, 0, 0)
+    size: Vector
+    center: Vector = (0, 0, 0)
 
 
 class Buoyancy(Element):
@@ -51,7 +51,7 @@ class Buoyancy(Element):
 
     kind = "buoyancy"
 
-    def __init__(self, body: BodyOrName, boxes: Sequence[Any], density: Scalar, without: Sequence[Any] = (),
+    def __init__(self, body: BodyOrName, boxes: Sequence[Box], density: Scalar, without: Sequence[Box] = (),
                  gravity: Scalar | None = None, name: str = "") -> None:
         super().__init__(body, name)
         self.boxes = self._boxes(boxes, "boxes")

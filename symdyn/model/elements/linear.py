@@ -50,8 +50,8 @@ class LinearStiffness(Element):
 
     kind = "linear stiffness"
 
-    def __init__(self, body: BodyOrName, K: Matrix, force: Any = (0,) * 6, point: Vector = (0, 0, 0), reference: Any = (0,) * 6,
-                 angles: str = "auto", name: str = "") -> None:
+    def __init__(self, body: BodyOrName, K: Matrix, force: Vector = (0,) * 6, point: Vector = (0, 0, 0),
+                 reference: Vector = (0,) * 6, angles: str = "auto", name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.K = faults.square(K, 6, f"{where}: K")

@@ -32,7 +32,7 @@ class Drag(Element):
 
     kind = "drag"
 
-    def __init__(self, body: BodyOrName, area: Scalar, coefficient: Scalar, density: Scalar, wind: Any = (0, 0, 0),
+    def __init__(self, body: BodyOrName, area: Scalar, coefficient: Scalar, density: Scalar, wind: Vector = (0, 0, 0),
                  point: Vector = (0, 0, 0), name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
@@ -77,8 +77,8 @@ class Thrust(Element):
 
     kind = "thrust"
 
-    def __init__(self, body: BodyOrName, force: Callable[[sp.Symbol], Any] | Any, axis: Vector = (1, 0, 0),
-                 point: Vector = (0, 0, 0), wind: Any = (0, 0, 0), name: str = "") -> None:
+    def __init__(self, body: BodyOrName, force: Callable[[sp.Symbol], Scalar] | Scalar, axis: Vector = (1, 0, 0),
+                 point: Vector = (0, 0, 0), wind: Vector = (0, 0, 0), name: str = "") -> None:
         super().__init__(body, name)
         where, faults = self.where, self.faults
         self.speed = sp.Dummy("v_r", real=True)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.errors import ArgumentError
 from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Key
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class BatchSolution:
         sizes = self.metadata.sizes
         return self.x[..., sizes.q:sizes.q + sizes.u]
 
-    def __getitem__(self, name: Any) -> np.ndarray:
+    def __getitem__(self, name: Key) -> np.ndarray:
         """One coordinate, speed or extra state by name or symbol, (n, n_t)."""
         text = name_of(name)
         if text not in self.metadata.x:

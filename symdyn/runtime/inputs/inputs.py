@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from symdyn.runtime.inputs.tables import Pieces, Table, joined
 from symdyn.runtime.raised import InputRaised, called
 from symdyn.shown import name_of, shown
 
+if TYPE_CHECKING:
+    from symdyn.given import Row
+
 
 @dataclass(frozen=True)
 class Smooth:
@@ -30,14 +33,14 @@ class Smooth:
     Raises ArgumentError for what cannot be called.
     """
 
-    function: Callable[[float, np.ndarray], Any]
+    function: Callable[[float, np.ndarray], Row]
 
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise ArgumentError(f"sd.Smooth declares that a function of (t, x) is smooth, found {self.function!r}; constants "
                                 "need no declaration, and tables have kinks")
 
-    def __call__(self, t: float, x: np.ndarray) -> Any:
+    def __call__(self, t: float, x: np.ndarray) -> Row:
         return self.function(t, x)
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from symdyn.arguments import OverTime
 from symdyn.errors import ArgumentError
 from symdyn.runtime.raised import called
+
+if TYPE_CHECKING:
+    from symdyn.given import Row
 
 # Instants closer than this part of the shortest period are one.
 ONE_INSTANT = 1e-9
@@ -33,7 +36,7 @@ class Sampled(OverTime):
     what is no function, and for times that make no sense.
     """
 
-    function: Callable[[float, np.ndarray], Any]
+    function: Callable[[float, np.ndarray], Row]
     period: float
     offset: float = 0.0
     delay: float = 0.0
