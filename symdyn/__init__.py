@@ -1,6 +1,7 @@
 """symdyn: equations of motion of multibody systems, derived symbolically and run as fast as the processor allows.
 
 The public names; each is imported when it is first used, so that `import symdyn` costs next to nothing.
+Examples begin with `import symdyn as sd`, `import numpy as np`, `import sympy as sp`.
 """
 
 from __future__ import annotations

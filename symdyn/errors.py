@@ -65,7 +65,11 @@ class SimulationWarning(UserWarning):
 
 
 class SimulationInterrupted(KeyboardInterrupt):
-    """A simulation was interrupted; `solution` holds what was computed up to there."""
+    """A simulation was interrupted; `solution` holds what was computed up to there.
+
+    >>> issubclass(sd.SimulationInterrupted, KeyboardInterrupt)
+    True
+    """
 
     def __init__(self, solution: object, message: str) -> None:
         super().__init__(message)

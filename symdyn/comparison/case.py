@@ -16,7 +16,11 @@ from symdyn.errors import CaseError
 
 @dataclass(frozen=True)
 class Slide:
-    """Where something is printed: section such as "3.5", title of the slide, line of the notes (or page)."""
+    """Where something is printed: section such as "3.5", title of the slide, line of the notes (or page).
+
+    >>> str(sd.Slide("3.4", "Pendulum", 12))
+    '3.4, Pendulum, line 12'
+    """
 
     section: str
     title: str = ""
@@ -40,6 +44,11 @@ class Erratum:
     proof     something independent of the formula that the right one fulfils and the printed one does not; see symdyn.proofs
     entries   their indices, [(i, j), ...] or [(i,), ...] of a vector; None: all that differ
     slip      one sentence, the same for all errata that repeat one slip: they are listed once, with all places; default: `why`
+
+    >>> m, l, g, q = sp.symbols("m l g q")
+    >>> slip = sd.Erratum("The sine is missing.", sd.proofs.other("Lagrange's equation", -m * g * l * sp.sin(q)))
+    >>> slip.why
+    'The sine is missing.'
     """
 
     why: str
@@ -71,6 +80,9 @@ class Remark:
 
     why          one sentence
     line, also   where it is printed, and where it is printed again
+
+    >>> sd.Remark("The axis is labelled x, it is y.", line=12).why
+    'The axis is labelled x, it is y.'
     """
 
     why: str
@@ -104,6 +116,13 @@ class Formula:
     errata        what is wrong, one or several
     unreadable    why it, or {index: why an entry}, cannot be read
     decimals      printed numbers are rounded to so many decimals
+
+    >>> q = sp.Symbol("q")
+    >>> formula = sd.Formula("double angle", sp.sin(2 * q), 2 * sp.sin(q) * sp.cos(q))
+    >>> print(sd.compare(sd.Case("identity", formulas=[formula])))
+    identity
+      double angle  1 equal, proved
+      1 entry: 1 equal, proved
     """
 
     name: str
@@ -173,6 +192,15 @@ class Case:
     A pendulum of your own slides, derived and compared in a few lines:
 
         Case("my-pendulum", printed={"M_tilde": [[m*l**2]], "F_tilde": [-m*g*l*sin(q)]}, derived=system.embedding())
+
+    >>> m, l, g, q1 = sp.symbols("m l g q1")
+    >>> equations = sd.systems.pendulum().embedding()
+    >>> case = sd.Case("my-pendulum", printed={"M_tilde": [[m * l**2]], "F_tilde": [-m * g * l * sp.sin(q1)]}, derived=equations)
+    >>> print(sd.compare(case))
+    my-pendulum
+      M_tilde  1 equal, proved
+      F_tilde  1 equal, proved
+      2 entries: 2 equal, proved
     """
 
     name: str

@@ -40,6 +40,9 @@ def compare(case: Case | str | Iterable[Case | str]) -> Any:
     Returns a Comparison of one case, Comparisons of a section or of several.
 
     Raises UnknownCase (the nearest names are offered) and CaseError with every fault of a case.
+
+    >>> sd.compare("pendulum-embedding").name
+    'pendulum-embedding'
     """
     if isinstance(case, Case):
         return _compared(case)

@@ -30,6 +30,12 @@ class Ensemble:
                shapes: of one member's outcomes
     count      number of members;  n_failed: how many of them have no outcome
     n_resumed  how many had been computed before;  seconds: wall time of the others
+
+    >>> import tempfile
+    >>> module = sd.systems.pendulum().compile(backend="numpy")
+    >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+    >>> found.count, found.labels
+    (2, ('end q1',))
     """
 
     def __init__(self, path: Path, n_resumed: int = 0, seconds: float = 0.0) -> None:

@@ -83,6 +83,12 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     A member that fails has no numbers in its row, and is told in `failures`; warnings of single motions are not given. Returns an
     Ensemble. Raises ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an
     executor died or the disk is full: what was done is kept, if there is a path.
+
+    >>> import tempfile
+    >>> module = sd.systems.pendulum().compile(backend="numpy")
+    >>> found = sd.ensemble(module, {"l": [0.5, 1.0]}, (0, 1), ["end q1"], path=tempfile.mkdtemp())
+    >>> found["end q1"].round(4)
+    array([-1.9705, -1.491 ])
     """
     resume, progress, consistent = (flag(v, f"an ensemble: {what}") for v, what in (
         (resume, "resume"), (progress, "progress"), (consistent, "consistent")))

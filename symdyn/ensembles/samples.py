@@ -44,6 +44,9 @@ class Samples:
     on the count as well: it has one value in each of `count` equally probable intervals of every quantity, which move with the
     count, so that more samples are another design. `block` takes memory for its own samples only, whatever the sampling.
     Raises ArgumentError with all that is wrong.
+
+    >>> sd.Samples({"m": {"from": 1, "to": 2, "count": 3}, "l": [0.5, 1.0]}).count
+    6
     """
 
     def __init__(self, values: SampleValues, sampling: str | None = None, count: int | None = None, seed: int = 0,

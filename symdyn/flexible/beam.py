@@ -46,6 +46,10 @@ class Beam:
 
     Kinetic energy is complete to second order in the elastic coordinates and speeds, with the foreshortening that gives
     centrifugal and gravity stiffening; see ModalBody for what is neglected. Raises ModelError with all faults.
+
+    >>> beam = sd.Beam([0, 1], mass_per_length=2.0, stiffness=50.0, shapes=1, length=3.0)
+    >>> beam.modal.Me.round(6)
+    array([[1.5]])
     """
 
     def __init__(self, stations: Row, mass_per_length: float | Row, stiffness: float | Row | tuple[Row, Row],

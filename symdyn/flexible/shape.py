@@ -32,6 +32,9 @@ class Shape:
 
     The sum of two shapes is one shape: Shape("x", ...) + Shape("y", ...) deflects in both directions, as the modes of
     twisted blades do. Faults are told by the Beam that gets the shape.
+
+    >>> sd.Shape("x", [1, 0.2], powers=[2, 3]).along("x")
+    True
     """
 
     def __init__(self, direction: str, coefficients: Row | None = None, *, powers: Sequence[int] | None = None,

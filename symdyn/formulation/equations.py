@@ -130,6 +130,10 @@ class Equations:
         """A quantity, or a named output, as an array of nodes and numbers; recorded on first use.
 
         Besides `quantities` there are those of symdyn.analytic.lagrange.QUANTITIES, such as "T", "V", "momenta".
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.quantity("M_tilde").shape
+        (1, 1)
         """
         text(name, "the name of a quantity", "M_tilde")
         if name not in self.quantities and f"output_{name}" in self.quantities:
@@ -149,7 +153,12 @@ class Equations:
         return self._recorded[name]
 
     def tape(self, *names: str) -> Tape:
-        """A tape with the named quantities as outputs."""
+        """A tape with the named quantities as outputs.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.tape("M_tilde").operations
+        0
+        """
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
     def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: bool = False) -> Any:
@@ -163,6 +172,10 @@ class Equations:
         What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
         for an unknown form, for one that is too large, for a quantity that is too large to be read, and if the quantity is so
         long that the time is over before it is multiplied into one expression; ArgumentError for a form of what has none.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.explicit("k_tilde", form="polynomial")
+        Matrix([[0]])
         """
         text(name, "the name of a quantity", "M_tilde")
         if text(form, "the form", "fourier") != "shortest" and (intermediates or not simplify):
@@ -247,6 +260,10 @@ class Equations:
         shorthand       s_1 for sin q_1, c_12 for cos(q_1 + q_2), with a legend
         intermediates   steps that the derivation names (velocities, forces, inertias of links) stand before the quantity
         width           letters in a line: wider matrices get named entries below them, longer sums several lines
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> print(equations.latex("M_tilde"))
+        \\tilde{\\mathbf{M}} = \\left[\\begin{matrix}l^{2} m\\end{matrix}\\right]
         """
         from symdyn.report.latex import equations_latex
 
@@ -256,6 +273,10 @@ class Equations:
         """Leaf of the tape -> the symbol it is printed as: its own, where others stand for the same value.
 
         A speed u with a name of its own is the derivative of its coordinate, too, and is printed as u.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> len(equations.printed_leaves())
+        8
         """
         from symdyn.analytic.lagrange import momentum_leaves
 
@@ -269,13 +290,22 @@ class Equations:
 
     @property
     def accelerations(self) -> sp.Matrix:
-        """Symbols of the derivatives of the speeds, (n_u, 1)."""
+        """Symbols of the derivatives of the speeds, (n_u, 1).
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.accelerations
+        Matrix([[q1_ddot]])
+        """
         return sp.Matrix(len(self.symbols.speeds), 1, [u.dot for u in self.symbols.speeds])
 
     def lambdify(self, name: str) -> Callable[..., np.ndarray]:
         """One quantity, such as "M_tilde", as a NumPy function f(q, u, params, t=0, inputs=(), ud=()).
 
         It takes one state or arrays of states; params as everywhere in Module. Raises SymdynError for an unknown name.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.lambdify("M_tilde")([0.1], params=[1.0, 1.0, 9.81]).shape
+        (1, 1)
         """
         return self.compile(backend="numpy").function(name)
 
@@ -288,6 +318,10 @@ class Equations:
         specialize   parameters, by symbol or name, that become numbers in the code and are folded
 
         Raises CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects the code.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.compile(backend="numpy").name
+        'pendulum'
         """
         from symdyn.pipeline import compile_equations
 
@@ -309,6 +343,11 @@ class Equations:
         batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
 
         Raises SymdynError for an unknown function, parameter, backend or method, or a broken template.
+
+        >>> import tempfile
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> sorted(path.name for path in equations.write(tempfile.mkdtemp(), backend="numpy"))
+        ['pendulum.py']
         """
         from symdyn.pipeline import emit, write_source
         from symdyn.runtime.paths import as_path, writing
@@ -323,13 +362,22 @@ class Equations:
         """The smallest set of inertial parameters that the equations depend on.
 
         See symdyn.formulation.identification.quantities.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.base_parameters()
+        <2 base parameters of pendulum>
         """
         from symdyn.formulation.identification.quantities import base_parameters
 
         return base_parameters(self)
 
     def verify(self, states: int = 5, digits: int = 30, params: Numbers | None = None) -> Verification:
-        """Prove the equations sound by identities at random states; see symdyn.verification.verify."""
+        """Prove the equations sound by identities at random states; see symdyn.verification.verify.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.verify(states=2).passed
+        True
+        """
         from symdyn.verification import verify
 
         return verify(self, states, digits, params)
@@ -340,6 +388,10 @@ class Equations:
         other   equations of the same mechanism that were derived separately, in the same coordinates: whether both are the same;
                 see symdyn.exact.across
         Returns the claims, each with its Proof. Raises ArgumentError for equations in other coordinates, speeds or constraints.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.prove().proved
+        True
         """
         if other is not None:
             from symdyn.exact.across import prove_equal
@@ -351,7 +403,12 @@ class Equations:
 
     def check_units(self) -> UnitReport:
         """Dimensional analysis of all entries by the units of the symbols (system.units): true where they agree, prints what does
-        not, such as a sum of metres and radians. See symdyn.analytic.units."""
+        not, such as a sum of metres and radians. See symdyn.analytic.units.
+
+        >>> equations = sd.systems.pendulum().embedding()
+        >>> equations.check_units().faults
+        ()
+        """
         from symdyn.analytic.units import check_units
 
         return check_units(self)

@@ -29,6 +29,12 @@ class Frame(Axes):
     Raises ModelError telling all faults, or NotARotation with numbers if the rotation alone is at fault; a symbolic rotation
     is checked at random values of its symbols (four Euler parameters: with norm 1).
     Source: lecture, chapters 1.2, 1.6 and 1.7.
+
+    >>> q = sd.coordinates("q")
+    >>> n = sd.Frame("n")
+    >>> b = n.frame("b", sd.rotation.about("Z", q))
+    >>> b.point("P", [1, 0, 0]).velocity(seen_from=n).T
+    Matrix([[-q_dot*sin(q), q_dot*cos(q), 0]])
     """
 
     def __init__(self, name: str, parent: Frame | None = None, rotation: Matrix | None = None,

@@ -32,6 +32,10 @@ def rate(value: Any) -> Any:
     Raises ModelError, telling all faults, for text, NaN, what is no expression, and for q.ddot and inputs, whose rates
     have no symbol.
     Source: lecture, chapter 1.7.
+
+    >>> q = sd.coordinates("q")
+    >>> sd.rate(sp.sin(q))
+    q_dot*cos(q)
     """
     if isinstance(value, sp.MatrixBase):
         shape, entries = value.shape, list(value)

@@ -19,6 +19,9 @@ class Rod(Joint):
     """A massless rod of a given length (m) between a point of each body, hinged at both ends: one constraint.
 
     For `System.close_loop`; see Joint for the points. A rod of no length is a Spherical joint.
+
+    >>> system = sd.systems.double_pendulum()
+    >>> rod = system.close_loop(sd.Rod("rod", system.ground, "rod2", length=1.5))
     """
 
     kind = "rod"
@@ -42,6 +45,11 @@ class Gear:
 
     ratio    of the coordinates, a number or an expression of parameters; offset: rad or m, as the coordinate of joint_b
     For `System.close_loop`. A joint whose coordinate is an expression, such as coordinate=2*q, is a gear without a constraint.
+
+    >>> system = sd.systems.double_pendulum()
+    >>> gear = system.close_loop(sd.Gear("gear", "hinge1", "hinge2", ratio=2))
+    >>> system.augmented().C_r
+    Matrix([[-2, 1]])
     """
 
     kind = "gear"

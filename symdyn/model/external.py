@@ -48,6 +48,11 @@ class External:
 
     Of a Piecewise all parts are computed, so that a function must not fail where another part holds.
     Raises ModelError that lists every fault.
+
+    >>> text = "static int square(const double *in, double *out) { out[0] = in[0]*in[0]; return 0; }"
+    >>> square = sd.External("square", ["x"], c=text)
+    >>> square(sd.coordinates("q"))
+    square(q)
     """
 
     def __init__(self, name: str, arguments: Sequence[str], results: int = 1, *, c: str | None = None,

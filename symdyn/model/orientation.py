@@ -21,6 +21,11 @@ class EulerAngles:
              the child. With "body" the mass matrix is regular at every attitude; it is the angles' rates that do not exist
              at gimbal lock, and a run that gets there stops and says so.
     Raises ModelError for anything but one of the twelve sequences and these two.
+
+    >>> system = sd.System("top")
+    >>> top = system.add_body("top", mass=1, inertia=[1, 1, 2])
+    >>> sd.Spherical("tip", system.ground, top, orientation=sd.EulerAngles("ZXZ")).coordinates
+    (q_tip_1, q_tip_2, q_tip_3)
     """
 
     sequence: str = "ZYX"
@@ -53,6 +58,11 @@ class EulerParameters:
     """Four Euler parameters (theta0 first) as coordinates; speeds: angular velocity in the axes of the child's joint frame.
 
     They start at (1, 0, 0, 0) unless given otherwise, and must be a unit vector.
+
+    >>> system = sd.System("top")
+    >>> top = system.add_body("top", mass=1, inertia=[1, 1, 2])
+    >>> sd.Spherical("tip", system.ground, top, orientation=sd.EulerParameters()).coordinates
+    (q_tip_1, q_tip_2, q_tip_3, q_tip_4)
     """
 
     @property

@@ -31,18 +31,39 @@ class Point:
 
 
 def position(body: Body, at: Vector = (0, 0, 0)) -> Point:
-    """The position of a point of a body in the n-frame, m; an output, and `[i]` a scalar for every expression."""
+    """The position of a point of a body in the n-frame, m; an output, and `[i]` a scalar for every expression.
+
+    >>> system = sd.systems.pendulum()
+    >>> system.add_output("tip", sd.position("bob", [0, -1]))
+    >>> module = system.compile(backend="numpy")
+    >>> module.outputs(0.0, [0.0, 2.0])["tip"]
+    array([ 0., -1.])
+    """
     return Point(body, at, "position")
 
 
 def velocity(body: Body, at: Vector = (0, 0, 0)) -> Point:
-    """The velocity of a point of a body in the n-frame, m/s; an output, and `[i]` a scalar for every expression."""
+    """The velocity of a point of a body in the n-frame, m/s; an output, and `[i]` a scalar for every expression.
+
+    >>> system = sd.systems.pendulum()
+    >>> system.add_output("tip", sd.velocity("bob", [0, -1]))
+    >>> module = system.compile(backend="numpy")
+    >>> module.outputs(0.0, [0.0, 2.0])["tip"]
+    array([2., 0.])
+    """
     return Point(body, at, "velocity")
 
 
 def acceleration(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """The acceleration of a point of a body in the n-frame, under all loads, m/s^2; an output, and `[i]` a scalar for outputs,
-    events and loads."""
+    events and loads.
+
+    >>> system = sd.systems.pendulum()
+    >>> system.add_output("tip", sd.acceleration("bob", [0, -1]))
+    >>> module = system.compile(backend="numpy")
+    >>> module.outputs(0.0, [0.0, 2.0])["tip"] + 0.0
+    array([0., 4.])
+    """
     return Point(body, at, "acceleration")
 
 
@@ -50,6 +71,14 @@ def jacobian(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """J of a point of a body, (6, n_u), for `System.add_output`: [v; omega] = J u, and what given motion adds, n-frame.
 
     Rows: velocity of the point, then angular velocity of the body; in a planar system v_x, v_y, omega_z, (3, n_u).
+
+    >>> system = sd.systems.pendulum()
+    >>> system.add_output("tip", sd.jacobian("bob", [0, -1]))
+    >>> module = system.compile(backend="numpy")
+    >>> module.outputs(0.0, [0.0, 2.0])["tip"]
+    array([[1.],
+           [0.],
+           [1.]])
     """
     return Point(body, at, "jacobian")
 
@@ -58,5 +87,11 @@ def bias_acceleration(body: Body, at: Vector = (0, 0, 0)) -> Point:
     """J_dot u of a point of a body, (6,), for `System.add_output`: [a; alpha] = J u_dot + J_dot u, rows as in `jacobian`.
 
     What is left of the accelerations when u_dot = 0; given motion is part of it. m/s^2 and rad/s^2.
+
+    >>> system = sd.systems.pendulum()
+    >>> system.add_output("tip", sd.bias_acceleration("bob", [0, -1]))
+    >>> module = system.compile(backend="numpy")
+    >>> module.outputs(0.0, [0.0, 2.0])["tip"] + 0.0
+    array([0., 4., 0.])
     """
     return Point(body, at, "bias_acceleration")

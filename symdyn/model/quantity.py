@@ -161,6 +161,9 @@ def rotation_matrix(body: BodyOrName) -> sp.ImmutableMatrix:
     """The rotation matrix R of a body, (3, 3): n components are R times components in body axes.
 
     Its entries are scalars that may stand in every expression, with `.dot`. Raises ModelError.
+
+    >>> sd.rotation_matrix("bob")[0, 0]
+    rotation_matrix(bob)[0, 0]
     """
     name = _name(body, "sd.rotation_matrix")
     return sp.ImmutableMatrix(3, 3, lambda i, j: Quantity(Measure("rotation_matrix", (name,), index=(int(i), int(j)))))
@@ -171,6 +174,9 @@ def angular_velocity(body: BodyOrName) -> sp.ImmutableMatrix:
 
     Its entries are scalars that may stand in every expression, with `.dot`, the angular acceleration, in outputs and events.
     Components in body axes are `sd.rotation_matrix(body).T * sd.angular_velocity(body)`. Raises ModelError.
+
+    >>> sd.angular_velocity("bob")[2]
+    angular_velocity(bob)[2]
     """
     name = _name(body, "sd.angular_velocity")
     return sp.ImmutableMatrix(3, 1, lambda i, _: Quantity(Measure("angular_velocity", (name,), index=(int(i),))))
@@ -181,6 +187,9 @@ def distance(a: BodyOrName, b: BodyOrName, point_a: Vector | None = None, point_
 
     point_a, point_b   where they are on their bodies, body axes, m; default: the origins
     The rate is not defined where the points coincide. Raises ModelError.
+
+    >>> sd.distance("a", "b").dot
+    distance(a, b).dot
     """
     names = (_name(a, "sd.distance"), _name(b, "sd.distance"))
     points = tuple(_point((0, 0, 0) if point is None else point, f"sd.distance: point of {name}", body)
@@ -192,6 +201,9 @@ def multiplier(name: str) -> Quantity:
     """The multiplier of a constraint by its name, as in `equations.constraints`: of C_r^T lam in M u_dot + k + C_r^T lam = F.
 
     It may stand in loads, rates of states, events, resets and outputs of augmented equations. Raises ModelError.
+
+    >>> sd.multiplier("rail") * 0.3
+    0.3*multiplier(rail)
     """
     return Quantity(Measure("multiplier", (_name(name, "sd.multiplier"),)))
 
@@ -202,6 +214,9 @@ def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.Immutabl
     frame   a body in whose axes the components are taken; default: the n-frame
     As in the quantity `reactions`, what the joint's own drive gives along its speeds is left out. Its entries may stand in loads,
     rates of states, events, resets and outputs: `mu * Abs(sd.reaction("slider", rod)[1])` is Coulomb friction. Raises ModelError.
+
+    >>> abs(sd.reaction("pivot")[0])
+    Abs(reaction(pivot)[0])
     """
     name = _name(joint, "sd.reaction")
     axes = None if frame is None else _name(frame, "sd.reaction: frame")

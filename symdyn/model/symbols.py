@@ -185,22 +185,41 @@ def _make(kind: type, names: str, assumptions: dict) -> Any:
 
 
 def coordinates(names: str, **assumptions: Any) -> Any:
-    """Generalized coordinates from names as for sympy.symbols: `q1, q2 = coordinates("q1 q2")`."""
+    """Generalized coordinates from names as for sympy.symbols: `q1, q2 = coordinates("q1 q2")`.
+
+    >>> x, theta = sd.coordinates("x theta")
+    >>> theta.dot, theta.ddot
+    (theta_dot, theta_ddot)
+    """
     return _make(Coordinate, names, assumptions)
 
 
 def speeds(names: str, **assumptions: Any) -> Any:
-    """Generalized speeds with names of their own, to be passed to joints as `speed=` or `speeds=`."""
+    """Generalized speeds with names of their own, to be passed to joints as `speed=` or `speeds=`.
+
+    >>> sd.speeds("w1:3")
+    (w1, w2)
+    """
     return _make(Speed, names, assumptions)
 
 
 def parameters(names: str, **assumptions: Any) -> Any:
-    """Parameters: plain SymPy symbols that get numbers when the motion is computed; declared by use."""
+    """Parameters: plain SymPy symbols that get numbers when the motion is computed; declared by use.
+
+    >>> m, l = sd.parameters("m l")
+    >>> m * l**2
+    l**2*m
+    """
     return _make(sp.Symbol, names, assumptions)
 
 
 def inputs(names: str, **assumptions: Any) -> Any:
-    """Free inputs: forces, torques or anything else that is given at run time."""
+    """Free inputs: forces, torques or anything else that is given at run time.
+
+    >>> F = sd.inputs("F")
+    >>> F * sp.cos(sd.t)
+    F*cos(t)
+    """
     return _make(Input, names, assumptions)
 
 
@@ -246,6 +265,10 @@ def partial_rate(value: Scalar) -> sp.Expr:
 
     What is left of `symdyn.rate` where nothing moves, such as the C_t of a constraint; `value.diff(symdyn.t)` is the total
     derivative. Raises ModelError for what is neither expression nor matrix.
+
+    >>> q = sd.coordinates("q")
+    >>> sd.partial_rate(sd.t * sp.sin(q))
+    sin(q)
     """
     if not isinstance(value, (sp.Expr, sp.MatrixBase)):
         raise ModelError([f"partial_rate was given {value!r} of type {type(value).__name__}; pass an expression or a matrix"])

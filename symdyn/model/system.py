@@ -62,6 +62,14 @@ class System:
     parameter, `initial` for coordinates, speeds, states and inputs, `duration` the usual time of simulation, `units`
     the unit of a symbol where it cannot be told from its use. Faults are collected while describing; `check()` and
     every formulation raise them all in one ModelError.
+
+    >>> q, = sd.coordinates("q,")
+    >>> m, l, g = sd.parameters("m l g")
+    >>> system = sd.System("pendulum", gravity=[0, -g])
+    >>> bob = system.add_body("bob", mass=m, com=[0, -l])
+    >>> pivot = system.add_joint(sd.Revolute("pivot", system.ground, bob, q))
+    >>> system.embedding().M_tilde
+    Matrix([[l**2*m]])
     """
 
     def __init__(self, name: str, gravity: Vector | None = None, planar: bool | None = None,
@@ -97,7 +105,12 @@ class System:
 
     @property
     def frame(self) -> Frame:
-        """The n-frame as a ReferenceFrame of SymPy, for vectors such as `force=-k*x*system.frame.x`."""
+        """The n-frame as a ReferenceFrame of SymPy, for vectors such as `force=-k*x*system.frame.x`.
+
+        >>> system = sd.System("space")
+        >>> system.frame
+        ground
+        """
         return self.ground.frame
 
     # -- bodies and joints
@@ -111,6 +124,10 @@ class System:
         com       centre of mass from the body's origin, body axes, m
         frame     the body axes as a ReferenceFrame of sympy.physics.mechanics, if there is one already: inertia may be a dyadic,
                   and com a vector, written in it. Later `body.frame` is the frame that vectors of the body are written in
+
+        >>> system = sd.System("plane", gravity=[0, -9.81])
+        >>> system.add_body("cart", mass=2.0, com=[0.1, 0]).name
+        'cart'
         """
         where = f"body {shown(name)}"
         faults = self._faults
@@ -127,7 +144,13 @@ class System:
         return body
 
     def add_joint(self, joint: Joint) -> Joint:
-        """Add a joint; parent and child may be given as bodies or by name."""
+        """Add a joint; parent and child may be given as bodies or by name.
+
+        >>> system = sd.System("plane", gravity=[0, -9.81])
+        >>> cart = system.add_body("cart", mass=2.0)
+        >>> system.add_joint(sd.Prismatic("rail", system.ground, cart, axis=[1, 0])).coordinates
+        (q_rail,)
+        """
         if not isinstance(joint, Joint):
             self._faults.append(f"add_joint was given {shown(joint)}; pass a joint such as sd.Revolute(...)")
         else:
@@ -147,6 +170,12 @@ class System:
         motions of the clamped end, centrifugal and gravity stiffening included; see symdyn.flexible.ModalBody. Returns the bodies
         `root` and `tip`, both with the axes of the beam's frame where it is straight, and the coordinates. Raises ModelError if
         beam is none.
+
+        >>> system = sd.System("mast", gravity=[0, 0, -9.81])
+        >>> mast = system.add_flexible_body("mast", sd.Beam([0, 1], 0.5, 20.0, 1, length=3.0))
+        >>> clamp = system.add_joint(sd.Fixed("clamp", system.ground, mast.root))
+        >>> system.embedding().M_tilde.shape
+        (1, 1)
         """
         body = flexible_body(name, beam, coordinates, stiffness, damping, carries)
         self.bodies += [body.root, body.tip]
@@ -159,6 +188,13 @@ class System:
         Joints of all kinds but Free close loops: Fixed, Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Helical,
         Custom. Their coordinates do not become coordinates of the system, except those of Helical and Custom joints: give none to
         the others.
+
+        >>> system = sd.System("bar", gravity=[0, -9.81])
+        >>> bar = system.add_body("bar", mass=1.0, inertia=0.1, com=[0.5, 0])
+        >>> joint = system.add_joint(sd.Planar("free", system.ground, bar))
+        >>> rod = system.close_loop(sd.Rod("rod", system.ground, bar, length=1.0))
+        >>> system.augmented().constraints
+        ('rod',)
         """
         if not isinstance(joint, (Joint, Gear)):
             self._faults.append(f"close_loop was given {shown(joint)}; pass a joint such as sd.Revolute(...), an sd.Rod or an "
@@ -169,7 +205,12 @@ class System:
 
     def add_coordinate(self, *coordinates: sp.Expr) -> None:
         """Coordinates that no joint has for its own, to be used in the expressions of joints: with an absolute angle phi,
-        the joint after one with angle q takes coordinate=phi - q."""
+        the joint after one with angle q takes coordinate=phi - q.
+
+        >>> a, b = sd.coordinates("a b")
+        >>> system = sd.System("points", gravity=[0, -9.81])
+        >>> system.add_coordinate(a, b)
+        """
         for given in coordinates:
             taken = as_coordinate(given)
             if isinstance(taken, Coordinate):
@@ -180,7 +221,13 @@ class System:
                                     "one by one")
 
     def move_ground(self, position: Vector = ZERO, angles: Sequence[Scalar] = ZERO, sequence: str = "ZYX") -> None:
-        """Give the ground a prescribed motion: position (m) and Euler angles (rad), of t, motions (sd.motions) and parameters."""
+        """Give the ground a prescribed motion: position (m) and Euler angles (rad), of t, motions (sd.motions) and parameters.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.move_ground([sp.cos(sd.t) / 10, 0])
+        >>> system.embedding().F_tilde - system.embedding().k_tilde
+        Matrix([[-g*l*m*sin(q1) + l*m*cos(t)*cos(q1)/10]])
+        """
         p = self._faults.vector(position, "move_ground: position", self.planar)
         turned = self._faults.vector(angles, "move_ground: angles")
         moving = Free("ground_motion", "inertial", "ground", ZERO * 2, EulerAngles(sequence))
@@ -197,6 +244,12 @@ class System:
         frame     the body in whose axes the components are given; default: the n-frame. A vector of SymPy's, such as
                   F*body.frame.x, has its frame with it: that of a body, or `system.frame`
         reaction  the body that feels the opposite force at the same place, if any
+
+        >>> system = sd.systems.pendulum()
+        >>> F = sd.inputs("F")
+        >>> system.add_force("bob", [F, 0])
+        >>> system.embedding().F_tilde
+        Matrix([[l*(-g*m*sin(q1) + F*cos(q1))]])
         """
         label = self._label(name, f"force_{len(self.loads) + 1}")
         at = None if point is None else self._faults.vector(point, f"{label}: point", True, self._body(body))
@@ -205,7 +258,13 @@ class System:
 
     def add_torque(self, body: BodyOrName, torque: Scalar | Vector, frame: BodyOrName | None = None,
                    reaction: BodyOrName | None = None, name: str = "") -> None:
-        """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force."""
+        """A torque (N m) on a body: 3 components, or one number about z in a planar system; see add_force.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_torque("bob", 2.0)
+        >>> system.embedding().F_tilde
+        Matrix([[-g*l*m*sin(q1) + 2]])
+        """
         label = self._label(name, f"torque_{len(self.loads) + 1}")
         if self.planar and not hasattr(torque, "__len__") and not is_sympy_vector(torque):
             torque = [0, 0, torque]
@@ -213,7 +272,14 @@ class System:
         self.loads.append(Torque(body, self._faults.vector(torque, label, frame=axes), frame, reaction, label))
 
     def add_joint_force(self, joint: JointOrName, value: Scalar | Sequence[Scalar], name: str = "") -> None:
-        """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies."""
+        """Drive a joint: the torque (N m) or force (N) along each of its speeds, acting between its two bodies.
+
+        >>> system = sd.systems.pendulum()
+        >>> q, = system.initial
+        >>> system.add_joint_force("pivot", -q.dot / 4)
+        >>> system.embedding().F_tilde
+        Matrix([[-(g*l*m*sin(q1) + q1_dot/4)]])
+        """
         label = self._label(name, f"joint_force_{len(self.loads) + 1}")
         self.loads.append(JointForce(joint, self._faults.expressions(value, label), label))
 
@@ -224,6 +290,13 @@ class System:
         Both ends are pulled by stiffness (distance - length) + damping times the rate of the distance. Stiffness, damping and
         length are numbers or expressions as for a force. A spring whose stiffness and length depend on parameters only has a
         potential energy; any other is a load that does work, like a force.
+
+        >>> system = sd.System("oscillator")
+        >>> block = system.add_body("block", mass=2)
+        >>> rail = system.add_joint(sd.Prismatic("rail", system.ground, block, axis=[1, 0, 0]))
+        >>> system.add_spring_damper(system.ground, block, point_a=[-1, 0, 0], stiffness=50, length=1)
+        >>> system.embedding().F_tilde
+        Matrix([[(-50 + 50/sqrt((q_rail + 1)**2))*(q_rail + 1)]])
         """
         label = self._label(name, f"spring_{len(self.loads) + 1}")
         f = self._faults
@@ -240,6 +313,10 @@ class System:
         force   any expression, such as a law in d = sd.distance(body_a, body_b, point_a, point_b) and its rate d.dot: a rope
                 that only pulls is Max(0, k*(d - length) + c*d.dot)
         point_a, point_b   body axes, m; default: the origins
+
+        >>> system = sd.systems.pendulum()
+        >>> r = sd.distance(system.ground, "bob", [1, 0], [0, -1])
+        >>> system.add_force_between(system.ground, "bob", 5 / r**2, [1, 0], [0, -1])
         """
         label = self._label(name, f"force_{len(self.loads) + 1}")
         f = self._faults
@@ -248,7 +325,13 @@ class System:
         self.loads.append(ForceBetween(body_a, body_b, f.expression(force, label), points[0], points[1], label))
 
     def add_load(self, load: Load) -> Load:
-        """Add a load that follows from the pose and motion of a body, such as sd.Buoyancy or sd.MooringLine, or added mass."""
+        """Add a load that follows from the pose and motion of a body, such as sd.Buoyancy or sd.MooringLine, or added mass.
+
+        >>> system = sd.systems.pendulum()
+        >>> drag = system.add_load(sd.LinearDamping("bob", [0, 0, 0, 0, 0, 0.1]))
+        >>> system.embedding().F_tilde
+        Matrix([[-(g*l*m*sin(q1) + 0.1*q1_dot)]])
+        """
         if not isinstance(load, (Element, AddedMass)):
             self._faults.append(f"add_load was given {shown(load)}; pass a load such as sd.Buoyancy(...) or "
                                 "sd.LinearDamping(...)")
@@ -261,7 +344,14 @@ class System:
 
     def add_output(self, name: str, value: Scalar | Vector | Point) -> None:
         """A named output: an expression in coordinates, speeds, states, inputs, t and parameters, a list of them, or
-        a point of a body: sd.position, sd.velocity, sd.acceleration, sd.jacobian, sd.bias_acceleration(body, point)."""
+        a point of a body: sd.position, sd.velocity, sd.acceleration, sd.jacobian, sd.bias_acceleration(body, point).
+
+        >>> system = sd.systems.pendulum()
+        >>> q, = system.initial
+        >>> system.add_output("height", -sp.cos(q))
+        >>> system.compile(backend="numpy").simulate((0, 1)).outputs["height"].shape
+        (1001,)
+        """
         if isinstance(value, Point):
             at = self._faults.vector(value.at, f"output {shown(name)}: point", True, self._body(value.body))
             taken: Any = Point(value.body, tuple(at), value.quantity)
@@ -277,6 +367,13 @@ class System:
         symbol   what z is in the expressions of rates, loads and outputs: made by sd.coordinates("z"), or a symbol of SymPy's
                  mechanics (dynamicsymbols("z")). It has no unit and no inertia; its initial value goes into system.initial[z]
         rate     z_dot, an expression as for add_output
+
+        >>> system = sd.systems.pendulum()
+        >>> q, = system.initial
+        >>> angle = sd.speeds("angle")
+        >>> system.add_state(angle, q)
+        >>> len(system.compile(backend="numpy").rhs(0.0, [0.1, 0.0, 0.0]))
+        3
         """
         taken = as_coordinate(symbol)
         if not isinstance(taken, Coordinate):
@@ -285,7 +382,16 @@ class System:
         self.states.append(State(taken, self._faults.expression(rate, f"rate of state {symbol}")))
 
     def add_constraint(self, expression: Scalar, name: str = "") -> None:
-        """A constraint expression = 0 in coordinates, motions and t; with speeds, linear in them, a velocity constraint."""
+        """A constraint expression = 0 in coordinates, motions and t; with speeds, linear in them, a velocity constraint.
+
+        >>> x, y = sd.coordinates("x y")
+        >>> system = sd.System("slope", gravity=[0, -9.81])
+        >>> block = system.add_body("block", mass=1, inertia=1)
+        >>> plane = system.add_joint(sd.Planar("plane", system.ground, block, [x, y, sd.coordinates("phi")]))
+        >>> system.add_constraint(y - x / 2, "slope")
+        >>> system.augmented().C_r
+        Matrix([[-1/2, 1, 0]])
+        """
         unnamed = name is None or (isinstance(name, str) and not name)
         label = f"constraint_{len(self.constraints) + 1}" if unnamed else name
         faults = len(self._faults)
@@ -316,6 +422,12 @@ class System:
                    and the others follow: they change by as little as the constraints allow in the metric of the mass matrix,
                    coordinates first, then speeds. For speeds that is the impact by impulses along what is reset alone, such as
                    in a joint; a speed that is to stay is named, {w: w}. What the constraints do not allow ends the run
+
+        >>> system = sd.systems.pendulum()
+        >>> q, = system.initial
+        >>> system.add_event("lowest", q, stop=True)
+        >>> system.compile(backend="numpy").simulate((0, 2)).events["lowest"].t.round(6)
+        array([0.666468])
         """
         made = make_event(self._faults, name, value, direction, stop, reset)
         if made is not None:
@@ -325,6 +437,9 @@ class System:
         """What a body looks like in pictures: shapes of sd.shapes in its axes (Box, Cylinder, Blade, Line; Water for the ground).
 
         color   text such as '#3377aa', '0.8' or 'orange', or three numbers from 0 to 1; default: one for each body
+
+        >>> system = sd.systems.pendulum()
+        >>> system.draw("bob", sd.shapes.Line([[0, 0], [0, -1]]), color="tab:blue")
         """
         self.shapes += drawn(self._faults, body, shapes, color, self.planar)
 
@@ -344,6 +459,9 @@ class System:
 
         What is doubtful but possible, such as moments of inertia that no real body has, is warned of once for each system
         (ModelWarning) and stays in the model's `doubts`. Raises ModelError with every fault found.
+
+        >>> sd.systems.pendulum().check().bodies[0].name
+        'bob'
         """
         return check(self)
 
@@ -353,6 +471,9 @@ class System:
         frames   the axes that quantities are formed in: "body", each link's own, or "parallel", those of the link before
                  where axes stay parallel
         Raises ModelError with every fault found.
+
+        >>> sd.systems.pendulum().embedding().k_tilde
+        Matrix([[0]])
         """
         from symdyn.formulation.trees.embedding import embed
 
@@ -363,6 +484,15 @@ class System:
 
         frames   as for `embedding`
         Raises ModelError with every fault found.
+
+        >>> sd.systems.pendulum().recursive().link("bob").I
+        Matrix([
+        [l**2*m, 0,      0,   0, 0, -l*m],
+        [     0, 0,      0,   0, 0,    0],
+        [     0, 0, l**2*m, l*m, 0,    0],
+        [     0, 0,    l*m,   m, 0,    0],
+        [     0, 0,      0,   0, m,    0],
+        [  -l*m, 0,      0,   0, 0,    m]])
         """
         from symdyn.formulation.trees.recursive import recursive
 
@@ -380,6 +510,9 @@ class System:
         frames        as for `embedding`; parallel ones, where there are any, print F_d in absolute angles
         Raises ModelError with every fault found, and for constraints that cannot hold or move nothing; SymdynError for an
         orientation that nothing takes: in relative coordinates or in a plane.
+
+        >>> sd.systems.pendulum().augmented(coordinates="absolute").constraints
+        ('pivot_x', 'pivot_y')
         """
         from symdyn.formulation.constraints.augmented import augment
 
@@ -397,6 +530,10 @@ class System:
                       ways: change of the fastest speed's coordinate, rad or parts of the mechanism's length
         Returns a Diagnosis, which prints as text. Raises ModelError for a description with faults; contradictory constraints
         are told in the diagnosis.
+
+        >>> print(sd.systems.pendulum().diagnose())
+        pendulum: diagnosis of the constraints
+          no loops or constraints: 1 degree of freedom
         """
         from symdyn.diagnosis import diagnose
 
@@ -408,6 +545,9 @@ class System:
 
         tune   compile the candidates and time them, instead of predicting from their operations
         The result's `candidates` tells what it was chosen from. Raises ModelError with every fault found.
+
+        >>> sd.systems.pendulum().equations().formulation
+        'embedding'
         """
         from symdyn.choice import choose
 
@@ -423,6 +563,9 @@ class System:
 
         Raises what `equations` raises, CompilerNotFound if C is asked for and there is no compiler, CompileError if it rejects
         the code.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").rhs(0.0, [0.1, 0.0]).round(6)
+        array([ 0.      , -0.979366])
         """
         return self.equations(tune).compile(backend, templates, specialize)
 
@@ -437,6 +580,13 @@ class System:
 
         Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a
         file that cannot be written; ArgumentError for a path that is none.
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> system = sd.System("slider", gravity=[0, 0, -9.81])
+        >>> joint = system.add_joint(sd.Prismatic("rail", system.ground, system.add_body("block", mass=1), axis=[1, 0, 0]))
+        >>> system.to_urdf(f"{folder}/chain.urdf").name
+        'chain.urdf'
         """
         from symdyn.urdf.write import write_urdf
 
@@ -482,7 +632,13 @@ class System:
         return f"System({shown(self.name)}, {', '.join(parts)})"
 
     def set_defaults(self, defaults: Numbers) -> System:
-        """Add numbers for parameters; returns the system."""
+        """Add numbers for parameters; returns the system.
+
+        >>> m, l, g = sd.parameters("m l g")
+        >>> system = sd.systems.pendulum().set_defaults({l: 2.0})
+        >>> system.defaults[l]
+        2.0
+        """
         self.defaults.update(defaults)
         return self
 

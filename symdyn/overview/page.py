@@ -57,6 +57,11 @@ def full_report(system: System | Equations, path: PathName, budget: float = BUDG
     told          called with what is going on
     Raises ArgumentError for an ending other than .html, a path that cannot be written, a budget that is no positive number and
     anything that is no mechanism; ModelError for one that has faults.
+
+    >>> import tempfile
+    >>> system = sd.systems.pendulum()
+    >>> sd.full_report(system, f"{tempfile.mkdtemp()}/pendulum.html", verify=False).name  # doctest: +SKIP
+    'pendulum.html'
     """
     target = _target(path)
     if isinstance(budget, bool) or not isinstance(budget, (int, float)) or not 0 < budget < math.inf:

@@ -71,6 +71,10 @@ def latex(value: Scalar | Matrix | Equations, name: str = "", shorthand: bool = 
     width       letters in a line; longer matrices get named entries below them, longer sums several lines
 
     Raises ArgumentError for what is no expression or matrix, and for a width that nothing fits in.
+
+    >>> m, l = sd.parameters("m l")
+    >>> print(sd.latex(m * l**2, "M"))
+    \\mathbf{M} = l^{2} m
     """
     return _typeset([(name, value)], shorthand, width)
 

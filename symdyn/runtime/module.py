@@ -88,6 +88,10 @@ class Module:
     Parameters are given as an array in the order of `metadata.parameters`, or as a mapping from names or symbols;
     what is left out takes its default. Every function takes one state, or arrays with the states along the first axis.
     Raises ArgumentError for values that do not fit, EvaluationError where the equations cannot be evaluated.
+
+    >>> module = sd.systems.pendulum().compile(backend="numpy")
+    >>> module.functions[:4], module.metadata.bodies
+    (('rhs', 'mass_matrix', 'k_tilde', 'F_tilde'), ('bob',))
     """
 
     def __init__(self, metadata: ModuleMetadata, provider: Provider, backend: str, fallback: str = "",
@@ -117,6 +121,10 @@ class Module:
         """x_dot (n_x,) at time t and state x = [q; u; z].
 
         params, inputs   in order, or by name or symbol; inputs that are left out take their initial values, as everywhere
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.rhs(0.0, [0.1, 0.0]).round(6)
+        array([ 0.      , -0.979366])
         """
         try:
             evaluator, seen, mark = self._local.rhs
@@ -142,6 +150,11 @@ class Module:
 
         Rows that cannot be evaluated are NaN, and an EvaluationWarning tells which and why. Values have the same bits as
         those of `rhs`. Quickest with states entry by entry in memory (x = a.T of an array a (n_x, n)).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.rhs_batch(0.0, [[0.1, 0.0], [0.2, 0.0]]).round(6)
+        array([[ 0.      , -0.979366],
+               [ 0.      , -1.948946]])
         """
         from symdyn.runtime.batches.states import rhs_batch
 
@@ -150,14 +163,24 @@ class Module:
     @property
     def batch_width(self) -> int:
         """How many states one processor core computes at once in `rhs_batch` and `simulate_batch`; 1: the backend is NumPy, or
-        the C compiler has no vectors."""
+        the C compiler has no vectors.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.batch_width
+        1
+        """
         from symdyn.runtime.batches.states import width
 
         return width(self)
 
     def evaluate(self, name: str, t: Times, x: States, params: States | None = None, inputs: States | None = (),
                  ud: States = ()) -> np.ndarray:
-        """Any function by name at one state or at rows of states; see METADATA shapes for the result."""
+        """Any function by name at one state or at rows of states; see METADATA shapes for the result.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.evaluate("mass_matrix", 0.0, [0.1, 0.0], {"l": 2.0})
+        array([[4.]])
+        """
         text(name, f"{self.name}: the name of a function", "mass_matrix")
         evaluator = self._evaluator(name, params)
         state = self._rows(x, "x", "x")
@@ -198,6 +221,10 @@ class Module:
 
         The two orders of arguments, by time and state as for `rhs`, or by parts of the state, hold for k_tilde, F_tilde, J,
         energy and inverse_dynamics, too; every argument can be named. Raises ArgumentError where what is given fits both.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.mass_matrix(q=[0.1])
+        array([[1.]])
         """
         named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "mass_matrix", at, named, ("q", "params", "t", "inputs"))
@@ -205,7 +232,12 @@ class Module:
 
     def k_tilde(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                 params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
-        """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0)."""
+        """k_tilde (n_u,), Coriolis, centrifugal and gyroscopic terms: k_tilde(t, x, params) or k_tilde(q, u, params, t=0).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.k_tilde(q=[0.1], u=[2.0])
+        array([0.])
+        """
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "k_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("k_tilde", call)
@@ -213,7 +245,12 @@ class Module:
     def F_tilde(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                 params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """F_tilde (n_u,), generalized forces of all loads and gravity: F_tilde(t, x, params, inputs) or
-        F_tilde(q, u, params, t=0, inputs=())."""
+        F_tilde(q, u, params, t=0, inputs=()).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.F_tilde(q=[0.1], u=[0.0]).round(6)
+        array([-0.979366])
+        """
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "F_tilde", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("F_tilde", call)
@@ -221,14 +258,26 @@ class Module:
     def J(self, *at: States | None, x: States | None = None, q: States | None = None, params: States | None = None,
           t: Times | None = None, inputs: States | None = None) -> np.ndarray:
         """J (6 n_b, n_u), planar (3 n_b, n_u), with [v_G; omega] of every body = J u, n-frame: J(t, x, params) or
-        J(q, params, t=0)."""
+        J(q, params, t=0).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.J(q=[0.0])
+        array([[1.],
+               [0.],
+               [1.]])
+        """
         named = {"x": x, "q": q, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "J", at, named, ("q", "params", "t", "inputs"))
         return self._called("J", call)
 
     def energy(self, *at: States | None, x: States | None = None, q: States | None = None, u: States | None = None,
                params: States | None = None, t: Times | None = None, inputs: States | None = None) -> np.ndarray:
-        """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0)."""
+        """Kinetic and potential energy (2,), J: energy(t, x, params) or energy(q, u, params, t=0).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.energy(q=[0.0], u=[2.0])
+        array([ 2.  , -9.81])
+        """
         named = {"x": x, "q": q, "u": u, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "energy", at, named, ("q", "u", "params", "t", "inputs"))
         return self._called("energy", call)
@@ -243,6 +292,10 @@ class Module:
               loops are cut and tau is that of the tree alone
         Raises ArgumentError where there are constraints and no lam: tau depends on how they share the forces. The inputs that
         make a motion of a mechanism with loops, with its multipliers, are those of `actuation`.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.inverse_dynamics(q=[0.0], u=[0.0], ud=[1.0])
+        array([1.])
         """
         named = {"x": x, "q": q, "u": u, "ud": ud, "params": params, "t": t, "inputs": inputs}
         call = ordered(self, "inverse_dynamics", at, named, ("q", "u", "ud", "params", "t", "inputs"))
@@ -291,6 +344,11 @@ class Module:
         Raises ArgumentError for a motion that violates the constraints, or that the inputs cannot make, with the direction in
         coordinates and the force that is missing; where no solution is found; and where more inputs than freedoms enter
         nonlinearly, by name. See symdyn.statics.actuation.Actuation for the result, and for the source.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_joint_force("pivot", sd.inputs("tau"))
+        >>> system.compile(backend="numpy").actuation(0.0, q=[0.0], u=[0.0], ud=[1.0])["tau"]
+        1.0
         """
         from symdyn.statics.actuation import actuation
 
@@ -301,13 +359,25 @@ class Module:
         by name; with the names of speeds and inputs, by which it is indexed, too.
 
         inputs   where they enter nonlinearly the matrix depends on them; default: their initial values
+
+        >>> module = sd.systems.cart_pole().compile(backend="numpy")
+        >>> module.input_matrix(0.0, [0.0, 0.0, 0.0, 0.0])
+                            F [N]
+        q1_dot [N]              1
+        q2_dot [N m]            0
         """
         from symdyn.statics.actuation import input_matrix
 
         return input_matrix(self, t, x, params, inputs)
 
     def outputs(self, t: Times, x: States, params: States | None = None, inputs: States | None = ()) -> dict[str, np.ndarray]:
-        """The user's named outputs."""
+        """The user's named outputs.
+
+        >>> system = sd.systems.pendulum()
+        >>> system.add_output("tip", sd.position("bob", [0, -1]))
+        >>> system.compile(backend="numpy").outputs(0.0, [0.0, 2.0])
+        {'tip': array([ 0., -1.])}
+        """
         return self.split_outputs(self.evaluate("outputs", t, x, params, inputs))
 
     def jacobian(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
@@ -326,12 +396,12 @@ class Module:
         With Euler parameters the derivatives by the state hold along changes that keep their norm. Raises ArgumentError for what
         there are no derivatives of or by.
 
-        >>> import symdyn as sd
-        >>> module = sd.systems.pendulum().embedding().compile()
-        >>> module.jacobian(0, [0, 0]).x.round(4).tolist()
-        [[0.0, 1.0], [-14.715, 0.0]]
-        >>> module.jacobian(0, [0, 0], of="inverse_dynamics", wrt=["ud"], ud=[0]).ud.shape
-        (1, 1)
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.jacobian(0.0, [0.0, 0.0]).x.round(6)
+        array([[ 0.  ,  1.  ],
+               [-9.81,  0.  ]])
+        >>> module.jacobian(0.0, [0.0, 0.0], of="inverse_dynamics", wrt=["ud"], ud=[0.0]).ud
+        array([[1.]])
         """
         if not isinstance(wrt, (list, tuple)):
             raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of {_BY}")
@@ -356,10 +426,9 @@ class Module:
         The others as for `jacobian`. Raises ArgumentError for weights and names that do not fit, SymdynError where rates of
         states depend on multipliers.
 
-        >>> import symdyn as sd
-        >>> module = sd.systems.pendulum().embedding().compile()
-        >>> module.adjoint(0, [0, 0], [0, 1], wrt=["x"]).x.round(4).tolist()
-        [-14.715, 0.0]
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.adjoint(0.0, [0.0, 0.0], [0.0, 1.0], wrt=["x"]).x.round(6)
+        array([-9.81,  0.  ])
         """
         self._weighted(wrt, "adjoint")
         given = self._with_weights(weights, (), 0)
@@ -375,12 +444,12 @@ class Module:
         The others as for `jacobian`. With Euler parameters the second derivatives hold along changes that keep their norm. Raises
         ArgumentError for weights, directions and names that do not fit, SymdynError where rates of states depend on multipliers.
 
-        >>> import symdyn as sd
-        >>> module = sd.systems.pendulum().embedding().compile()
-        >>> module.hessian(0, [1.5707963267948966, 0], [0, 1]).round(4).tolist()
-        [[14.715, 0.0], [0.0, 0.0]]
-        >>> module.hessian(0, [1.5707963267948966, 0], [0, 1], along=[2, 0]).round(4).tolist()
-        [29.43, 0.0]
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.hessian(0.0, [np.pi / 2, 0.0], [0.0, 1.0]).round(6)
+        array([[9.81, 0.  ],
+               [0.  , 0.  ]])
+        >>> module.hessian(0.0, [np.pi / 2, 0.0], [0.0, 1.0], along=[2.0, 0.0]).round(6)
+        array([19.62,  0.  ])
         """
         self._weighted(wrt, "hessian")
         chosen = [by for by in Jacobian._fields if by in wrt]
@@ -420,9 +489,11 @@ class Module:
 
         It is read off the statements: True for an entry that is zero by numbers only. Raises ArgumentError as `jacobian`.
 
-        >>> import symdyn as sd
-        >>> sd.systems.cart_pole().embedding().compile().sparsity().astype(int).tolist()
-        [[0, 0, 1, 0], [0, 0, 0, 1], [0, 1, 1, 1], [0, 1, 1, 1]]
+        >>> sd.systems.cart_pole().compile(backend="numpy").sparsity().astype(int)
+        array([[0, 0, 1, 0],
+               [0, 0, 0, 1],
+               [0, 1, 1, 1],
+               [0, 1, 1, 1]])
         """
         if not isinstance(wrt, str) or wrt not in FurtherDerivatives._fields:
             raise ArgumentError(f"{self.name}: sparsity by {shown(wrt)} asked for; there are {_BY}")
@@ -442,7 +513,12 @@ class Module:
         return {by: own.get(by, f"{of}_by_{by}") for by in FurtherDerivatives._fields}
 
     def function(self, name: str) -> Callable[..., np.ndarray]:
-        """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states."""
+        """One function as f(q, u, params, t=0, inputs=(), ud=()), of one state or of rows of states.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.function("mass_matrix")([0.1])
+        array([[1.]])
+        """
         self._unit(text(name, f"{self.name}: the name of a function", "mass_matrix"))
 
         def call(q: Any, u: Any = None, params: Any = None, t: Any = 0.0, inputs: Any = (),
@@ -452,16 +528,31 @@ class Module:
         return call
 
     def bind(self, params: States | None = None) -> BoundModule:
-        """The module with these parameters, whatever becomes of `params` later: the prologue runs here and not again."""
+        """The module with these parameters, whatever becomes of `params` later: the prologue runs here and not again.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.bind({"l": 2.0}).rhs(0.0, [0.1, 0.0]).round(6)
+        array([ 0.      , -0.489683])
+        """
         return BoundModule(self, self.parameters(params))
 
     def parameters(self, params: States | None = None) -> np.ndarray:
-        """Parameters in order, (n_p,)."""
+        """Parameters in order, (n_p,).
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.parameters({"l": 2.0})
+        array([9.81, 1.  , 2.  ])
+        """
         return take(params, self.metadata.parameters, "parameters", self._defaults, self.name)
 
     @functools.cached_property
     def default_parameters(self) -> np.ndarray:
-        """Their defaults, (n_p,), not to be written to: change a copy of them. Raises ArgumentError for those without one."""
+        """Their defaults, (n_p,), not to be written to: change a copy of them. Raises ArgumentError for those without one.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.default_parameters
+        array([9.81, 1.  , 1.  ])
+        """
         return fixed(self.parameters())
 
     # -- constraints
@@ -478,6 +569,10 @@ class Module:
         those after an impact, without rebound, of a mechanism whose constraints begin to hold, exact to rounding also with
         redundant constraints; along motions that move no mass the smallest velocities are added. Raises ArgumentError with
         the residual of every constraint that is left where there is no solution nearby.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.consistent({"q1": 0.1})
+        (array([0.1]), array([0.]))
         """
         from symdyn.runtime.consistent import consistent
 
@@ -488,13 +583,22 @@ class Module:
 
         Columns of angular velocities are divided by the mechanism's length; singular values below 1e-8 of the largest are zero.
         inputs: values of motions, which constraints may follow.
+
+        >>> module = sd.systems.four_bar().compile(backend="numpy")
+        >>> int(module.rank([0.3, 1.0, 2.0]))
+        2
         """
         from symdyn.runtime.constraints import rank
 
         return rank(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
 
     def unique(self, q: States, params: States | None = None, t: Times = 0.0, inputs: States | None = ()) -> np.ndarray:
-        """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`."""
+        """Which multipliers the motion determines, (n_c,) of bool, by the same singular values as `rank`.
+
+        >>> module = sd.systems.four_bar().compile(backend="numpy")
+        >>> module.unique([0.3, 1.0, 2.0])
+        array([ True,  True])
+        """
         from symdyn.runtime.constraints import unique
 
         return unique(self.following(self._rows(inputs, "inputs", "inputs")), t, self._state(q), self.parameters(params))
@@ -546,6 +650,10 @@ class Module:
         SimulationWarning is given and kept in the Solution's `doubts`. What a function of the user raises ends a run like that,
         and is its `cause`. Ctrl-C raises SimulationInterrupted, whose `solution` holds the same.
         Raises ArgumentError for values that do not fit.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.simulate((0, 1), q={"q1": 0.1}, rtol=1e-10).x[-1].round(6)
+        array([-0.099993, -0.003585])
         """
         from symdyn.runtime.integrating.simulate import simulate
 
@@ -583,6 +691,10 @@ class Module:
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions
         loads leave what they are meant for, or Euler angles come too near to gimbal lock, at the states that are kept. Raises
         ArgumentError for what does not fit.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.simulate_batch({"q1": [0.1, 0.2]}, t=(0, 1)).x.shape
+        (2, 1, 2)
         """
         from symdyn.runtime.batches.motions import simulate_batch
 
@@ -614,6 +726,10 @@ class Module:
         Constraints are fulfilled at the same time. Raises NoEquilibrium with the forces that are left,
         EquilibriumNotUnique with the direction that has no stiffness, or none beyond rounding, ArgumentError for what does not
         fit.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> abs(module.equilibrium(start={"q1": 0.1})["q1"]) < 1e-9
+        True
         """
         from symdyn.statics.equilibrium import equilibrium
 
@@ -633,6 +749,10 @@ class Module:
         Two are the same if coordinates differ by less than 1e-6, angles of joints that turn
         all the way by whole turns, Euler parameters by their sign. A start that leads to none is listed in `failures`; raises
         NoEquilibrium with the first message if none of them leads anywhere.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> len(module.equilibria(10))
+        2
         """
         from symdyn.statics.equilibria import equilibria
 
@@ -651,6 +771,11 @@ class Module:
                       names or the equilibrium kept, but for the conditions of a trim; () holds nothing
 
         See symdyn.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.linearize({"q1": 0.0}).A.round(4) + 0.0
+        array([[ 0.  ,  1.  ],
+               [-9.81,  0.  ]])
         """
         from symdyn.statics.linearize import linearize
 
@@ -672,6 +797,10 @@ class Module:
         Constant equations are judged by their eigenvalues, those that a change of variables makes constant (a rotor of three or
         more like blades, a body that spins about its axis) after the change, others by Floquet theory. Raises ArgumentError where
         neither holds, NoEquilibrium where no periodic motion is found.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> print(module.stability({"q1": 0.0}).verdict)
+        neutral
         """
         from symdyn.statics.stability import stability
 
@@ -706,7 +835,12 @@ class Module:
     # -- about the module
 
     def report(self) -> Report:
-        """What was generated, what was skipped and why, operation counts; prints as text."""
+        """What was generated, what was skipped and why, operation counts; prints as text.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.report().rows[0].function
+        'rhs'
+        """
         if self._reporter is None:
             raise ArgumentError(f"{self.name} was loaded from files; a report needs the equations it came from")
         from symdyn.runtime.batches.motions import many_at_once
@@ -715,7 +849,13 @@ class Module:
         return replace(self._reporter(), many=many_at_once(self, UNIT in self._units))
 
     def write(self, folder: PathName) -> list[Path]:
-        """Write the generated files, complete with header, example and reference vectors; returns their paths."""
+        """Write the generated files, complete with header, example and reference vectors; returns their paths.
+
+        >>> import tempfile
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> [path.name for path in module.write(tempfile.mkdtemp())]
+        ['pendulum.py']
+        """
         if self._writer is None:
             raise ArgumentError(f"{self.name} was loaded from files; copy them, or compile the equations it came from")
         target = as_path(folder, "of the folder to write to", "generated/arm")
@@ -734,11 +874,21 @@ class Module:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """Names of the functions that can be evaluated."""
+        """Names of the functions that can be evaluated.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.functions[0]
+        'rhs'
+        """
         return tuple(self.metadata.functions)
 
     def shape(self, name: str) -> tuple[int, ...]:
-        """Shape of the result of a function at one state."""
+        """Shape of the result of a function at one state.
+
+        >>> module = sd.systems.pendulum().compile(backend="numpy")
+        >>> module.shape("mass_matrix")
+        (1, 1)
+        """
         return tuple(self._unit(name).metadata.shapes[name])
 
     def unit(self, what: str | RightSide) -> Unit:

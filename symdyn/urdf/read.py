@@ -53,6 +53,12 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
 
     Raises ModelError that tells every fault of the file with its line; ArgumentError for an unknown root, and for a path and
     names that are none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
+
+    >>> import tempfile
+    >>> system = sd.System("slider", gravity=[0, 0, -9.81])
+    >>> joint = system.add_joint(sd.Prismatic("rail", system.ground, system.add_body("block", mass=1), axis=[1, 0, 0]))
+    >>> sd.read_urdf(system.to_urdf(f"{tempfile.mkdtemp()}/slider.urdf")).name
+    'slider'
     """
     patterns, held = _patterns(symbolic, "symbolic"), _patterns(fixed, "fixed")
     flag(damping, "damping")

@@ -56,6 +56,12 @@ def augmented(coordinates: Sequence[sp.Symbol], mass: Matrix, force: Vector, con
     Raises ModelError with every fault: shapes, symbols, speeds that are not linear, constraints that hold nothing or contradict
     each other, coordinates without mass that nothing holds. Constraints that leave no motion are allowed, since they may
     prescribe it; warns (ModelWarning) if no state is found that fulfils them with the numbers in `defaults`.
+
+    >>> x, y = sd.coordinates("x y")
+    >>> m, l, g = sd.parameters("m l g")
+    >>> equations = sd.augmented([x, y], [m, m], [0, -m * g], [x**2 + y**2 - l**2])
+    >>> equations.C_r
+    Matrix([[2*x, 2*y]])
     """
     given = ByHand(coordinates, name)
     faults, q = given.faults, given.q

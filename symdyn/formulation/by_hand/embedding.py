@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from symdyn.given import Matrix, Numbers, Vector
 
 
-def embedding(coordinates: Sequence[sp.Symbol], position: Vector, mass: Matrix, force: Vector = None, name: str = "system",
+def embedding(coordinates: Sequence[sp.Symbol], position: Vector, mass: Matrix, force: Vector | None = None, name: str = "system",
               defaults: Numbers | None = None) -> EmbeddedEquations:
     """Embedded equations of a position map.
 
@@ -41,6 +41,12 @@ def embedding(coordinates: Sequence[sp.Symbol], position: Vector, mass: Matrix, 
 
     The result prints J, Jdot, Jd_qd, M_tilde, k_tilde, F_tilde, the reaction F_c = M r_ddot - F, and compiles like the
     equations of a System. Raises ModelError with every fault: shapes, coordinates that nothing depends on, symbols.
+
+    >>> q = sd.coordinates("q")
+    >>> m, l, g = sd.parameters("m l g")
+    >>> equations = sd.embedding([q], [l * sp.sin(q), -l * sp.cos(q)], [m, m], [0, -m * g])
+    >>> equations.M_tilde, equations.F_tilde
+    (Matrix([[l**2*m]]), Matrix([[-g*l*m*sin(q)]]))
     """
     given = ByHand(coordinates, name)
     faults, q = given.faults, given.q

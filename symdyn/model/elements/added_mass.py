@@ -25,6 +25,13 @@ class AddedMass:
     v x (A v)_f, so that energy is kept; to first order they are the usual -A v_dot. Water has no weight here: gravity is in the
     buoyancy. Source: Lamb, Hydrodynamics, section 124; Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control,
     section 6.3.
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> water = system.add_load(sd.AddedMass(box, sp.diag(0, 0, 300, 0, 0, 0)))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([ 0.    , -6.1313])
     """
 
     kind = "added mass"

@@ -31,6 +31,9 @@ class Box:
     """A box whose edges are parallel to the axes of its body.
 
     size    (3,) lengths of its edges along x, y, z, m, positive; center: (3,) its middle, body axes, m
+
+    >>> sd.Box([2, 1, 1], center=[0, 0, -0.5]).size
+    [2, 1, 1]
     """
 
     size: Vector
@@ -47,6 +50,13 @@ class Buoyancy(Element):
 
     All may hold parameters. Its potential is the integral of density*gravity*depth over the wet part. Watched is the wet part
     of the volume, which is between 0 and 1 while the body floats.
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> buoyancy = system.add_load(sd.Buoyancy(box, [sd.Box([1, 1, 1])], density=1000))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([0.   , 1.962])
     """
 
     kind = "buoyancy"

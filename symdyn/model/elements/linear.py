@@ -46,6 +46,13 @@ class LinearStiffness(Element):
     what is not symmetric in K has no potential and counts as a force that does work (a matrix of moments about fixed axes, of
     a prestressed mooring for example, is not quite symmetric). A linear stiffness is meant for small angles: a tilt above 20
     degrees gives a warning, and a turn above 120 degrees where the angles are not coordinates of a joint.
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> stiffness = system.add_load(sd.LinearStiffness(box, [0, 0, 1e4, 0, 0, 0]))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([ 0.  , -7.81])
     """
 
     kind = "linear stiffness"
@@ -151,6 +158,13 @@ class LinearDamping(Element):
     B       (6, 6): N s/m, N s, N m s; a list of 6 stands for its diagonal
     point   (3,) body axes, m
     A matrix of numbers whose symmetric part has a negative eigenvalue feeds energy into some motions: it gives a ModelWarning.
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> damping = system.add_load(sd.LinearDamping(box, [0, 0, 200, 0, 0, 0]))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.5]).round(4)
+    array([  0.5 , -10.01])
     """
 
     kind = "linear damping"

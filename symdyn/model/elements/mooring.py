@@ -40,6 +40,13 @@ class MooringLine(Element):
     length count as such. The run stops, and tells why, where the fairlead is not above the seabed; a strain at the fairlead
     above 5 % gives a warning.
     Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.tape.catenary for the equations.
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> line = system.add_load(sd.MooringLine(box, [0, 0, 0], [60, 0, -20], length=70, weight=100, stiffness=1e6))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([  0.    , -15.6414])
     """
 
     kind = "mooring line"

@@ -24,6 +24,13 @@ class WaveExcitation(Element):
     frequency   w, rad/s
     point       (3,) body axes, m
     ramp        s: within this time the waves grow from nothing, by (1 - cos(pi t / ramp)) / 2; None: they are there at once
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> wave = system.add_load(sd.WaveExcitation(box, [0, 0, 1e3, 0, 0, 0], [0] * 6, frequency=0.6))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([ 0.  , -7.81])
     """
 
     kind = "wave excitation"

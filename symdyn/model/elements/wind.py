@@ -28,6 +28,13 @@ class Drag(Element):
     area          m^2; coefficient: 1; density: of the air or water, kg/m^3
     wind          (3,) n-frame, m/s: expressions of t, inputs and parameters
     point         (3,) body axes, m
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> drag = system.add_load(sd.Drag(box, area=1, coefficient=1.2, density=1.2, wind=[0, 0, 5]))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([ 0.   , -9.774])
     """
 
     kind = "drag"
@@ -73,6 +80,13 @@ class Thrust(Element):
     axis    (3,) body axes, of any length but zero; the force acts along it where it is positive
     wind    (3,) n-frame, m/s: expressions of t, inputs and parameters
     point   (3,) body axes, m
+
+    >>> system = sd.System("float", gravity=[0, 0, -9.81])
+    >>> box = system.add_body("box", mass=500, inertia=[100, 100, 100])
+    >>> joint = system.add_joint(sd.Prismatic("heave", system.ground, box, axis=[0, 0, 1]))
+    >>> thrust = system.add_load(sd.Thrust(box, lambda v: 10 * v, axis=[0, 0, 1], wind=[0, 0, 5]))
+    >>> system.compile(backend="numpy").rhs(0.0, [-0.1, 0.0]).round(4)
+    array([ 0.  , -9.71])
     """
 
     kind = "thrust"

@@ -32,6 +32,12 @@ class Custom(Joint):
     Everything else follows by exact differentiation. The rotation must be one at every value of its symbols, and every
     coordinate must move the child in a way of its own; both are tried at random points. A motion that is given, or follows
     other coordinates, needs no joint of its own: Free takes expressions as coordinates.
+
+    >>> s = sd.coordinates("s")
+    >>> system = sd.System("bead")
+    >>> joint = sd.Custom("wire", system.ground, system.add_body("bead", mass=1), [s], position=[s, 0, s**2], units=["m"])
+    >>> joint.coordinates
+    (s,)
     """
 
     kind = "custom"

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 
 class Cylindrical(Joint):
-    """coordinates = [angle (rad), distance (m)] about and along `axis`; see Joint for the frames."""
+    """coordinates = [angle (rad), distance (m)] about and along `axis`; see Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Cylindrical("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    (q_joint_1, q_joint_2)
+    """
 
     kind = "cylindrical"
     coordinate_units = ("rad", "m")

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 
 class Fixed(Joint):
-    """Holds the child on the parent; see Joint for the frames."""
+    """Holds the child on the parent; see Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Fixed("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    ()
+    """
 
     kind = "fixed"
 

@@ -37,6 +37,11 @@ class Free(Joint):
                   rotation's speeds a free body's mass matrix is then constant, and the joint's forces are the force at this
                   origin and the moment about it, both in the child's axes.
     See Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Free("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    (q_joint_1, q_joint_2, q_joint_3, q_joint_4, q_joint_5, q_joint_6)
     """
 
     kind = "free"

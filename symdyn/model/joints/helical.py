@@ -23,6 +23,11 @@ class Helical(AxisJoint):
     pitch   m/rad, a number or an expression of parameters: the advance of one full turn over 2 pi; positive: a
             right-handed screw
     See Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Helical("joint", system.ground, system.add_body("body", mass=1), pitch=0.01)
+    >>> joint.coordinates
+    (q_joint,)
     """
 
     kind = "helical"

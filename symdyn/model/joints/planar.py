@@ -20,6 +20,11 @@ class Planar(Joint):
     """coordinates = [x (m), y (m), theta (rad)] in the x-y plane of the joint frame on the parent.
 
     See Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Planar("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    (q_joint_1, q_joint_2, q_joint_3)
     """
 
     kind = "planar"

@@ -11,7 +11,13 @@ from symdyn.spatial.vectors import identity, zeros
 
 
 class Prismatic(AxisJoint):
-    """Translation by `coordinate` (m) along `axis`, a vector in the joint frame, default x; see Joint for the frames."""
+    """Translation by `coordinate` (m) along `axis`, a vector in the joint frame, default x; see Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Prismatic("joint", system.ground, system.add_body("body", mass=1), axis=[1, 0, 0])
+    >>> joint.coordinates
+    (q_joint,)
+    """
 
     kind = "prismatic"
     coordinate_units = ("m",)

@@ -11,7 +11,13 @@ from symdyn.spatial.vectors import zeros
 
 
 class Revolute(AxisJoint):
-    """Rotation by `coordinate` (rad) about `axis`, a vector in the joint frame, default z; see Joint for the frames."""
+    """Rotation by `coordinate` (rad) about `axis`, a vector in the joint frame, default z; see Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Revolute("joint", system.ground, system.add_body("body", mass=1), axis=[0, 0, 1])
+    >>> joint.coordinates
+    (q_joint,)
+    """
 
     kind = "revolute"
     coordinate_units = ("rad",)

@@ -31,6 +31,11 @@ class Spherical(Joint):
                   EulerAngles(sequence, speeds="body") or EulerParameters(), whose speeds are the angular velocity, rad/s, in
                   the axes of the child's joint frame: omega_x_NAME, omega_y_NAME, omega_z_NAME unless named otherwise
     See Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Spherical("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    (q_joint_1, q_joint_2, q_joint_3)
     """
 
     kind = "spherical"

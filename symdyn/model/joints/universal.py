@@ -21,6 +21,11 @@ class Universal(Joint):
     """coordinates = [first angle, second angle] (rad), R = R_1 R_2; `axes` are two vectors in the joint frame.
 
     See Joint for the frames.
+
+    >>> system = sd.System("one")
+    >>> joint = sd.Universal("joint", system.ground, system.add_body("body", mass=1))
+    >>> joint.coordinates
+    (q_joint_1, q_joint_2)
     """
 
     kind = "universal"

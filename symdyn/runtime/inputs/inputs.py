@@ -31,6 +31,10 @@ class Smooth:
     Methods that cannot find such places, as "gauss", take declared functions alone:
     `inputs={"F": sd.Smooth(lambda t, x: ...)}`.
     Raises ArgumentError for what cannot be called.
+
+    >>> force = sd.Smooth(lambda t, x: 2.0 - x[0])
+    >>> sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": force}).success
+    True
     """
 
     function: Callable[[float, np.ndarray], Row]

@@ -34,6 +34,10 @@ class Sampled(OverTime):
     Pass it to `simulate`: inputs={F: sd.Sampled(f, period=0.01)}, inputs={(F, M): sd.Sampled(f, 0.01)} for an f that returns two
     values, or inputs=sd.Sampled(f, 0.01) for all inputs. Steps of the integrator end at the instants. Raises ArgumentError for
     what is no function, and for times that make no sense.
+
+    >>> controller = sd.Sampled(lambda t, x: -5.0 * x[0], period=0.1)
+    >>> sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": controller}).success
+    True
     """
 
     function: Callable[[float, np.ndarray], Row]

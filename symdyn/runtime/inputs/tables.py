@@ -55,6 +55,10 @@ class Table(OverTime):
                     "hold": the first value, and the last one
 
     Copies what is passed. Raises ArgumentError for what does not fit.
+
+    >>> force = sd.Table([0, 1, 2], [0.0, 3.0, 0.0], interpolation="cubic")
+    >>> sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": force}).success
+    True
     """
 
     times: np.ndarray

@@ -53,6 +53,10 @@ class Solution:
     method, why   of integration, and why it was chosen, if it was (method="auto")
     events    name -> times t (n,) and states just before x (n, n_x) of the system's events
     corrections   of projections onto the constraints: the largest of position and speed, how many, how much work
+
+    >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+    >>> solution.t.shape, solution.x[-1].round(6), solution.success
+    ((1001,), array([-1.491035, -3.118983]), True)
     """
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
@@ -130,41 +134,84 @@ class Solution:
 
     @property
     def y(self) -> np.ndarray:
-        """(n_x, n_t)"""
+        """States (n_x, n_t), as in SciPy.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.y.shape
+        (2, 1001)
+        """
         return self.x.T
 
     @property
     def status(self) -> int:
-        """0: reached the end, -1: stopped early, as in SciPy."""
+        """0: reached the end, -1: stopped early, as in SciPy.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.status
+        0
+        """
         return 0 if self.success else -1
 
     @property
     def q(self) -> np.ndarray:
+        """Coordinates (n_t, n_q).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.q[0]
+        array([2.])
+        """
         return self.x[:, :self._sizes.q]
 
     @property
     def u(self) -> np.ndarray:
+        """Speeds (n_t, n_u).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.u[0]
+        array([0.])
+        """
         return self.x[:, self._sizes.q:self._sizes.q + self._sizes.u]
 
     @property
     def z(self) -> np.ndarray:
+        """Extra states (n_t, n_z).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.z.shape
+        (1001, 0)
+        """
         return self.x[:, self._sizes.q + self._sizes.u:]
 
     @cached_property
     def energy(self) -> np.ndarray:
-        """Kinetic plus potential energy, (n_t,), J."""
+        """Kinetic plus potential energy, (n_t,), J.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.energy[:2].round(6)
+        array([4.0824, 4.0824])
+        """
         return self.energies.sum(axis=1)
 
     @cached_property
     def energies(self) -> np.ndarray:
-        """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not tell it."""
+        """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not tell it.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.energies[0].round(6)
+        array([0.    , 4.0824])
+        """
         if "energy" not in self.module.functions:
             raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not tell the energy; compute it "
                                 "from sol.q and sol.u, or describe the mechanism by bodies and joints")
         return self._rows("energy")
 
     def energy_at(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Kinetic plus potential energy at times (n,) and states (n, n_x), with the motion's parameters and inputs, (n,), J."""
+        """Kinetic plus potential energy at times (n,) and states (n, n_x), with the motion's parameters and inputs, (n,), J.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.energy_at(solution.t[:2], solution.x[:2]).round(6)
+        array([4.0824, 4.0824])
+        """
         rows = self.module.evaluate("energy", t, x, self.params, self._inputs.rows(t, x))
         return np.array(rows.reshape(len(t), -1).sum(axis=1))
 
@@ -174,6 +221,10 @@ class Solution:
         time; negative where it is lost, as in impacts. Empty without such events.
 
         Raises ArgumentError for equations by hand, as `energies` does.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.reset_energy
+        {}
         """
         return reset_energy(self, self._happened) if len(self.energies) else {}
 
@@ -183,6 +234,10 @@ class Solution:
         loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "error", the change less all others.
 
         Raises ArgumentError as `work` does.
+
+        >>> solution = sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": 1.0}, work=True)
+        >>> sorted(solution.energy_balance)
+        ['change', 'error', 'work']
         """
         change = self.energy - self.energy[0]
         parts = {"work": self.work, **{f"reset of {name}": rows for name, rows in self.reset_energy.items()}}
@@ -193,6 +248,10 @@ class Solution:
         """Work of all loads but gravity and springs since the start, (n_t,), J.
 
         Raises ArgumentError if the simulation was not asked for it and there are such loads.
+
+        >>> solution = sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": 1.0}, work=True)
+        >>> solution.work[-2:].round(4)
+        array([0.4358, 0.4364])
         """
         if self._work is not None:
             return self._work
@@ -202,31 +261,56 @@ class Solution:
 
     @property
     def has_work(self) -> bool:
-        """Whether the work of the loads was integrated along with the motion."""
+        """Whether the work of the loads was integrated along with the motion.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.has_work
+        False
+        """
         return self._work is not None
 
     @property
     def inputs(self) -> np.ndarray:
         """The inputs at every time, (n_t, n_in), as they were when the run ended; at an instant of a sampled controller those
-        that take effect there; not a number where a function of the user raises."""
+        that take effect there; not a number where a function of the user raises.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.inputs.shape
+        (1001, 0)
+        """
         return self._input_rows
 
     @property
     def samples(self) -> dict[str, SampleRows]:
-        """Input name -> what its sampled controller set: when the values took effect, t (n,), and the values (n,)."""
+        """Input name -> what its sampled controller set: when the values took effect, t (n,), and the values (n,).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.samples
+        {}
+        """
         record, known = self._inputs.record, self.module.metadata.inputs
         return {} if record is None else {name: record.of(k) for k, name in enumerate(known) if record.fresh[:, k].any()}
 
     @cached_property
     def outputs(self) -> dict[str, np.ndarray]:
-        """The user's named outputs, each (n_t, ...)."""
+        """The user's named outputs, each (n_t, ...).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.outputs
+        {}
+        """
         if not self.module.metadata.outputs:
             return {}
         return self.module.split_outputs(self._rows("outputs"))
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """Origin and rotation (row by row) of every body's frame, n-frame, (n_t, n_b, 12)."""
+        """Origin and rotation (row by row) of every body's frame, n-frame, (n_t, n_b, 12).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.frames.shape
+        (1001, 1, 12)
+        """
         return self._rows("frames")
 
     # -- constraints
@@ -236,33 +320,62 @@ class Solution:
         """Multipliers of the constraints, (n_t, n_c), the least ones where they are not unique; the force is -C_r^T lam.
 
         No columns without constraints; not a number where they cannot be computed.
+
+        >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
+        >>> solution.lam.shape
+        (1001, 1)
         """
         return self.rows("lam") if self._n_c else np.zeros((len(self.t), 0))
 
     @cached_property
     def constraint_violation(self) -> np.ndarray:
-        """Residuals of the constraints relative to the mechanism's length, (n_t, n_c)."""
+        """Residuals of the constraints relative to the mechanism's length, (n_t, n_c).
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.constraint_violation.shape
+        (1001, 0)
+        """
         return position_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
 
     @cached_property
     def velocity_violation(self) -> np.ndarray:
-        """Residuals C_dot of the constraints relative to the largest speed of the motion, (n_t, n_c)."""
+        """Residuals C_dot of the constraints relative to the largest speed of the motion, (n_t, n_c).
+
+        >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
+        >>> bool(solution.velocity_violation.max() < 1e-8)
+        True
+        """
         return velocity_residual(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0))
 
     @cached_property
     def rank(self) -> np.ndarray:
-        """Number of independent constraints, (n_t,); see Module.rank."""
+        """Number of independent constraints, (n_t,); see Module.rank.
+
+        >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
+        >>> solution.rank[:2]
+        array([1, 1])
+        """
         return rank(self.module, self.t, self.x, self.params) if self._n_c else np.zeros(len(self.t), dtype=int)
 
     @cached_property
     def unique_reactions(self) -> dict[str, np.ndarray]:
         """Joint name -> whether the motion determines its reaction, (n_t,) of bool; where redundant constraints share it, it is
-        that of the multipliers of least norm."""
+        that of the multipliers of least norm.
+
+        >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
+        >>> sorted(solution.unique_reactions)
+        ['P1', 'P2']
+        """
         return unique_reactions(self)
 
     @cached_property
     def unique(self) -> np.ndarray:
-        """Which multipliers the motion determines, (n_t, n_c) of bool; see Module.unique."""
+        """Which multipliers the motion determines, (n_t, n_c) of bool; see Module.unique.
+
+        >>> solution = sd.systems.slider_crank().compile(backend="numpy").simulate((0, 0.1))
+        >>> solution.unique[0]
+        array([ True])
+        """
         return unique(self.module, self.t, self.x, self.params) if self._n_c else np.zeros((len(self.t), 0), dtype=bool)
 
     @cached_property
@@ -272,6 +385,10 @@ class Solution:
         A reaction is what the joint holds by its shape. What acts along its speeds is none: joint forces (drives, springs and
         dampers in the joint), gears (sd.Gear), and constraints by expression. What holds a coordinate that is given by an
         expression, prescribed or dependent (coordinate=2*p), is a reaction. `cut_loads` has both.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.reactions["pivot"].shape
+        (1001, 6)
         """
         return reactions(self)
 
@@ -280,6 +397,10 @@ class Solution:
 
         frame   "inertial" (the n-frame), "ground" (the n-frame, or the ground that moves), "parent", "child", or a body
         Raises ArgumentError for another joint or frame.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.reaction("pivot", frame="bob").shape
+        (1001, 6)
         """
         return in_frame(self, self.reactions, joint, frame)
 
@@ -288,7 +409,12 @@ class Solution:
         """Joint name -> all that passes through the joint to its child, as force (N) and moment (N m) about the joint's point on
         the child, n-frame, (n_t, 6): the reaction, and the joint forces (drives, springs, dampers), gears and constraints that
         act along the joint's speeds. It does not depend on how a drive or a gear is described. Loads between two bodies
-        (add_spring_damper, add_torque with reaction) pass outside of their joint."""
+        (add_spring_damper, add_torque with reaction) pass outside of their joint.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> sorted(solution.cut_loads)
+        ['pivot']
+        """
         return reactions(self, "cut_loads")
 
     def cut_load(self, joint: JointOrName, frame: BodyOrName = "inertial") -> np.ndarray:
@@ -296,6 +422,10 @@ class Solution:
 
         frame   as for `reaction`
         Raises ArgumentError for another joint or frame.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.cut_load("pivot").shape
+        (1001, 6)
         """
         return in_frame(self, self.cut_loads, joint, frame)
 
@@ -305,13 +435,22 @@ class Solution:
         `energy_balance` for the parts.
 
         Raises ArgumentError as `work` does.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.energy_error() < 1e-6
+        True
         """
         scale, _ = self.energy_scale
         return float(np.abs(self.energy_balance["error"]).max() / scale) if scale > 0 else 0.0
 
     @property
     def energy_scale(self) -> tuple[float, bool]:
-        """What errors of energy are measured by, J, see `energy_error`; and whether the mechanism rests."""
+        """What errors of energy are measured by, J, see `energy_error`; and whether the mechanism rests.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.energy_scale[0] > 0
+        True
+        """
         kinetic, potential = self.energies.T
         moving, whole = float(max(kinetic.max(), np.ptp(potential))), float(np.abs(potential).max())
         rests = moving < REST * whole
@@ -323,6 +462,11 @@ class Solution:
         """Coordinates, speeds and energy over time; returns the matplotlib figure, and saves it if a path is given.
 
         view   (elevation, azimuth) of the eye on the mechanism, degrees
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> figure = solution.plot(f"{folder}/motion.png")
         """
         from symdyn.pictures import plot
 
@@ -335,6 +479,11 @@ class Solution:
 
         view   as for `plot`, or one for each picture
         Raises ArgumentError for times outside of the motion, and if nothing can be drawn.
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> figure = solution.picture(0.1, f"{folder}/pose.png")
         """
         from symdyn.pictures import picture
 
@@ -344,7 +493,13 @@ class Solution:
 
     def animate(self, path: PathName | None = None, fps: int = 25, speed: float = 1.0,
                 view: Sequence[float] | None = None) -> FuncAnimation:
-        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`."""
+        """The moving bodies; returns the matplotlib animation, and saves it (GIF) if a path is given; view: as for `plot`.
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> film = solution.animate(f"{folder}/motion.gif", fps=5)
+        """
         from symdyn.pictures import animate
 
         return animate(self, path, fps, speed, view)
@@ -354,6 +509,12 @@ class Solution:
         was generated. It opens without a network; returns its path.
 
         Raises ArgumentError for another ending than .html, MissingExtra without matplotlib.
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> solution.report(f"{folder}/run.html").name
+        'run.html'
         """
         from symdyn.runtime.solutions.report import write_report
 
@@ -363,6 +524,12 @@ class Solution:
         """Save to .npz (arrays, names, parameters, message) or .csv (t, x, inputs, outputs and multipliers in columns).
 
         Raises ArgumentError for another ending.
+
+        >>> import tempfile
+        >>> folder = tempfile.mkdtemp()
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> solution.save(f"{folder}/run.npz").name
+        'run.npz'
         """
         path = as_path(path, "where to save the motion", "run.npz")
         if path.suffix not in (".npz", ".csv"):
@@ -408,7 +575,12 @@ class Solution:
         return self.module.metadata.sizes
 
     def rows(self, name: str) -> np.ndarray:
-        """A function of the module at every time, (n_t, ...); not a number where it cannot be evaluated."""
+        """A function of the module at every time, (n_t, ...); not a number where it cannot be evaluated.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.rows("mass_matrix").shape
+        (1001, 1, 1)
+        """
         try:
             return self._rows(name)
         except EvaluationError:
