@@ -38,6 +38,7 @@ PACKAGES = ("model", "formulation", "tape", "backend", "runtime")
 # Files of tests that start other programs, or check the text of the package, and what takes minutes.
 LEFT_OUT = ("tests/bench", "tests/checks", "tests/lecture", "tests/test_wheel.py", "tests/test_release.py", "tests/test_types.py",
             "tests/test_architecture.py", "tests/backend/test_c_tools.py", "tests/test_notebooks.py")
+QUICK = 5.0         # seconds of tests that run first, so that few files are read for most mutants
 FILE_SECONDS = 300  # processor time of one file of tests while functions are noted
 SLACK = 4.0         # times the noted seconds, and
 SPARE = 60.0        # seconds more, of processor time, before a mutant counts as one that never ends
@@ -183,12 +184,14 @@ class Tests:
                 entering.setdefault(names[number], []).append(test)
         return cls({test: line["seconds"] for test, line in last.items()}, entering)
 
-    def chosen(self, mutant: Mutant, seconds: float) -> tuple[list[str], list[str]]:
-        """The tests that enter the changed function, and the others of their files, each within these seconds in all."""
+    def chosen(self, mutant: Mutant, seconds: float) -> tuple[list[str], list[str], list[str]]:
+        """Tests that enter the changed function, a few quick ones and the rest, and the others of their files, each within these
+        seconds in all."""
         first = self._ordered(self.entering.get(mutant.function, ()), seconds)
         files = {test.split("::")[0] for test in first}
         others = [test for test in self.seconds if test.split("::")[0] in files and test not in set(first)]
-        return first, self._ordered(others, seconds)
+        quick = self._ordered(first, QUICK)
+        return quick, [test for test in first if test not in set(quick)], self._ordered(others, seconds)
 
     def _ordered(self, tests: Sequence[str], limit: float) -> list[str]:
         """File by file, the quickest first, as far as the seconds suffice; at least one test."""

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import symdyn as sd
+from symdyn.ensembles import Ensemble
+from symdyn.formulation.equations import Equations
+from symdyn.formulation.printed.augmented import AugmentedEquations
+from symdyn.formulation.printed.independent_speeds import MotionEquations
+from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.module import Module
+from symdyn.runtime.solutions.solution import Solution
+from symdyn.statics.actuation import Actuation
+from symdyn.statics.campbell import Campbell
+from symdyn.statics.equilibria import Equilibria
+from symdyn.statics.equilibrium import Equilibrium
+from symdyn.statics.linearize import Linearization
+from symdyn.statics.modes import Mode, Modes
+from symdyn.statics.regulator import Regulator
+from symdyn.statics.stability import Stability
 
 STUB = Path(sd.__file__).with_name("__init__.pyi")
 USER = """
@@ -82,3 +99,38 @@ def test_an_editor_shows_signatures_with_defaults() -> None:
     lines = text.split("\n")
     [signature] = jedi.Script(text).get_signatures(len(lines), len(lines[-1]))
     assert {"t", "q", "u", "params", "inputs", "rtol", "method", "events"} <= {p.name for p in signature.params}
+
+
+RETURNED = (Module, Solution, BatchSolution, Equations, MotionEquations, AugmentedEquations, Equilibrium, Equilibria,
+            Linearization, Modes, Mode, Stability, Campbell, Regulator, Actuation, Ensemble)
+# Where no type says it: one symbol or a tuple of them, by the text; entries of SymPy or of nested lists; a matrix, or one with
+# intermediates; a comparison or several of them, by the text; what a scalar of a derivation may be; a client of dask, mpi4py
+# or concurrent.futures.
+UNTYPED = {"coordinates", "inputs", "motions", "parameters", "speeds", "Case", "Formula", "compare", "explicit", "rate", "motion",
+           "rates", "ensemble"}
+
+
+def _signatures() -> Iterator[tuple[str, inspect.Signature]]:
+    owners = [thing for name in sd.__all__ if inspect.isclass(thing := getattr(sd, name)) and not issubclass(thing, Exception)]
+    for name in sd.__all__:
+        if inspect.isfunction(getattr(sd, name)):
+            yield name, inspect.signature(getattr(sd, name))
+    for owner in owners:
+        yield owner.__name__, inspect.signature(owner.__init__)
+    for owner in [*owners, *RETURNED]:
+        for name, thing in vars(owner).items():
+            function = thing.fget if isinstance(thing, property) else getattr(thing, "func", thing)
+            if inspect.isfunction(function) and not name.startswith("_"):
+                yield f"{owner.__name__}.{name}", inspect.signature(function)
+
+
+def test_public_signatures_have_types_and_none_of_them_is_any() -> None:
+    untyped = {}
+    for name, signature in _signatures():
+        annotations = {p.name: p.annotation for p in signature.parameters.values() if p.name not in ("self", "cls")}
+        annotations["return"] = signature.return_annotation
+        wrong = [key for key, value in annotations.items()
+                 if re.search(r"\bAny\b", str(value)) or (value is inspect.Parameter.empty and name != "System")]
+        if wrong and name.rsplit(".")[-1] not in UNTYPED and name.split(".")[0] not in UNTYPED:
+            untyped[name] = wrong
+    assert not untyped

@@ -24,21 +24,21 @@ class Axis:
 
     values     what it takes one after the other, (n,); one value: it does not vary; None: it has a distribution only
     quantile   the values of a distribution at probabilities, (n,) -> (n,)
-    told       the same as plain values, to compare one ensemble with another
+    record     the same as plain values, to compare one ensemble with another
     """
 
     values: np.ndarray | None
     quantile: Callable[[np.ndarray], np.ndarray]
-    told: Any
+    record: Any
 
     @property
     def varies(self) -> bool:
         return self.values is None or len(self.values) > 1
 
 
-def listed(values: np.ndarray, told: Any) -> Axis:
+def listed(values: np.ndarray, record: Any) -> Axis:
     """One of several values, each as probable as the others."""
-    return Axis(values, lambda p: values[np.minimum((p * len(values)).astype(int), len(values) - 1)], told)
+    return Axis(values, lambda p: values[np.minimum((p * len(values)).astype(int), len(values) - 1)], record)
 
 
 # What a distribution takes, and which values it has at probabilities.
@@ -154,7 +154,7 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
             numbers[key] = found
     if len(numbers) < len(wanted):
         return None
-    told = {"distribution": name, **numbers}
+    record = {"distribution": name, **numbers}
     if "count" in wanted:
         if numbers["count"] < 2 or numbers["count"] != int(numbers["count"]):
             faults.append(f"{where}.count: must be a whole number from 2 on, found {shown(value['count'])}")
@@ -172,4 +172,4 @@ def _from_mapping(value: Mapping[str, Any], where: str, faults: list[str]) -> Ax
     if not _fits(name, numbers):
         faults.append(f"{where}: {name} needs {DISTRIBUTIONS[name][1]}, found "
                       + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.items()))
-    return None if len(faults) > before else Axis(None, _quantile(name, numbers), told)
+    return None if len(faults) > before else Axis(None, _quantile(name, numbers), record)

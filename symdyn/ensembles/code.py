@@ -1,4 +1,4 @@
-"""What a function of the user computes, as far as it can be told: a short text that changes with its code."""
+"""What a function of the user computes, as far as it can be found out: a short text that changes with its code."""
 
 from __future__ import annotations
 

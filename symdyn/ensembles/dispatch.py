@@ -82,9 +82,9 @@ def _is_shut(error: Exception) -> bool:
 
 def _workers(executor: Any) -> int:
     """How many tasks an executor does at a time, as far as it tells."""
-    told = getattr(executor, "_max_workers", None)
-    if isinstance(told, int):
-        return max(1, told)
+    workers = getattr(executor, "_max_workers", None)
+    if isinstance(workers, int):
+        return max(1, workers)
     client = getattr(executor, "_client", None)
     if client is not None and hasattr(client, "nthreads"):  # Dask's
         return max(1, sum(client.nthreads().values()))

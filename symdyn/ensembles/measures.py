@@ -65,7 +65,7 @@ class Measure:
             return np.asarray(values[int(np.argmin(np.abs(t - self.time)))])
         return np.asarray(REDUCTIONS[self.kind](t, values))
 
-    def told(self) -> str:
+    def record(self) -> str:
         """What tells it from others."""
         function = self.function
         return f"{self.kind} {self.name}" if function is None else (

@@ -6,13 +6,13 @@ import difflib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symdyn.counting import counted
 from symdyn.ensembles.archive import reading
-from symdyn.ensembles.store import RESULT, read_failures
+from symdyn.ensembles.store import RESULT, Failure, read_failures
 from symdyn.errors import ArgumentError
 from symdyn.shown import name_of, shown
 
@@ -81,7 +81,7 @@ class Ensemble:
         with reading(self.file) as archive:
             return archive["failed"]  # type: ignore[no-any-return]
 
-    def failures(self, most: int | None = None) -> list[dict[str, Any]]:
+    def failures(self, most: int | None = None) -> list[Failure]:
         """Members that failed, each with index, values and message; the first few, or all."""
         return read_failures(self.path, most)
 

@@ -79,8 +79,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     functions   of the module that functions of a Solution call in other processes only
     rtol, atol, method, max_step, first_step, max_steps, stabilization, events, event_spacing   of `simulate`; None: as there
 
-    From 2000 samples on motions are integrated several at once on the processor's vectors, where `simulate_batch` does so.
-    A member that fails has no numbers in its row, and is told in `failures`; warnings of single motions are not given. Returns an
+    From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
+    that fails has no numbers in its row, and is listed in `failures`; warnings of single motions are not given. Returns an
     Ensemble. Raises ArgumentError for what does not fit, and where another run is at work in the folder; EnsembleStopped where an
     executor died or the disk is full: what was done is kept, if there is a path.
 
@@ -224,7 +224,7 @@ class _Run:
                 "outcomes": [m.label for m in measures], "count": self.store.count,
                 "shapes": {m.label: s for m, s in zip(measures, self.setting.shapes)},
                 "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata.units},
-                "about": {m.label: m.told() for m in measures}, "rtol": self.setting.options.get("rtol", 1e-8)}
+                "about": {m.label: m.record() for m in measures}, "rtol": self.setting.options.get("rtol", 1e-8)}
 
 
 def _tried(setting: Setting, samples: Samples) -> Setting:
@@ -257,9 +257,9 @@ def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:
     portable: PortableModule = setting.system
     functions = {m.label: fingerprint(m.function) for m in setting.measures if m.function is not None}
     return {**({"functions": functions} if functions else {}), "system": portable.module.name,
-            "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": samples.told(),
+            "code": portable.key(), "backend": portable.module.backend, "chunk": size, "samples": samples.record(),
             "t": [float(setting.times[0]), float(setting.times[-1]), len(setting.times)],
-            "outcomes": {m.label: m.told() for m in setting.measures}, "consistent": setting.consistent,
+            "outcomes": {m.label: m.record() for m in setting.measures}, "consistent": setting.consistent,
             "vectors": setting.vectors,
             "base": {k: v.tolist() for k, v in setting.base.items()},
             "options": {k: v if isinstance(v, (int, float, str)) else repr(v) for k, v in setting.options.items()}}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -115,9 +115,9 @@ class Samples:
             columns = [a.quantile(next(drawn)) if a.varies else np.full(len(k), _values(a)[0]) for a in self._axes]
         return np.column_stack(columns)
 
-    def told(self) -> dict[str, Any]:
-        """What tells these samples from others, as plain values."""
-        values = {n: a.told for n, a in zip(self.names, self._axes, strict=True)}
+    def record(self) -> dict[str, object]:
+        """Plain values that are the same for the same samples only."""
+        values = {n: a.record for n, a in zip(self.names, self._axes, strict=True)}
         return {"sampling": self.sampling, "count": self.count, "seed": self.seed, "values": {
             n: hashlib.sha256(v.tobytes()).hexdigest() if isinstance(v, np.ndarray) else v for n, v in values.items()}}
 

@@ -13,7 +13,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypedDict
 
 import numpy as np
 
@@ -154,9 +154,17 @@ def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
     write_whole(folder / MANIFEST, lambda file: file.write(text.encode()))
 
 
-def read_failures(folder: Path, most: int | None = None) -> list[dict[str, Any]]:
+class Failure(TypedDict):
+    """A member that failed: its number, its values by name, the message."""
+
+    index: int
+    values: dict[str, float]
+    message: str
+
+
+def read_failures(folder: Path, most: int | None = None) -> list[Failure]:
     """Members that failed: index, values, message."""
-    found: list[dict[str, Any]] = []
+    found: list[Failure] = []
     with (folder / FAILURES).open(encoding="utf-8") as file:
         for line in file:
             if most is not None and len(found) >= most:

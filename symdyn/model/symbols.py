@@ -61,7 +61,7 @@ class Timed(Moving):
     def free_symbols(self) -> set[sp.Basic]:
         return {self, time}
 
-    def diff(self, *symbols: Any, **assumptions: Any) -> Any:
+    def diff(self, *symbols: Any, **assumptions: bool) -> Any:
         """The derivative as of any expression; without symbols, that by time."""
         return super().diff(*(symbols or (time,)), **assumptions)
 
@@ -184,7 +184,7 @@ def _make(kind: type, names: str, assumptions: dict) -> Any:
     return made
 
 
-def coordinates(names: str, **assumptions: Any) -> Any:
+def coordinates(names: str, **assumptions: bool) -> Any:
     """Generalized coordinates from names as for sympy.symbols: `q1, q2 = coordinates("q1 q2")`.
 
     >>> x, theta = sd.coordinates("x theta")
@@ -194,7 +194,7 @@ def coordinates(names: str, **assumptions: Any) -> Any:
     return _make(Coordinate, names, assumptions)
 
 
-def speeds(names: str, **assumptions: Any) -> Any:
+def speeds(names: str, **assumptions: bool) -> Any:
     """Generalized speeds with names of their own, to be passed to joints as `speed=` or `speeds=`.
 
     >>> sd.speeds("w1:3")
@@ -203,7 +203,7 @@ def speeds(names: str, **assumptions: Any) -> Any:
     return _make(Speed, names, assumptions)
 
 
-def parameters(names: str, **assumptions: Any) -> Any:
+def parameters(names: str, **assumptions: bool) -> Any:
     """Parameters: plain SymPy symbols that get numbers when the motion is computed; declared by use.
 
     >>> m, l = sd.parameters("m l")
@@ -213,7 +213,7 @@ def parameters(names: str, **assumptions: Any) -> Any:
     return _make(sp.Symbol, names, assumptions)
 
 
-def inputs(names: str, **assumptions: Any) -> Any:
+def inputs(names: str, **assumptions: bool) -> Any:
     """Free inputs: forces, torques or anything else that is given at run time.
 
     >>> F = sd.inputs("F")
@@ -223,7 +223,7 @@ def inputs(names: str, **assumptions: Any) -> Any:
     return _make(Input, names, assumptions)
 
 
-def motions(names: str, **assumptions: Any) -> Any:
+def motions(names: str, **assumptions: bool) -> Any:
     """Coordinates that follow inputs: value, rate and acceleration are given at run time, and no equation is solved for them.
 
     names   as for sympy.symbols: `z = sd.motions("z")`

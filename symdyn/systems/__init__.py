@@ -70,7 +70,7 @@ def names(constrained: bool | None = None) -> list[str]:
     return list(_CATALOGUE if constrained is None else _CONSTRAINED if constrained else _TREES)
 
 
-def get(name: str, **options: Any) -> System:
+def get(name: str, **options: object) -> System:
     """The system of this name, with the options of its function.
 
     Raises SymdynError for a name that the catalogue does not have.
