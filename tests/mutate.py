@@ -5,9 +5,9 @@
     python tests/mutate.py --again                          # the survivors once more, after tests were added
 
 Each mutant is one changed operator, comparison, condition, constant or result in model, formulation, tape, backend or runtime. It
-stands in a copy of the working tree, where the tests that enter the changed function run, the quickest files first, until one
-fails; then the other tests of these files. A mutant that takes far more processor time than the tests need counts as killed.
-Which test enters which function is noted once, in a copy whose functions count themselves; tests that only enter it in other
+stands in a copy of the working tree, where the tests that enter the changed function run, those first that enter few others,
+until one fails; then the other tests of their files. One that takes far more processor time than the tests need counts as
+killed. Which test enters which function is noted once, in a copy whose functions count themselves; tests that only enter it in other
 processes (notebooks, commands) are not seen. `--folder` holds the notes and the results, a line of JSON for each mutant.
 """
 
@@ -38,7 +38,8 @@ PACKAGES = ("model", "formulation", "tape", "backend", "runtime")
 # Files of tests that start other programs, or check the text of the package, and what takes minutes.
 LEFT_OUT = ("tests/bench", "tests/checks", "tests/lecture", "tests/test_wheel.py", "tests/test_release.py", "tests/test_types.py",
             "tests/test_architecture.py", "tests/backend/test_c_tools.py", "tests/test_notebooks.py")
-QUICK = 5.0         # seconds of tests that run first, so that few files are read for most mutants
+QUICK_TESTS = 12    # run first, so that few files are read for most mutants, and
+QUICK = 5.0         # no more seconds of them
 FILE_SECONDS = 300  # processor time of one file of tests while functions are noted
 SLACK = 4.0         # times the noted seconds, and
 SPARE = 60.0        # seconds more, of processor time, before a mutant counts as one that never ends
@@ -167,9 +168,10 @@ def _is_head(node: ast.stmt) -> bool:
 
 @dataclass(frozen=True)
 class Tests:
-    """What is noted of the tests: the seconds of each, and the tests that enter a function."""
+    """What is noted of the tests: the seconds of each, how many functions it enters, and the tests that enter a function."""
 
     seconds: dict[str, float]
+    breadth: dict[str, int]
     entering: dict[str, list[str]]
 
     @classmethod
@@ -182,15 +184,17 @@ class Tests:
         for test, line in last.items():
             for number in line["entered"]:
                 entering.setdefault(names[number], []).append(test)
-        return cls({test: line["seconds"] for test, line in last.items()}, entering)
+        return cls({test: line["seconds"] for test, line in last.items()},
+                   {test: len(line["entered"]) for test, line in last.items()}, entering)
 
     def chosen(self, mutant: Mutant, seconds: float) -> tuple[list[str], list[str], list[str]]:
-        """Tests that enter the changed function, a few quick ones and the rest, and the others of their files, each within these
-        seconds in all."""
+        """Tests that enter the changed function, those first that enter few others; the rest of these tests; and the others of
+        their files, each within these seconds in all."""
         first = self._ordered(self.entering.get(mutant.function, ()), seconds)
         files = {test.split("::")[0] for test in first}
         others = [test for test in self.seconds if test.split("::")[0] in files and test not in set(first)]
-        quick = self._ordered(first, QUICK)
+        narrow = sorted(first, key=lambda test: self.breadth[test])[:QUICK_TESTS]
+        quick = self._ordered(narrow, QUICK)
         return quick, [test for test in first if test not in set(quick)], self._ordered(others, seconds)
 
     def _ordered(self, tests: Sequence[str], limit: float) -> list[str]:

@@ -11,8 +11,10 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.identification import base_parameters
 from symdyn.formulation.identification.regrouping import factors
 from symdyn.formulation.probes.independent import independent
+from symdyn.formulation.trees.equations import tree_of
 from symdyn.model.symbols import symbols_of
 from symdyn.spatial.vectors import vector
 from symdyn.tape import Recorder, Tape
@@ -152,6 +154,14 @@ def test_branches_are_counted_to_the_body_that_carries_them() -> None:
     found = eq.base_parameters()
     assert len(found) == 10 + 7 + 7 == sufficient(eq)
     assert found.expressions[0] == sum(sd.parameters("m0 m1 m2"))
+
+
+def test_euler_parameters_of_the_random_states_have_unit_length() -> None:
+    s = sd.System("unit")
+    for k, kind in enumerate((sd.Free, sd.Spherical)):
+        s.add_joint(kind(f"joint{k}", s.ground, general_body(s, k), orientation=sd.EulerParameters()))
+    free, ball = ([q.name for q in joint.coordinates[-4:]] for joint in s.joints)
+    assert base_parameters._unit_groups(tree_of(s.check(), "body")) == [free, ball] and len(ball) == 4
 
 
 def test_identification() -> None:

@@ -333,6 +333,16 @@ def test_contradictions_between_parameters_without_numbers(positive: bool) -> No
             s.augmented()
 
 
+def test_contradictions_for_most_numbers_of_a_parameter_are_not_for_all() -> None:
+    """The defect (a - 3) (a - 20) has one sign at 1 and at 100, another between 3 and 20."""
+    a = sd.parameters("a", positive=True)
+    s = arm()
+    s.add_constraint(q1 - a)
+    s.add_constraint(q1 - a - (a - 3) * (a - 20))
+    with pytest.warns(ModelWarning, match="constraint_2 and constraint_1 contradict each other unless"):
+        s.augmented()
+
+
 def test_out_of_reach_names_the_prescribed_joints_of_the_loop() -> None:
     s = arm(planar=True)
     beside = s.add_body("beside", mass=1, inertia=1)

@@ -248,6 +248,8 @@ def test_function_and_lambdify(sink: Any, double: Any, derived: Callable[..., An
     q, u, inputs = [0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8]
     F_tilde = sink.function("F_tilde")
     np.testing.assert_array_equal(F_tilde(q, u, {"m1": 3.0}, 0.4, inputs), sink.F_tilde(q, u, {"m1": 3.0}, 0.4, inputs))
+    np.testing.assert_array_equal(F_tilde(q, u, inputs=inputs), sink.F_tilde(q, u, None, 0.0, inputs))
+    assert not np.array_equal(sink.F_tilde(q, u, None, 0.0, inputs), sink.F_tilde(q, u, None, 1.0, inputs))
     assert F_tilde([q] * 4, [u] * 4, None, np.zeros(4)).shape == (4, 3)
     k_tilde = derived("double_pendulum").lambdify("k_tilde")
     np.testing.assert_allclose(k_tilde(X[:2], X[2:]), double.k_tilde(X[:2], X[2:]), rtol=1e-14)
