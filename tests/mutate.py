@@ -7,8 +7,8 @@
 Each mutant is one changed operator, comparison, condition, constant or result in model, formulation, tape, backend or runtime. It
 stands in a copy of the working tree, where the tests that enter the changed function run, those first that enter few others,
 until one fails; then the other tests of their files. One that takes far more processor time than the tests need counts as
-killed. Which test enters which function is noted once, in a copy whose functions count themselves; tests that only enter it in other
-processes (notebooks, commands) are not seen. `--folder` holds the notes and the results, a line of JSON for each mutant.
+killed. Which test enters which function is noted once, in a copy whose functions count themselves; tests that only enter it in
+other processes (notebooks, commands) are not seen. `--folder` holds the notes and the results, a line of JSON for each mutant.
 """
 
 from __future__ import annotations
