@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.tape.floats import function_of
+from symdyn.tape.floats import Arrays, Slopes
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape
+from symdyn.tape.walk import walk
 
 # Relative change of a statement's value that has to show in a result, by how much relative to its largest entry.
 CHANGE, SHOWS = 1e-2, 1e-11
@@ -25,20 +26,18 @@ PASSED_ON = ("leaf", "neg", "call", "item", "guard", "pi")
 HALVINGS = 60
 
 
-class _Numbers:
-    """What the table of partial derivatives asks of a recorder, on arrays."""
+class _Unguarded(Arrays):
+    """What stands behind a check counts also where the check fails; algorithms are given all points."""
 
-    @staticmethod
-    def apply(op: str, *values: Any) -> Any:
-        return function_of(op)(*values)
+    def __init__(self, values: Mapping[str, np.ndarray], n: int) -> None:
+        super().__init__(values)
+        self.n = n
 
-    @staticmethod
-    def pow(base: Any, exponent: Any) -> Any:
-        return np.power(base, exponent)
+    def step(self, node: Node, args: list[Any]) -> Any:
+        return args[0] if node.op == "guard" else super().step(node, args)
 
-    @staticmethod
-    def pi() -> float:
-        return float(np.pi)
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return super().call(node, [np.broadcast_to(a, (self.n,)) for a in args])
 
 
 class Rows:
@@ -49,10 +48,8 @@ class Rows:
 
     def __init__(self, tape: Tape, values: Mapping[str, np.ndarray], n: int) -> None:
         self.tape, self.n = tape, n
-        self.of: dict[Node, Any] = {}
         with np.errstate(all="ignore"):
-            for node in tape.steps:
-                self.of[node] = self._step(node, values)
+            self.of = walk(tape.steps, _Unguarded(values, n))
         self.checked = [node for node in tape.steps if node in tape.recorder.checks and node.op != "call"]
         self.defined = self._finite()
 
@@ -61,19 +58,7 @@ class Rows:
         return np.broadcast_to(self.number(node.args[1] if node.op == "guard" else node), (self.n,))
 
     def number(self, value: Any) -> Any:
-        return self.of[value] if isinstance(value, Node) else value if isinstance(value, bool) else float(value)
-
-    def _step(self, node: Node, values: Mapping[str, np.ndarray]) -> Any:
-        if node.op == "leaf":
-            return values[node.args[1]]
-        if node.op == "call":
-            shape = (self.n,)
-            return np.moveaxis(node.args[0].rows([np.broadcast_to(self.number(a), shape) for a in node.args[1:]]), -1, 0)
-        if node.op == "item":
-            return self.of[node.args[0]][node.args[1]]
-        if node.op == "guard":
-            return self.number(node.args[0])
-        return function_of(node.op)(*[self.number(a) for a in node.args])
+        return self.of.of(value)
 
     def _finite(self) -> np.ndarray:
         good = np.ones(self.n, dtype=bool)
@@ -132,7 +117,7 @@ class Rows:
         if rule is None:
             return
         values = tuple(self.number(a) for a in node.args)
-        for a, partial in zip(node.args, rule(_Numbers, self.of[node], values)):
+        for a, partial in zip(node.args, rule(Slopes, self.of[node], values)):
             if isinstance(a, Node):
                 passed = np.nan_to_num(np.asarray(mine * partial, dtype=float))
                 weight[a] = weight.get(a, 0.0) + passed

@@ -8,7 +8,7 @@ stand for, so that 0.1 is 3602879701896397/2^55 and not 1/10.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -23,6 +23,7 @@ from symdyn.exact.ring import BOUND, FACTORED, Ring, Value, fraction
 from symdyn.tape.node import Node, exact
 from symdyn.tape.sympy_bridge import printed_as_decimal
 from symdyn.tape.tape import reachable
+from symdyn.tape.walk import Arithmetic, walk
 
 _ARITHMETIC = ("leaf", "add", "sub", "mul", "div", "neg", "guard", "sin", "cos", "tan")
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)
@@ -94,20 +95,13 @@ class Exact:
         taken_as |= {-number: ring.neg(value) for number, value in taken_as.items()}
         self._pairs: dict[tuple[int, ...], tuple[Value, Value]] = {}
         known: dict[str, Value] = {}
-        done: dict[Node, Any] = {leaf: ring.generator(k) for k, leaf in self.leaves.items()}
-
-        def take(a: Any) -> Any:
-            if isinstance(a, Node):
-                return done[a]
-            if isinstance(a, bool):
-                return a
-            return taken_as.get(exact(a)) or ring.number(exact(a))
+        def number(a: Any) -> Any:
+            return a if isinstance(a, bool) else taken_as.get(exact(a)) or ring.number(exact(a))
 
         free_of_sign = {k for k, leaf in self.leaves.items() if leaf in positive}
         same: dict[str, list[tuple[Value, Value]]] = {}
 
-        def function(node: Node) -> Value:
-            args = done[node.args[0]] if node.op == "item" else tuple(map(take, node.args))
+        def function(node: Node, args: tuple[Any, ...]) -> Value:
             if node.op == "sqrt" and len(args[0].num):
                 result, below = root_taken_apart(ring, args[0], free_of_sign, _roots(node))
                 for inside in below:
@@ -146,23 +140,9 @@ class Exact:
                     ring.relate(k, args[0].num if atom.op == "sqrt" else ring.product(args[0].num, args[0].num))
             return known[key]
 
-        arithmetic: Mapping[str, Callable] = {"add": ring.add, "sub": ring.sub, "mul": ring.mul, "div": ring.div, "neg": ring.neg,
-                                              "guard": lambda a, _: a}
-        for node in steps:
-            if node.op == "leaf":
-                continue
-            if node.op in ("sin", "cos", "tan"):
-                sine, cosine = self._turned(node.args[0])
-                done[node] = sine if node.op == "sin" else cosine if node.op == "cos" else ring.div(sine, cosine)
-            elif node.op in arithmetic:
-                done[node] = arithmetic[node.op](*map(take, node.args))
-            elif node.op == "call":
-                done[node] = (node.args[0], *map(take, node.args[1:]))
-            elif node.op in _TRUTH:
-                done[node] = Atom(node.op, tuple(map(take, node.args)))
-            else:
-                done[node] = function(node)
-        self.values: list[Value] = [take(e) for e in entries]
+        values = walk(steps, _Polynomials(ring, number, self._turned, function),
+                      {leaf: ring.generator(k) for k, leaf in self.leaves.items()})
+        self.values: list[Value] = [values.of(e) for e in entries]
 
     def _key(self, a: Any) -> str:
         if isinstance(a, Value):
@@ -190,6 +170,37 @@ class Exact:
             si = si if sign > 0 else ring.neg(si)
             self._pairs[vector] = (ring.add(ring.mul(s, ci), ring.mul(c, si)), ring.sub(ring.mul(c, ci), ring.mul(s, si)))
         return self._pairs[vector]
+
+
+class _Polynomials(Arithmetic):
+    """Fractions of polynomials.
+
+    numbers    what a number is; turned: sine and cosine of an argument of the tape
+    function   what any other operation is, and each result of a call, from the values of its arguments
+    """
+
+    def __init__(self, ring: Ring, numbers: Callable[[Any], Any], turned: Callable[[Any], tuple[Value, Value]],
+                 function: Callable[[Node, tuple[Any, ...]], Value]) -> None:
+        self.ring, self.numbers, self.turned, self.function = ring, numbers, turned, function
+        self.functions = {"add": ring.add, "sub": ring.sub, "mul": ring.mul, "div": ring.div, "neg": ring.neg,
+                          "guard": lambda a, _: a}
+
+    def number(self, value: Any) -> Any:
+        return self.numbers(value)
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        if (arithmetic := self.functions.get(node.op)) is not None:
+            return arithmetic(*args)
+        if node.op in ("sin", "cos", "tan"):
+            sine, cosine = self.turned(node.args[0])
+            return sine if node.op == "sin" else cosine if node.op == "cos" else self.ring.div(sine, cosine)
+        return Atom(node.op, tuple(args)) if node.op in _TRUTH else self.function(node, tuple(args))
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return (node.args[0], *args)
+
+    def item(self, node: Node, results: Any) -> Any:
+        return self.function(node, results)
 
 
 def _generators(of_calls: bool, node: Node) -> int:

@@ -14,6 +14,7 @@ from symdyn.tape.evaluate import functions_of
 from symdyn.tape.external import UserFunction
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.tape import Tape
+from symdyn.tape.walk import Arithmetic, walk
 
 # These run on mpmath's own tuples, which takes half the time of its numbers.
 _ARITHMETIC = {"add": libmp.mpf_add, "sub": libmp.mpf_sub, "mul": libmp.mpf_mul}
@@ -43,8 +44,9 @@ def program(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[s
     return writer.known["program"]  # type: ignore[no-any-return]
 
 
-class _Writer:
-    """Writes the function; `known` is what its names stand for: v a node's value as a tuple of mpmath, c a number, k a kernel."""
+class _Writer(Arithmetic):
+    """Writes the function: values are names. `known` is what they stand for: v a node's value as a tuple of mpmath, c a number,
+    k an algorithm."""
 
     def __init__(self, tape: Tape, context: Any, fixed: Mapping[str, Any], free: Mapping[str, int]) -> None:
         self.tape, self.context, self.fixed, self.free = tape, context, fixed, free
@@ -55,52 +57,55 @@ class _Writer:
         angles = [{n.args[0] for n in tape.steps if n.op == op} for op in ("sin", "cos")]
         self.both = angles[0] & angles[1]
         self.written: set[Node] = set()
+        self.lines = ["def program(x):"]
 
     def text(self) -> str:
-        lines = ["def program(x):"]
-        for node in self.tape.steps:
-            if node.op == "leaf":
-                if node.args[1] in self.free:
-                    lines.append(f"    v{node.index} = x[{self.free[node.args[1]]}]._mpf_")
-                else:
-                    self.known[f"v{node.index}"] = self.context.mpf(self.fixed[node.args[1]])._mpf_
-            elif node.mask & ~PARAMETER:
-                lines += [f"    {line}" for line in self._line(node)]
-            else:  # once and for all
-                for line in self._line(node):
-                    exec(line, self.known)
-        entries = [f"make({self._name(e)})" for output in self.tape.outputs.values() for e in output.entries]
-        return "\n".join([*lines, f"    return [{', '.join(entries)}]", ""])
+        names = walk(self.tape.steps, self)
+        entries = [f"make({names.of(e)})" for output in self.tape.outputs.values() for e in output.entries]
+        return "\n".join([*self.lines, f"    return [{', '.join(entries)}]", ""])
 
-    def _line(self, node: Node) -> list[str]:
-        own, args = f"v{node.index}", node.args
-        if node in self.written:
-            return []
-        if node.op in _ARITHMETIC:
-            return [f"{own} = {node.op}({self._name(args[0])}, {self._name(args[1])}, prec, near)"]
-        if node.op == "div":
-            return [f"{own} = div({self._name(args[0])}, {self._name(args[1])})"]
-        if node.op == "neg":
-            return [f"{own} = neg({self._name(args[0])})"]
-        if node.op == "item":
-            return [f"{own} = {self._name(args[0])}[{args[1]}]"]
-        if node.op == "call":
-            self.known[f"k{node.index}"] = args[0]
-            return [f"{own} = call(k{node.index}, {', '.join(self._name(a) for a in args[1:])})"]
-        if node.op in ("sin", "cos") and args[0] in self.both:
-            pair = {n.op: n for n in self.tape.steps if n.op in ("sin", "cos") and n.args[0] is args[0]}
-            self.written |= set(pair.values())
-            return [f"v{pair['cos'].index}, v{pair['sin'].index} = cos_sin({self._name(args[0])}, prec, near)"]
-        return [f"{own} = apply({', '.join([f'f_{node.op}', *[self._name(a) for a in args]])})"]
+    def leaf(self, node: Node) -> str:
+        own = f"v{node.index}"
+        if node.args[1] in self.free:
+            self.lines.append(f"    {own} = x[{self.free[node.args[1]]}]._mpf_")
+        else:
+            self.known[own] = self.context.mpf(self.fixed[node.args[1]])._mpf_
+        return own
 
-    def _name(self, value: Any) -> str:
-        if isinstance(value, Node):
-            return f"v{value.index}"
+    def number(self, value: Any) -> str:
         if value not in self.numbers:
             self.numbers[value] = f"c{len(self.numbers)}"
             exact = self.context.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else value
             self.known[self.numbers[value]] = value if isinstance(value, bool) else self.context.mpf(exact)._mpf_
         return self.numbers[value]
+
+    def step(self, node: Node, args: list[str]) -> str:
+        own, op = f"v{node.index}", node.op
+        if node in self.written:
+            return own
+        if op in _ARITHMETIC:
+            return self._line(node, f"{own} = {op}({args[0]}, {args[1]}, prec, near)")
+        if op in ("div", "neg"):
+            return self._line(node, f"{own} = {op}({', '.join(args)})")
+        if op in ("sin", "cos") and node.args[0] in self.both:
+            pair = {n.op: n for n in self.tape.steps if n.op in ("sin", "cos") and n.args[0] is node.args[0]}
+            self.written |= set(pair.values())
+            return self._line(node, f"v{pair['cos'].index}, v{pair['sin'].index} = cos_sin({args[0]}, prec, near)")
+        return self._line(node, f"{own} = apply({', '.join([f'f_{op}', *args])})")
+
+    def call(self, node: Node, args: list[str]) -> str:
+        self.known[f"k{node.index}"] = node.args[0]
+        return self._line(node, f"v{node.index} = call(k{node.index}, {', '.join(args)})")
+
+    def item(self, node: Node, results: str) -> str:
+        return self._line(node, f"v{node.index} = {results}[{node.args[1]}]")
+
+    def _line(self, node: Node, line: str) -> str:
+        if node.mask & ~PARAMETER:
+            self.lines.append(f"    {line}")
+        else:  # once and for all
+            exec(line, self.known)
+        return f"v{node.index}"
 
     def _div(self, a: Any, b: Any) -> Any:
         return libmp.mpf_div(a, b, self.context.prec, "n") if b != libmp.fzero else libmp.fnan  # of a branch that is not taken

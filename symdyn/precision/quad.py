@@ -21,6 +21,7 @@ from symdyn.runtime.building.compiler import Compiler, find_compiler
 from symdyn.tape.external import UserFunction
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape
+from symdyn.tape.walk import Arithmetic, walk
 
 # Binary digits of a number, decimal ones that they surely hold, and decimal ones of the local errors that this is enough for.
 BITS, DIGITS, MOST = 113, 33, 28
@@ -141,45 +142,10 @@ class Compiled:
 def source(tape: Tape, context: Any, fixed: Mapping[str, Any], free: Sequence[str]) -> str:
     """The C text: int symdyn_quad(const quad *x, quad *out), which returns 1 where the tape does not hold, and the midpoint rule
     if there is an entry for every free leaf but the first."""
-    places = {name: k for k, name in enumerate(free)}
-    lines, kernels = [], set()
-
-    def text(value: Any) -> str:
-        if isinstance(value, Node):
-            return f"v{value.index}"
-        if isinstance(value, bool):
-            return str(int(value))
-        exact = context.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else context.mpf(value)
-        return literal(exact._mpf_)
-
-    for node in tape.steps:
-        op, args = node.op, node.args
-        if op == "leaf":
-            name = args[1]
-            value = f"x[{places[name]}]" if name in places else literal(context.mpf(fixed[name])._mpf_)
-        elif op == "call":
-            kernel = args[0]
-            if isinstance(kernel, UserFunction) or kernel.name not in _KERNELS:
-                raise NotInQuad(f"{kernel.name} has no text with 113 binary digits")
-            kernels.add(kernel.name)
-            sizes = "".join(f"{n}, " for n in kernel.sizes)
-            lines += [f"const quad a{node.index}[] = {{ {', '.join(map(text, args[1:]))} }};",
-                      f"quad v{node.index}[{kernel.n_out}];",
-                      f"if ({kernel.name}({sizes}a{node.index}, v{node.index})) return {_LOST};"]
-            continue
-        elif op == "item":
-            value = f"v{args[0].index}[{args[1]}]"
-        elif op == "guard":
-            lines.append(f"if (!({text(args[1])} > 0)) return {_LOST};")
-            value = text(args[0])
-        elif op in _INFIX:
-            value = f"{text(args[0])} {_INFIX[op]} {text(args[1])}"
-        elif op in _WRITTEN:
-            value = _WRITTEN[op].format(*map(text, args))
-        else:
-            value = f"{op}q({', '.join(map(text, args))})"
-        lines.append(f"const {'int' if op in _TRUTHS else 'quad'} v{node.index} = {value};")
-    entries = [text(e) for output in tape.outputs.values() for e in output.entries]
+    writer = _Writer(context, fixed, free)
+    texts = walk(tape.steps, writer)
+    lines, kernels = writer.lines, writer.kernels
+    entries = [texts.of(e) for output in tape.outputs.values() for e in output.entries]
     lines += [f"out[{k}] = {entry};" for k, entry in enumerate(entries)]
     body = "\n".join(f"    {line}" for line in [*lines, "return 0;"])
     rule = _MIDPOINT % len(entries) if len(entries) == len(free) - 1 else ""
@@ -192,6 +158,51 @@ def _kernel(name: str) -> str:
     text = text.replace("SYMDYN_LINKED ", "static ")
     text = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)", lambda m: _FINER.get(m[1], m[1]) + "Q", text)
     return re.sub(r"\b(fabs|sqrt|tanh|log1p)(?=\()", r"\1q", re.sub(r"\bdouble\b", "quad", text))
+
+
+class _Writer(Arithmetic):
+    """Lines of C; values are names and literals."""
+
+    def __init__(self, context: Any, fixed: Mapping[str, Any], free: Sequence[str]) -> None:
+        self.context, self.fixed, self.places = context, fixed, {name: k for k, name in enumerate(free)}
+        self.lines: list[str] = []
+        self.kernels: set[str] = set()
+
+    def leaf(self, node: Node) -> str:
+        name = node.args[1]
+        return self._assigned(node, f"x[{self.places[name]}]" if name in self.places else self.number(self.fixed[name]))
+
+    def number(self, value: Any) -> str:
+        if isinstance(value, bool):
+            return str(int(value))
+        exact = self.context.mpf(value.numerator) / value.denominator if isinstance(value, Fraction) else self.context.mpf(value)
+        return literal(exact._mpf_)
+
+    def step(self, node: Node, args: list[str]) -> str:
+        op = node.op
+        if op == "guard":
+            self.lines.append(f"if (!({args[1]} > 0)) return {_LOST};")
+            return self._assigned(node, args[0])
+        if op in _INFIX:
+            return self._assigned(node, f"{args[0]} {_INFIX[op]} {args[1]}")
+        return self._assigned(node, _WRITTEN[op].format(*args) if op in _WRITTEN else f"{op}q({', '.join(args)})")
+
+    def call(self, node: Node, args: list[str]) -> str:
+        kernel = node.args[0]
+        if isinstance(kernel, UserFunction) or kernel.name not in _KERNELS:
+            raise NotInQuad(f"{kernel.name} has no text with {BITS} binary digits")
+        self.kernels.add(kernel.name)
+        sizes = "".join(f"{n}, " for n in kernel.sizes)
+        self.lines += [f"const quad a{node.index}[] = {{ {', '.join(args)} }};", f"quad v{node.index}[{kernel.n_out}];",
+                       f"if ({kernel.name}({sizes}a{node.index}, v{node.index})) return {_LOST};"]
+        return f"v{node.index}"
+
+    def item(self, node: Node, results: str) -> str:
+        return self._assigned(node, f"{results}[{node.args[1]}]")
+
+    def _assigned(self, node: Node, value: str) -> str:
+        self.lines.append(f"const {'int' if node.op in _TRUTHS else 'quad'} v{node.index} = {value};")
+        return f"v{node.index}"
 
 
 def literal(value: tuple[int, int, int, int]) -> str:

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from symdyn.stress.subject import EPS
-from symdyn.tape.floats import function_of
+from symdyn.tape.floats import Arrays, Slopes
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape, reachable
+from symdyn.tape.walk import walk
 
 # Half units in the last place that sines and cosines, and other functions, are off by: of C's library and symdyn's own (the GNU C
 # library's manual, "Known Maximum Errors in Math Functions"; templates/c/runtime/sincos.h), and of NumPy's vector instructions.
@@ -56,22 +57,6 @@ class FirstOrder:
         return self.arithmetic + trig * self.trig + function * self.function  # type: ignore[no-any-return]
 
 
-class _Numbers:
-    """Where the table of operations finds functions for derivatives."""
-
-    @staticmethod
-    def apply(op: str, *args: Any) -> Any:
-        return function_of(op)(*args)
-
-    @staticmethod
-    def pow(base: Any, exponent: Any) -> Any:
-        return np.power(base, exponent)
-
-    @staticmethod
-    def pi() -> float:
-        return np.pi
-
-
 def first_order(tape: Tape, values: Mapping[str, Any], n: int) -> FirstOrder:
     """Of all entries of a tape's outputs at n states; infinite for those that need an algorithm that is not written out.
 
@@ -84,22 +69,12 @@ def first_order(tape: Tape, values: Mapping[str, Any], n: int) -> FirstOrder:
 class _Pass:
     def __init__(self, tape: Tape, values: Mapping[str, Any], n: int) -> None:
         self.tape, self.n = tape, n
-        self.value: dict[Node, Any] = {}
-        for node in tape.steps:
-            self.value[node] = self._evaluated(node, values)
+        self.value = walk(tape.steps, Arrays(values))
         self.partials: dict[Node, tuple] = {}
         self.used: dict[Node, np.ndarray] = {}
 
-    def _evaluated(self, node: Node, values: Mapping[str, Any]) -> Any:
-        if node.op == "leaf":
-            return np.asarray(values[node.args[1]], dtype=float)
-        if node.op == "call":
-            return np.moveaxis(node.args[0].rows([self.number(a) for a in node.args[1:]]), -1, 0)
-        return self.value[node.args[0]][node.args[1]] if node.op == "item" else function_of(node.op)(
-            *[self.number(a) for a in node.args])
-
     def number(self, value: Any) -> Any:
-        return self.value[value] if isinstance(value, Node) else value if isinstance(value, bool) else float(value)
+        return self.value.of(value)
 
     def found(self) -> FirstOrder:
         entries = [e for output in self.tape.outputs.values() for e in output.entries]
@@ -167,7 +142,7 @@ class _Pass:
         if node not in self.partials:
             rule = OPERATIONS[node.op].partials
             assert rule is not None
-            slopes = rule(_Numbers, self.value[node], tuple(self.number(a) for a in node.args))
+            slopes = rule(Slopes, self.value[node], tuple(self.number(a) for a in node.args))
             self.partials[node] = tuple(s if isinstance(s, int) else np.asarray(s, dtype=float) for s in slopes)
         return self.partials[node]
 

@@ -14,9 +14,10 @@ from symdyn.stress.subject import Subject
 from symdyn.tape.balance import balance
 from symdyn.tape.kernels import CLEANINGS, MASSLESS, ROUNDS, SMOOTHED, Kernel, Multipliers, Saddle
 from symdyn.tape.node import Node, is_zero
-from symdyn.tape.passes import rebuild
+from symdyn.tape.passes import Again
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, unsigned
+from symdyn.tape.walk import walk
 
 
 @dataclass(frozen=True)
@@ -51,23 +52,24 @@ def written_out(tape: Tape) -> Statements:
     """The tape with the algorithms Saddle and Multipliers as statements, in the order of the C backend; others stay calls."""
     if not any(node.op == "call" and type(node.args[0]) in _WRITERS for node in tape.steps):
         return Statements(tape, False)
-    recorder, new = Recorder(), dict[Node, Any]()
-
-    def of(value: Any) -> Any:
-        return new[value] if isinstance(value, Node) else value
-
-    for node in tape.steps:
-        args = tuple(of(a) for a in node.args)
-        if node.op == "leaf":
-            new[node] = recorder.leaf(node.args[1], node.args[0])
-        elif node.op == "call" and type(node.args[0]) in _WRITERS:
-            new[node] = _WRITERS[type(node.args[0])](recorder, node.args[0], args[1:])
-        else:
-            new[node] = rebuild(recorder, node.op, args)
-            if node in tape.recorder.checks:
-                recorder.positive(unsigned(new[node]), tape.recorder.checks[node])
-    outputs = {name: Output(name, o.shape, tuple(of(e) for e in o.entries)) for name, o in tape.outputs.items()}
+    recorder = Recorder()
+    new = walk(tape.steps, _WrittenOut(recorder))
+    outputs = {name: Output(name, o.shape, tuple(new.of(e) for e in o.entries)) for name, o in tape.outputs.items()}
     return Statements(Tape(recorder, outputs), True)
+
+
+class _WrittenOut(Again):
+    """With the checks of the tape, and statements in place of algorithms."""
+
+    def again(self, node: Node, args: tuple[Any, ...]) -> Any:
+        value, checks = super().again(node, args), node.recorder.checks
+        if node in checks:
+            self.recorder.positive(unsigned(value), checks[node])
+        return value
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        writer = _WRITERS.get(type(node.args[0]))
+        return super().call(node, args) if writer is None else writer(self.recorder, node.args[0], args)
 
 
 def _saddle(r: Recorder, kernel: Kernel, values: Sequence[Any]) -> list[Any]:

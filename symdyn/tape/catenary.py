@@ -28,9 +28,10 @@ import numpy as np
 from symdyn.tape.differentiate import forward
 from symdyn.tape.kernels import Kernel
 from symdyn.tape.node import STATE, Node, is_zero
-from symdyn.tape.passes import rebuild
+from symdyn.tape.passes import Again
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
+from symdyn.tape.walk import walk
 
 # A line that hangs freely has no horizontal force if its ends are as near to one vertical as this part of its length.
 NEAREST = 1e-9
@@ -69,9 +70,7 @@ class Catenary(Kernel):
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         leaves, steps, entries = _linearized(bool(self.sizes[0]), not is_zero(values[3]) or not is_zero(changes[3]))
-        new: dict[Node, Any] = dict(zip(leaves, [*results, *values, *changes], strict=True))
-        for node in steps:
-            new[node] = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
+        new = walk(steps, Again(recorder), dict(zip(leaves, [*results, *values, *changes], strict=True)))
         return [new[e] for e in entries]
 
 

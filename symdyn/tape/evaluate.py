@@ -15,6 +15,7 @@ from symdyn.errors import UnsupportedExpression
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape, reachable
+from symdyn.tape.walk import Arithmetic, walk
 
 
 def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30,
@@ -28,35 +29,11 @@ def evaluate(tape: Tape, values: Mapping[str, Any], digits: int = 30,
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
     if missing:
         raise KeyError(f"no value for {', '.join(missing)}")
-    context, functions = _arithmetic(digits)
-    done: dict[Node, Any] = {}
-
-    def number(value: Any) -> Any:
-        if isinstance(value, Node):
-            return done[value]
-        if isinstance(value, bool):
-            return value
-        if not isinstance(value, Fraction):
-            return context.mpf(value)
-        taken = value if constants is None else constants(value)
-        return context.mpf(taken.numerator) / taken.denominator
-
-    for node in tape.steps:
-        if node.op == "leaf":
-            done[node] = context.mpf(values[node.args[1]])
-        elif node.op == "call":
-            done[node] = node.args[0].precise(context, [number(a) for a in node.args[1:]])
-        elif node.op == "item":
-            done[node] = done[node.args[0]][node.args[1]]
-        else:
-            try:
-                done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else number(a) for a in node.args])
-            except ZeroDivisionError:  # harmless in a branch that is not taken
-                done[node] = context.nan
+    done = walk(tape.steps, _AtLeaves(digits, values, constants))
     result = {}
     for name, output in tape.outputs.items():
         array = np.empty(len(output.entries), dtype=object)
-        array[:] = [number(e) for e in output.entries]
+        array[:] = [done.of(e) for e in output.entries]
         result[name] = array.reshape(output.shape)
     return result
 
@@ -78,15 +55,49 @@ def constant(value: Any) -> float:
     """
     if not isinstance(value, Node):
         return double(value)
-    context, functions = _arithmetic(40)
-    done: dict[Node, Any] = {}
-    for node in reachable([value]):
-        done[node] = functions[node.op](*[done[a] if isinstance(a, Node) else context.mpf(Fraction(a).numerator)
-                                          / Fraction(a).denominator for a in node.args])
-    if isinstance(done[value], context.mpc):
-        raise UnsupportedExpression(f"a constant of the equations is the complex number {context.nstr(done[value], 6)}; "
+    digits = Digits(40)
+    found = walk(reachable([value]), digits)[value]
+    if isinstance(found, digits.context.mpc):
+        raise UnsupportedExpression(f"a constant of the equations is the complex number {digits.context.nstr(found, 6)}; "
                                     "look for the root, logarithm or arc function of a number outside its range")
-    return float(done[value])
+    return float(found)
+
+
+class Digits(Arithmetic):
+    """Numbers of mpmath with so many decimal digits."""
+
+    def __init__(self, digits: int) -> None:
+        self.context, self.functions = _arithmetic(digits)
+
+    def number(self, value: Any) -> Any:
+        if isinstance(value, bool):
+            return value
+        if isinstance(value, Fraction):
+            return self.context.mpf(value.numerator) / value.denominator
+        return self.context.mpf(value)
+
+
+class _AtLeaves(Digits):
+    """With numbers for the leaves, by name, and others in place of constants; what is not defined is NaN."""
+
+    def __init__(self, digits: int, values: Mapping[str, Any], constants: Callable[[Fraction], Fraction] | None) -> None:
+        super().__init__(digits)
+        self.values, self.constants = values, constants
+
+    def leaf(self, node: Node) -> Any:
+        return self.context.mpf(self.values[node.args[1]])
+
+    def number(self, value: Any) -> Any:
+        return super().number(self.constants(value) if self.constants is not None and isinstance(value, Fraction) else value)
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        try:
+            return self.functions[node.op](*args)
+        except ZeroDivisionError:  # harmless in a branch that is not taken
+            return self.context.nan
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return node.args[0].precise(self.context, args)
 
 
 @functools.cache

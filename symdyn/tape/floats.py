@@ -10,6 +10,7 @@ import numpy as np
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import Tape
+from symdyn.tape.walk import Arithmetic, walk
 
 
 def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np.ndarray]:
@@ -21,38 +22,58 @@ def evaluate_rows(tape: Tape, values: Mapping[str, Any], n: int) -> dict[str, np
     missing = [leaf.args[1] for leaf in tape.inputs if leaf.args[1] not in values]
     if missing:
         raise KeyError(f"no value for {', '.join(missing)}")
-    done: dict[Node, Any] = {}
-
-    def number(value: Any) -> Any:
-        return done[value] if isinstance(value, Node) else value if isinstance(value, bool) else float(value)
-
     with np.errstate(all="ignore"):
-        for node in tape.steps:
-            if node.op == "leaf":
-                done[node] = np.asarray(values[node.args[1]], dtype=float)
-            elif node.op == "call":
-                done[node] = np.moveaxis(node.args[0].rows([number(a) for a in node.args[1:]]), -1, 0)
-            elif node.op == "item":
-                done[node] = done[node.args[0]][node.args[1]]
-            else:
-                done[node] = function_of(node.op)(*[number(a) for a in node.args])
+        done = walk(tape.steps, Arrays(values))
     result = {}
     for name, output in tape.outputs.items():
         flat = np.empty((n, len(output.entries)))
         for k, e in enumerate(output.entries):
-            flat[:, k] = number(e)
+            flat[:, k] = done.of(e)
         result[name] = flat.reshape((n, *output.shape))
     return result
 
 
-def function_of(op: str) -> Callable[..., Any]:
-    """What computes an operation with NumPy's arrays."""
-    if op == "guard":
-        return lambda value, margin: np.where(margin > 0, value, np.nan)
-    if op == "pi":
-        return lambda: np.pi
-    if op == "erf":
-        from scipy.special import erf
+class Slopes:
+    """What the table of operations asks of a recorder for derivatives, on arrays."""
 
-        return erf  # type: ignore[no-any-return]
-    return getattr(np, OPERATIONS[op].numpy)  # type: ignore[no-any-return]
+    @staticmethod
+    def apply(op: str, *args: Any) -> Any:
+        return FUNCTIONS[op](*args)
+
+    @staticmethod
+    def pow(base: Any, exponent: Any) -> Any:
+        return np.power(base, exponent)
+
+    @staticmethod
+    def pi() -> float:
+        return np.pi
+
+
+def _erf(x: Any) -> Any:
+    from scipy.special import erf
+
+    return erf(x)
+
+
+# Operation -> what computes it with NumPy's arrays.
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{op: getattr(np, row.numpy) for op, row in OPERATIONS.items() if row.numpy and op not in ("pi", "erf")},
+    "guard": lambda value, margin: np.where(margin > 0, value, np.nan), "pi": lambda: np.pi, "erf": _erf}
+
+
+class Arrays(Arithmetic):
+    """Numbers and arrays (n,) of them, for values of the leaves by name."""
+
+    functions = FUNCTIONS
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self.values = values
+
+    def leaf(self, node: Node) -> Any:
+        return np.asarray(self.values[node.args[1]], dtype=float)
+
+    def number(self, value: Any) -> Any:
+        return value if isinstance(value, bool) else float(value)
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return np.moveaxis(node.args[0].rows(args), -1, 0)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from symdyn.tape.node import PARAMETER, Node, is_zero
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
+from symdyn.tape.walk import Arithmetic, walk
 
 # Stands for unbounded, so that products of several do not overflow; the largest argument of exp below it.
 BIG, LARGEST_EXPONENT = 10**60, 138
@@ -68,33 +69,29 @@ def enclosures(recorder: Recorder, entries: Sequence[Any], leaves: Mapping[Node,
     leaves    jets of what moves
     rounded   whether values are to hold what doubles give as well, with the rounding of their operations
     """
-    arithmetic = _Arithmetic(recorder)
-    found: dict[Node, Any] = {}
-
-    def of(value: Any) -> Any:
-        return found[value] if isinstance(value, Node) else value if isinstance(value, bool) else _still(value)
-
-    for node in reachable(entries):
-        if node in leaves:
-            found[node] = leaves[node]
-        elif not node.mask & ~PARAMETER:
-            found[node] = _still(node)
-        else:
-            found[node] = made = arithmetic.step(node, [of(a) for a in node.args])
-            if rounded and node.op not in _EXACT:
-                found[node] = made._replace(value=arithmetic.widened(made.value))
-    return [of(entry) for entry in entries]
+    steps = reachable(entries)
+    known = {node: leaves[node] if node in leaves else _still(node) for node in steps
+             if node in leaves or not node.mask & ~PARAMETER}
+    found = walk(steps, _Intervals(recorder, rounded), known)
+    return [found.of(entry) for entry in entries]
 
 
 def _still(value: Any) -> Jet:
     return Jet(Interval(value, value), ZERO, ZERO)
 
 
-class _Arithmetic:
-    """Operations on intervals and jets, recorded."""
+class _Intervals(Arithmetic):
+    """Operations on intervals and jets, recorded; rounded: whether values are widened by their rounding."""
 
-    def __init__(self, recorder: Recorder) -> None:
-        self.r = recorder
+    def __init__(self, recorder: Recorder, rounded: bool) -> None:
+        self.r, self.rounded = recorder, rounded
+
+    def number(self, value: Any) -> Any:
+        return value if isinstance(value, bool) else _still(value)
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        made = self.jet(node.op, args)
+        return made._replace(value=self.widened(made.value)) if self.rounded and node.op not in _EXACT else made
 
     # -- numbers
 
@@ -193,8 +190,8 @@ class _Arithmetic:
 
     # -- jets
 
-    def step(self, node: Node, args: list[Any]) -> Any:
-        op = node.op
+    def jet(self, op: str, args: list[Any]) -> Any:
+        """The result of an operation on jets and truths."""
         if op in ("add", "sub"):
             act = self.add if op == "add" else self.sub
             return Jet(*[act(a, b) for a, b in zip(*args, strict=True)])

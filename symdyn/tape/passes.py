@@ -9,6 +9,7 @@ from symdyn.errors import EvaluationError
 from symdyn.tape.node import PARAMETER, Node
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, Tape, reachable, unsigned
+from symdyn.tape.walk import Arithmetic, walk
 
 _ARITHMETIC = {"add", "sub", "mul", "div", "neg", "pow"}
 
@@ -27,31 +28,58 @@ def rebuild(recorder: Recorder, op: str, args: tuple) -> Any:
     return recorder.apply(op, *args)
 
 
+class Again(Arithmetic):
+    """Nodes and numbers of another tape: every step is recorded there again, with folding."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+
+    def leaf(self, node: Node) -> Any:
+        return self.recorder.leaf(node.args[1], node.args[0])
+
+    def number(self, value: Any) -> Any:
+        return value
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        return self.again(node, tuple(args))
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        return self.again(node, (node.args[0], *args))
+
+    def item(self, node: Node, results: Any) -> Any:
+        return self.again(node, (results, node.args[1]))
+
+    def again(self, node: Node, args: tuple[Any, ...]) -> Any:
+        """A step with these arguments."""
+        return rebuild(self.recorder, node.op, args)
+
+
+class _WithNames(Again):
+    """Under their names and sections, with their checks."""
+
+    def again(self, node: Node, args: tuple[Any, ...]) -> Any:
+        recorder, checks = self.recorder, node.recorder.checks
+        with recorder.section(node.section):
+            try:
+                value = rebuild(recorder, node.op, args)
+            except ZeroDivisionError:
+                demanded = node if node.op == "call" else unsigned(node.args[-1])
+                reason = checks.get(demanded, "an expression divides by zero")
+                raise EvaluationError(f"with the numbers that are bound: {reason}") from None
+        if isinstance(value, Node):
+            if node in node.recorder.names:
+                recorder.name(node.recorder.names[node], value)
+            if node in checks and node.op == "guard":
+                recorder.positive(unsigned(value), checks[node])
+            elif node in checks:
+                return recorder.positive(value, checks[node])
+        return value
+
+
 def substitute(entries: tuple, replacements: Mapping[Node, Any], recorder: Recorder) -> tuple:
     """The entries with nodes replaced, everything above them recorded again under its old name and section."""
-    new: dict[Node, Any] = {}
-    for node in reachable(entries):
-        if node in replacements:
-            new[node] = replacements[node]
-        elif node.op == "leaf":
-            new[node] = recorder.leaf(node.args[1], node.args[0])
-        else:
-            with recorder.section(node.section):
-                try:
-                    value = rebuild(recorder, node.op, tuple(new[a] if isinstance(a, Node) else a for a in node.args))
-                except ZeroDivisionError:
-                    demanded = node if node.op == "call" else unsigned(node.args[-1])
-                    reason = node.recorder.checks.get(demanded, "an expression divides by zero")
-                    raise EvaluationError(f"with the numbers that are bound: {reason}") from None
-            new[node] = value
-            if isinstance(value, Node):
-                if node in node.recorder.names:
-                    recorder.name(node.recorder.names[node], value)
-                if node in node.recorder.checks and node.op == "guard":
-                    recorder.positive(unsigned(value), node.recorder.checks[node])
-                elif node in node.recorder.checks:
-                    new[node] = recorder.positive(value, node.recorder.checks[node])
-    return tuple(new[e] if isinstance(e, Node) else e for e in entries)
+    new = walk(reachable(entries), _WithNames(recorder), replacements)
+    return tuple(new.of(e) for e in entries)
 
 
 def specialize(tape: Tape, values: Mapping[str, Any]) -> Tape:

@@ -15,6 +15,7 @@ from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Output, reachable
+from symdyn.tape.walk import Arithmetic, walk
 
 _FUNCTIONS: dict[type, str] = {getattr(sp, row.sympy): op for op, row in OPERATIONS.items()
                                if op not in ("add", "sub", "mul", "div", "neg", "pow", "sqrt", "pi", "select",
@@ -136,33 +137,37 @@ def expand(output: Output, symbols: Mapping[Node, sp.Expr], named: Mapping[Node,
     symbols   leaf -> the user's symbol; leaves without one, such as the directions of derivatives, keep their names
     named     nodes to leave as they are, under these symbols
     """
-    done: dict[Node, Any] = dict(named or {})
-    for node in reachable(output.entries):
-        if node in done:
-            continue
-        if node.op == "leaf":
-            done[node] = symbols[node] if node in symbols else sp.Symbol(node.args[1])
-        elif node.op == "call" and isinstance(node.args[0], UserFunction):
-            function, *arguments = node.args
-            done[node] = function.applied([done[a] if isinstance(a, Node) else number(a) for a in arguments])
-        elif node.op == "call" and node.args[0].letters:
-            kernel, *arguments = node.args
-            given = [done[a] if isinstance(a, Node) else number(a) for a in arguments]
-            done[node] = [sp.Function(letter)(*given) for letter in kernel.letters]
-        elif node.op == "item":
-            done[node] = done[node.args[0]][node.args[1]]
-        elif node.op == "call":
-            raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
-                                        "the right side instead")
-        elif node.op == "guard":
-            done[node] = done[node.args[0]] if isinstance(node.args[0], Node) else number(node.args[0])
-        else:
-            done[node] = applied(node.op, [done[a] if isinstance(a, Node) else number(a) for a in node.args])
-    entries = [done[e] if isinstance(e, Node) else number(e) for e in output.entries]
+    done = walk(reachable(output.entries), _Explicit(symbols), named or {})
+    entries = [done.of(e) for e in output.entries]
     if output.shape == ():
         return entries[0]
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
     return sp.Matrix(rows, columns, entries)
+
+
+class _Explicit(Arithmetic):
+    """Expressions of SymPy."""
+
+    def __init__(self, symbols: Mapping[Node, sp.Expr]) -> None:
+        self.symbols = symbols
+
+    def leaf(self, node: Node) -> Any:
+        return self.symbols[node] if node in self.symbols else sp.Symbol(node.args[1])
+
+    def number(self, value: Any) -> Any:
+        return number(value)
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        return args[0] if node.op == "guard" else applied(node.op, args)
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        kernel = node.args[0]
+        if isinstance(kernel, UserFunction):
+            return kernel.applied(args)
+        if not kernel.letters:
+            raise UnsupportedExpression("it is computed by a numeric algorithm, without an explicit form; print the matrix and "
+                                        "the right side instead")
+        return [sp.Function(letter)(*args) for letter in kernel.letters]
 
 
 # Powers of two that floats reach, above and below one, and some less.

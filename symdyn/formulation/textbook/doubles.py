@@ -10,6 +10,7 @@ from typing import Any
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS
 from symdyn.tape.tape import reachable
+from symdyn.tape.walk import Arithmetic, walk
 
 _OWN: dict[str, Callable[..., Any]] = {
     "add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg,
@@ -22,40 +23,41 @@ _FUNCTIONS = {op: _OWN[op] if op in _OWN else getattr(math, row.mpmath) for op, 
               if op in _OWN or row.mpmath}
 
 
-class Doubles:
-    """Evaluates nodes; the order of the steps is found once."""
+class Doubles(Arithmetic):
+    """Evaluates nodes; the order of the steps is found once. What the walk gives a step is its index in the list of values."""
+
+    functions = _FUNCTIONS
 
     def __init__(self, nodes: Sequence[Node]) -> None:
         self._leaves: list[tuple[int, str]] = []
         self._steps: list[tuple[int, Callable[..., Any], list[int]]] = []
         self._start: list[Any] = []
-        place: dict[Any, int] = {}
-        for node in reachable(nodes):
-            arguments = []
-            for a in node.args if node.op != "leaf" else ():
-                if isinstance(a, Node):
-                    arguments.append(place[a])
-                else:
-                    arguments.append(len(self._start))
-                    self._start.append(a if isinstance(a, bool) else float(a))
-            place[node] = len(self._start)
-            self._start.append(math.nan)
-            if node.op == "leaf":
-                self._leaves.append((place[node], node.args[1]))
-            else:
-                self._steps.append((place[node], _FUNCTIONS[node.op], arguments))
-        self._results = [place[node] for node in nodes]
+        self._results = list(map(walk(reachable(nodes), self).__getitem__, nodes))
+
+    def leaf(self, node: Node) -> int:
+        index = self.number(math.nan)
+        self._leaves.append((index, node.args[1]))
+        return index
+
+    def number(self, value: Any) -> int:
+        self._start.append(value if isinstance(value, bool) else float(value))
+        return len(self._start) - 1
+
+    def step(self, node: Node, args: list[int]) -> int:
+        index = self.number(math.nan)
+        self._steps.append((index, self.functions[node.op], args))
+        return index
 
     def at(self, values: Mapping[str, Any]) -> list[Any]:
         """The values of the nodes, for values of the leaves by name; NaN where an operation has no real result."""
         done = list(self._start)
-        for place, name in self._leaves:
-            done[place] = float(values[name])
-        for place, function, arguments in self._steps:
+        for index, name in self._leaves:
+            done[index] = float(values[name])
+        for index, function, arguments in self._steps:
             try:
-                done[place] = function(*[done[k] for k in arguments])
+                done[index] = function(*[done[k] for k in arguments])
             except (ValueError, ZeroDivisionError):  # harmless in a branch that is not taken
-                done[place] = math.nan
+                done[index] = math.nan
             except OverflowError:
-                done[place] = math.inf
+                done[index] = math.inf
         return [done[k] for k in self._results]

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 import operator
 from collections.abc import Callable, Mapping
-from fractions import Fraction
 from typing import Any
 
-import mpmath
 import numpy as np
 
 from symdyn.bench.work.against.peer import Unfit
 from symdyn.functions.tapes import function_tape
-from symdyn.tape.evaluate import functions_of
+from symdyn.tape.evaluate import Digits
 from symdyn.tape.node import Node
 from symdyn.tape.tape import reachable
+from symdyn.tape.walk import walk as tape_walk
 
 # What other programs call as the tape does.
 ELEMENTARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
@@ -48,49 +46,43 @@ def constant_inputs(equations: Any) -> dict[str, float]:
 def walk(entries: tuple[Any, ...], values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]],
          program: str) -> list[Any]:
     """The entries; what depends on numbers alone is a number, rounded once. A guard is the value that it guards."""
-    context, arithmetic = _precise()
-    done: dict[Node, Any] = {}
-
-    def known(value: Any) -> Any:
-        if isinstance(value, Node):
-            return done[value]
-        if isinstance(value, Fraction):
-            return context.mpf(value.numerator) / value.denominator
-        return value if isinstance(value, bool) else context.mpf(value)
-
-    is_number = lambda value: isinstance(value, (context.mpf, bool))
-    rounded = lambda value: float(value) if isinstance(value, context.mpf) else value
-    for node in reachable(entries):
-        args = [known(a) for a in node.args] if node.op not in ("leaf", "call", "item") else []
-        if node.op == "leaf":
-            value = values[node.args[1]]
-            done[node] = context.mpf(value) if isinstance(value, float) else value
-        elif node.op in ("call", "item"):
-            raise Unfit("its accelerations come from a numeric algorithm, not from a formula")
-        elif node.op == "guard":
-            done[node] = args[0]
-        elif all(map(is_number, args)):
-            done[node] = _number(context, arithmetic[node.op], args)
-        elif node.op == "select" and isinstance(args[0], bool):
-            done[node] = args[1] if args[0] else args[2]
-        elif node.op in functions:
-            done[node] = functions[node.op](*map(rounded, args))
-        else:
-            raise Unfit(f"{program} has no {node.op}")
-    return [rounded(known(entry)) for entry in entries]
+    arithmetic = _Peer(values, functions, program)
+    done = tape_walk(reachable(entries), arithmetic)
+    return [arithmetic.rounded(done.of(entry)) for entry in entries]
 
 
-@functools.cache
-def _precise() -> tuple[Any, Mapping[str, Callable[..., Any]]]:
-    """A context of mpmath, and its functions."""
-    context = mpmath.mp.clone()
-    context.dps = 30
-    return context, functions_of(context)
+class _Peer(Digits):
+    """Numbers, with 30 digits, where all arguments are numbers; else the program's expressions."""
 
+    def __init__(self, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]], program: str) -> None:
+        super().__init__(30)
+        self.values, self.theirs, self.program = values, functions, program
 
-def _number(context: Any, function: Callable[..., Any], args: list[Any]) -> Any:
-    try:
-        value = function(*args)
-    except ZeroDivisionError:  # harmless in a branch that is not taken
-        value = context.nan
-    return value if isinstance(value, bool) else context.mpf(value)
+    def leaf(self, node: Node) -> Any:
+        value = self.values[node.args[1]]
+        return self.context.mpf(value) if isinstance(value, float) else value
+
+    def step(self, node: Node, args: list[Any]) -> Any:
+        if node.op == "guard":
+            return args[0]
+        if all(isinstance(a, (self.context.mpf, bool)) for a in args):
+            return self._number(node.op, args)
+        if node.op == "select" and isinstance(args[0], bool):
+            return args[1] if args[0] else args[2]
+        if node.op not in self.theirs:
+            raise Unfit(f"{self.program} has no {node.op}")
+        return self.theirs[node.op](*map(self.rounded, args))
+
+    def call(self, node: Node, args: list[Any]) -> Any:
+        raise Unfit("its accelerations come from a numeric algorithm, not from a formula")
+
+    def rounded(self, value: Any) -> Any:
+        """A number as a double."""
+        return float(value) if isinstance(value, self.context.mpf) else value
+
+    def _number(self, op: str, args: list[Any]) -> Any:
+        try:
+            value = self.functions[op](*args)
+        except ZeroDivisionError:  # harmless in a branch that is not taken
+            return self.context.nan
+        return value if isinstance(value, bool) else self.context.mpf(value)
