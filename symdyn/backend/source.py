@@ -35,6 +35,7 @@ from symdyn.backend.user_functions import texts as texts_of_user_functions
 from symdyn.errors import SymdynError
 from symdyn.folders import templates_folder
 from symdyn.shown import shown
+from symdyn.tape.algorithms import text_of
 from symdyn.tape.kernels import CLEANINGS, LOOSE, MASSLESS, ROUNDS, SMOOTHED
 from symdyn.tape.tape import Output, Tape
 from symdyn.turning import is_angle, turns
@@ -46,6 +47,8 @@ _C_TYPE = {"t": "double t", "q": "const double *q", "u": "const double *u", "z":
 CORRECTIONS = ("position_correction", "velocity_correction", "length")
 VIOLATION = "violation"
 EVENTS = "events"
+# The file of symdyn/tape/algorithms that an algorithm is in.
+_TEXTS = {"symdyn_saddle": "saddle", "symdyn_multipliers": "saddle", "symdyn_cube": "cube", "symdyn_catenary": "catenary"}
 _SYMBOLS = {"q": "coordinates q", "u": "speeds u", "z": "extra states z", "inputs": "inputs", "p": "parameters p"}
 
 
@@ -296,7 +299,7 @@ def _context(content: Content, program: Program, dialect: Dialect, standalone: b
         "uses": lambda g: g in uses.get("rhs", ()), "uses_sign": "symdyn_sign(" in text,
         "uses_sincos": "symdyn_sincos(" in text, "kernels": program.kernels, "user_texts": user_texts,
         "smoothed": SMOOTHED, "massless": MASSLESS, "loose": LOOSE, "rounds": ROUNDS, "cleanings": CLEANINGS,
-        "solver_sizes": _solver_sizes(program),
+        "solver_sizes": _solver_sizes(program), "algorithms": _algorithms(program),
         "uses_t": any("t" in a for a in uses.values()), "used_groups": {g for a in uses.values() for g in a},
         "field_call": field_call, "arguments_of": uses, "projection": projection,
         "unit_groups": [[list(groups["q"]).index(n) for n in group] for group in content.unit_groups],
@@ -336,6 +339,11 @@ def _solver_sizes(program: Program) -> list[tuple[str, str]]:
                        f"SYMDYN_{kernel.upper()}_ONE_SIZE": repr(int(one_size)),
                        **{f"SYMDYN_{key}": repr(value) for key, value in numbers.items()}}
     return list(result.items())
+
+
+def _algorithms(program: Program) -> list[str]:
+    """The texts in Python that numeric algorithms share with the package."""
+    return [text_of(name) for name in dict.fromkeys(name for kernel in program.kernels for name in ("states", _TEXTS[kernel]))]
 
 
 def _shape_text(f: Function) -> str:

@@ -25,6 +25,8 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.tape.algorithms.catenary import SYMDYN_NEAREST, symdyn_line_force
+from symdyn.tape.algorithms.states import symdyn_each
 from symdyn.tape.differentiate import forward
 from symdyn.tape.kernels import Kernel
 from symdyn.tape.node import STATE, Node, is_zero
@@ -33,9 +35,9 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import reachable
 from symdyn.tape.walk import walk
 
-# A line that hangs freely has no horizontal force if its ends are as near to one vertical as this part of its length.
-NEAREST = 1e-9
-STEPS = 100
+# Of doubles: some of their rounding, and a relative change below which the next step of Newton's method is exact.
+TINY, CLOSE = 9e-16, 1e-8
+NEAREST = SYMDYN_NEAREST
 # Friction below this is none, so that nothing is divided by zero.
 SMOOTH = Fraction(1, 10**12)
 
@@ -62,11 +64,12 @@ class Catenary(Kernel):
         return 5 * 70
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        stacked = np.stack(np.broadcast_arrays(*[np.asarray(v, dtype=float) for v in values]), axis=-1)
-        return np.apply_along_axis(lambda row: _solved(math, np.finfo(float).eps, self.sizes[0], *map(float, row)), -1, stacked)
+        found, _ = symdyn_each(lambda line: symdyn_line_force(math, self.sizes[0], line, TINY, CLOSE), 2, values)
+        return np.moveaxis(np.array(found), 0, -1)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        return list(_solved(context, context.eps, self.sizes[0], *values))
+        found = symdyn_line_force(context, self.sizes[0], values, 4 * context.eps, context.sqrt(context.eps))
+        return [context.nan] * 2 if found is None else list(found)
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         leaves, steps, entries = _linearized(bool(self.sizes[0]), not is_zero(values[3]) or not is_zero(changes[3]))
@@ -136,56 +139,3 @@ def _linearized(seabed: bool, rough: bool) -> tuple[list[Node], list[Node], list
         dh = r.apply("select", taut, dh, 0)
         dv = r.apply("select", taut, dv, (dz - v * v / 2 * de) / (1 + e * v))
     return leaves, [node for node in reachable([dh, dv]) if node.op != "leaf"], [dh, dv]
-
-
-def _solved(context: Any, eps: Any, seabed: int, x: Any, z: Any, e: Any, friction: Any) -> tuple[Any, Any]:
-    """h, v with the arithmetic of a context, or NaN twice; eps is its rounding."""
-    failed = (math.nan, math.nan)
-    if not (e >= 0 and friction >= 0 and abs(x) + abs(z) < 1e100) or (seabed and not z > 0):
-        return failed
-    if seabed:
-        v = 2 * z / (1 + context.sqrt(1 + 2 * e * z))
-        if v <= 1 and x <= 1 - v + 4 * eps:
-            return x * 0, v
-    if not x > NEAREST:
-        return failed
-    h, v = _start(context, seabed, x, z, e)
-    for _ in range(STEPS):
-        rests = seabed and v < 1
-        s, b = (1 - v, v * 0) if rests else (v * 0, v - 1)
-        l, t, a = 1 - s, context.sqrt(h * h + v * v), context.sqrt(h * h + b * b)
-        top, foot = t + v if v > 0 else h * h / (t - v), h * h / (a - b) if b < 0 else a + b  # t + v and a + b
-        arc = context.log1p(2 * l * top / (h * h + foot * top))  # asinh(v / h) - asinh(b / h) without cancellation
-        tense = h / friction if friction * s > h else s
-        x_off = s + h * arc + e * (h * (l + tense) - friction * tense * tense / 2) - x
-        z_off = l * (v + b) * (1 / (t + a) + e / 2) - z
-        x_h, z_h = arc - (v / t - b / a) + e * (l + tense), h / t - h / a
-        x_v, z_v = z_h + (e * friction * tense if rests else 0), v / t - b / a + e * l
-        determinant = x_h * z_v - x_v * z_h
-        if not 0 < determinant < math.inf:
-            return failed
-        dh, dv = (x_v * z_off - z_v * x_off) / determinant, (z_h * x_off - x_h * z_off) / determinant
-        step = 1 if h + dh >= h / 10 else -h * 9 / 10 / dh
-        if seabed and v + step * dv < v / 10:
-            step = -v * 9 / 10 / dv
-        h, v = h + step * dh, v + step * dv
-        if abs(dh) <= context.sqrt(eps) * h + 4 * eps and abs(dv) <= context.sqrt(eps) * (h + abs(v)):
-            return h, v
-    return failed
-
-
-def _start(context: Any, seabed: int, x: Any, z: Any, e: Any) -> tuple[Any, Any]:
-    """Where Newton's method starts: a parabola (Jonkman's rule), a straight line where the ends are far apart, or a stiff line
-    that touches the seabed, for which (1 - x) / z = (sqrt(u (u + 2)) - acosh(1 + u)) / u with u = z / h, solved roughly."""
-    d = context.sqrt(x * x + z * z)
-    flat = context.sqrt(3 * (1 - d * d)) / x if d < 1 else 1 / (x * 0 + 5)
-    h, v = x / (2 * flat), (z / context.tanh(flat) + 1) / 2
-    if d > 1 and (d - 1) * x > e * h * d and e > 0:
-        h, v = (d - 1) * x / (e * d), (d - 1) * z / (e * d) + (x * 0 + 1) / 2
-    if seabed and 1 - z < x < 1:
-        f = (1 - x) / z
-        touching = z * (1 - f) / (f * f * (4.5 - f * (4.2 - 3.6 * f)))
-        lifted = context.sqrt(z * (z + 2 * touching))
-        if lifted < 1:
-            h, v = touching, lifted
-    return h, v

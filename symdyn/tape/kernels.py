@@ -1,28 +1,42 @@
 """Numeric algorithms that a tape calls where statements would not do: so many numbers in, so many out.
 
-Generated code calls them by name; each backend has its own text of them (templates/BACKEND/NAME.*.jinja).
+Generated code calls them by name. Their text in Python is in symdyn.tape.algorithms, for doubles, for many digits, for statements
+on a tape and for generated Python modules; that in C is in templates/c/runtime/NAME.h.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+
+from symdyn.tape.algorithms.saddle import (
+    SYMDYN_CLEANINGS,
+    SYMDYN_MASSLESS,
+    SYMDYN_ROUNDS,
+    symdyn_least_multipliers,
+    symdyn_saddle_point,
+)
+from symdyn.tape.algorithms.states import symdyn_stacked
 
 # Singular values of the scaled constraints below this count less and less, in accelerations and in multipliers ...
 SMOOTHED = 1e-5
 # ... and in corrections, which would else be as large as a tiny error divided by a tiny singular value.
 DAMPED = 1e-3
-ROUNDS = 5
-CLEANINGS = 2
-# A mass below this part of the largest is none.
-MASSLESS = 1e-12
 # A pivot of the saddle's matrix that is no more than this part of its diagonal entry is none: nothing holds some direction. The
 # pivot that is the largest part of its entry goes first, so that rounding leaves less than 1e-15 of an entry. Numbers that are
-# folded and the generated code take the same test.
+# folded and the generated code take the same test; for numbers with more digits the bound is as many times their rounding.
 LOOSE = 1e-14
+EPS = 2.0**-52
+MASSLESS, ROUNDS, CLEANINGS = SYMDYN_MASSLESS, SYMDYN_ROUNDS, SYMDYN_CLEANINGS
+# What the algorithms need of NumPy's names.
+_NAMES = (
+    "subtract", "divide", "greater", "less_equal", "not_equal", "maximum", "logical_or", "where")
 
 
 @dataclass(frozen=True)
@@ -59,6 +73,11 @@ class Kernel:
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
         """Results for numbers of an mpmath context."""
         raise NotImplementedError
+
+    def statements(self, recorder: Any, values: Sequence[Any]) -> list[Any] | None:
+        """Results in statements, in the order of generated code, without its test whether there are any; None where branches
+        forbid it."""
+        return None
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         """Derivatives of the results for derivatives of the values, recorded."""
@@ -106,45 +125,15 @@ class Saddle(Kernel):
         return M, C.reshape(m, n), s, w, f, d
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-        M, C, s, w, f, d = _stacked(self.split(values), shape)
-        masses = w**2 * np.diagonal(M, axis1=-2, axis2=-1)
-        largest = np.max(masses, axis=-1)[..., None]
-        largest = np.where(largest > 0, largest, 1.0)
-        lighter = np.sqrt(largest / np.where(masses > MASSLESS * largest, masses, largest))
-        w = w * lighter
-        s = s / np.max(np.where(C != 0, lighter[..., None, :], 1.0), axis=-1, initial=1.0)
-        M = w[..., :, None] * M * w[..., None, :]
-        C = s[..., :, None] * C * w[..., None, :]
-        f, d, Ct = w * f, s * d, np.swapaxes(C, -1, -2)
-        stiff = largest / _stacked([_objects(values[:1])], shape)[0] ** 2
-        A = M + stiff[..., None] * (Ct @ C)
-        loose = _loose(A)
-        A = np.where(loose[..., None, None], np.eye(A.shape[-1]), A)
-        x, lam = np.zeros(f.shape), np.zeros(d.shape)
-        for _ in range(ROUNDS):
-            gap = d - (C @ x[..., None])[..., 0]
-            r = f - (M @ x[..., None])[..., 0] + (Ct @ (stiff * gap - lam)[..., None])[..., 0]
-            x = x + _solve(A, r[..., None])[..., 0]
-            lam = lam + stiff * ((C @ x[..., None])[..., 0] - d)
-        return np.where(loose[..., None], np.nan, w * x)
+        return _rows(symdyn_saddle_point, self.sizes, values, LOOSE)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        n, m = self.sizes
-        M, C, s, w, f, d = self.split(values)
-        M, C, f, d = w[:, None] * M * w[None, :], s[:, None] * C * w[None, :], w * f, s * d
-        stiff = (max([M[k, k] for k in range(n)]) or 1) * context.mpf(10) ** (context.dps // 2)
-        A = context.matrix((M + stiff * (C.T @ C) if m else M).tolist())
-        x, lam = f * 0, d * 0
-        for _ in range(ROUNDS):
-            r = f - M @ x
-            if m:
-                r = r - C.T @ lam + stiff * (C.T @ (d - C @ x))
-            step = context.lu_solve(A, context.matrix(list(r)))
-            x = x + np.array(list(step), dtype=object)
-            if m:
-                lam = lam + stiff * (C @ x - d)
-        return list(w * x)
+        e = context.sqrt(_smoothed(context))
+        return _precise(symdyn_saddle_point, context, self.sizes, [e, *values[1:]], context.eps * (LOOSE / EPS))
+
+    def statements(self, recorder: Any, values: Sequence[Any]) -> list[Any]:
+        e = Fraction(float(values[0]))
+        return _statements(symdyn_saddle_point, recorder, self.sizes, [e, *values[1:]], None)
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         n, m = self.sizes
@@ -185,37 +174,13 @@ class Multipliers(Kernel):
         return C.reshape(m, n), s, w, g
 
     def rows(self, values: Sequence[Any]) -> np.ndarray:
-        m = self.sizes[1]
-        shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-        C, s, w, g = _stacked(self.split(values), shape)
-        C = s[..., :, None] * C * w[..., None, :]
-        g, Ct = w * g, np.swapaxes(C, -1, -2)
-        B = C @ Ct + SMOOTHED**2 * np.eye(m)
-        lam = np.zeros((*s.shape, 1))
-        for _ in range(ROUNDS):
-            lam = lam + np.linalg.solve(B, C @ (g[..., None] - Ct @ lam))
-        for _ in range(CLEANINGS):
-            rest = lam
-            for _ in range(ROUNDS):
-                rest = SMOOTHED**2 * np.linalg.solve(B, rest)
-            lam = lam - rest
-        return s * lam[..., 0]
+        return _rows(symdyn_least_multipliers, self.sizes, values, SMOOTHED)
 
     def precise(self, context: Any, values: Sequence[Any]) -> list[Any]:
-        m = self.sizes[1]
-        C, s, w, g = self.split(values)
-        C, g = s[:, None] * C * w[None, :], w * g
-        smoothed = context.mpf(10) ** (-(context.dps // 2))
-        B = C @ C.T + np.array(context.eye(m).tolist(), dtype=object) * smoothed
-        lam = s * 0
-        for _ in range(ROUNDS):
-            step = context.lu_solve(context.matrix(B.tolist()), context.matrix(list(C @ (g - C.T @ lam))))
-            lam = lam + np.array(list(step), dtype=object)
-        rest = lam
-        for _ in range(ROUNDS):
-            step = context.lu_solve(context.matrix(B.tolist()), context.matrix(list(smoothed * rest)))
-            rest = np.array(list(step), dtype=object)
-        return list(s * (lam - rest))
+        return _precise(symdyn_least_multipliers, context, self.sizes, values, context.sqrt(_smoothed(context)))
+
+    def statements(self, recorder: Any, values: Sequence[Any]) -> list[Any]:
+        return _statements(symdyn_least_multipliers, recorder, self.sizes, values, Fraction(SMOOTHED))
 
     def tangents(self, recorder: Any, values: Sequence[Any], results: Sequence[Any], changes: Sequence[Any]) -> list[Any]:
         C, s, w, _ = self.split(values)
@@ -232,39 +197,35 @@ def _objects(values: Sequence[Any]) -> np.ndarray:
     return array
 
 
-def _stacked(arrays: Sequence[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
-    """Arrays of numbers or of arrays (states) as arrays with the states first."""
-    stacked = []
-    for a in arrays:
-        columns = [np.broadcast_to(np.asarray(v, dtype=float), shape) for v in a.ravel()]
-        whole = np.stack(columns, axis=-1) if columns else np.zeros((*shape, 0))
-        stacked.append(whole.reshape(*shape, *a.shape))
-    return stacked
+def _rows(algorithm: Callable[..., Any], sizes: tuple[int, ...], values: Sequence[Any], bound: float) -> np.ndarray:
+    """Results in doubles, states first; NaN where there are none."""
+    with np.errstate(all="ignore"):
+        found, failed = algorithm(np, *sizes, symdyn_stacked(values), bound)
+    return np.moveaxis(np.where(failed, np.nan, found), 0, -1)
 
 
-def _loose(A: np.ndarray) -> np.ndarray:
-    """For symmetric matrices (..., n, n): whether a pivot is next to nothing of its entry; as in the templates.
-
-    What is not a number is not loose: it shows in the result.
-    """
-    left, entries = A.copy(), np.diagonal(A, axis1=-2, axis2=-1)
-    parts = 1.0 / np.where(entries > 0, entries, np.inf)
-    loose, waiting = (entries <= 0).any(axis=-1), np.ones(entries.shape, dtype=bool)
-    for _ in range(A.shape[-1]):
-        part = np.where(waiting, np.diagonal(left, axis1=-2, axis2=-1) * parts, -np.inf)
-        p = part.argmax(axis=-1)[..., None]
-        loose |= np.take_along_axis(part, p, -1)[..., 0] <= LOOSE
-        column = np.take_along_axis(left, p[..., None], -1)[..., 0]
-        pivot = np.where(loose[..., None], 1.0, np.take_along_axis(column, p, -1))
-        left = left - column[..., :, None] * (column / pivot)[..., None, :]
-        np.put_along_axis(waiting, p, False, -1)
-    return np.asarray(loose)
+def _precise(algorithm: Callable[..., Any], context: Any, sizes: tuple[int, ...], values: Sequence[Any], bound: Any) -> list[Any]:
+    """Results for numbers of an mpmath context. Raises ZeroDivisionError where there are none."""
+    root = SimpleNamespace(**{name: getattr(np, name) for name in _NAMES}, sqrt=np.frompyfunc(context.sqrt, 1, 1))
+    found, failed = algorithm(root, *sizes, _objects(values), bound)
+    if failed:
+        raise ZeroDivisionError("the matrix is singular")
+    return [context.convert(v) for v in found]
 
 
-def _solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """A^-1 b for matrices (..., n, n), (..., n, 1); NaN for singular ones."""
-    try:
-        return np.linalg.solve(A, b)
-    except np.linalg.LinAlgError:
-        regular = (np.linalg.slogdet(A)[0] != 0)[..., None, None]
-        return np.where(regular, np.linalg.solve(np.where(regular, A, np.eye(A.shape[-1])), b), np.nan)
+def _statements(algorithm: Callable[..., Any], recorder: Any, sizes: tuple[int, ...], values: Sequence[Any],
+                bound: Any) -> list[Any]:
+    """Results as nodes of a tape."""
+    def recorded(op: str, arguments: int) -> Any:
+        return np.frompyfunc(partial(recorder.apply, op), arguments, 1)
+
+    two = {"greater": "gt", "less_equal": "le", "not_equal": "ne", "maximum": "max", "logical_or": "or"}
+    functions = SimpleNamespace(
+        **{name: recorded(op, 2) for name, op in two.items()}, subtract=np.subtract, divide=np.frompyfunc(recorder.div, 2, 1),
+        sqrt=np.frompyfunc(recorder.sqrt, 1, 1), where=recorded("select", 3))
+    return list(algorithm(functions, *sizes, _objects(values), bound)[0])
+
+
+def _smoothed(context: Any) -> Any:
+    """The square of the singular value below which constraints count less and less, with so many digits."""
+    return context.mpf(10) ** -(context.dps // 2)

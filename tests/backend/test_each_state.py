@@ -311,14 +311,15 @@ def test_what_is_called_fails_for_single_states(kind: str, bad: Mapping[int, flo
 def test_an_algorithm_that_divides_by_zero_fails_there() -> None:
     """Alone, and at one of many states."""
     module = loaded(afloat("box").embedding(), ("rhs",))
-    assert module._symdyn_each(lambda v: [1 / v[0], v[1]], 2, [4.0, 3.0], 1) == [0.25, 3.0]
-    with pytest.raises(module.SingularError):
-        module._symdyn_each(lambda v: [1 / v[0]], 1, [0.0], 1)
-    with pytest.raises(module.SingularError) as caught:
-        module._symdyn_each(lambda v: [1 / v[0], v[1]], 2, [np.array([[1.0], [0.0]]), np.array([1.0, 2.0, 3.0])], 1)
-    assert caught.value.states.tolist() == [[False] * 3, [True] * 3]
-    found = module._symdyn_each(lambda v: [1 / v[0], v[1]], 2, [np.array([[1.0], [2.0]]), np.array([1.0, 2.0, 3.0])], 1)
+    assert module.symdyn_each(lambda v: [1 / v[0], v[1]], 2, [4.0, 3.0]) == ([0.25, 3.0], False)
+    assert module.symdyn_each(lambda v: [1 / v[0]], 1, [0.0])[1]
+    first, second = np.array([[1.0], [0.0]]), np.array([1.0, 2.0, 3.0])
+    found, failed = module.symdyn_each(lambda v: [1 / v[0], v[1]], 2, [first, second])
+    assert failed.tolist() == [[False] * 3, [True] * 3]
+    np.testing.assert_array_equal(found, [[[1] * 3, [np.nan] * 3], [[1, 2, 3], [np.nan] * 3]])
+    found, failed = module.symdyn_each(lambda v: [1 / v[0], v[1]], 2, [np.array([[1.0], [2.0]]), second])
     np.testing.assert_array_equal(found, [[[1, 1, 1], [0.5, 0.5, 0.5]], [[1, 2, 3], [1, 2, 3]]])
+    assert not failed.any()
 
 
 def test_a_function_of_the_user_that_stops_for_all_is_tried_for_each() -> None:

@@ -81,78 +81,165 @@ class SingularError(ArithmeticError):
         self.states = states
 
 
-def _symdyn_solve(A, b, code):
-    """A^-1 b for one matrix, or for those of many states; where some are singular, it is told which."""
+def symdyn_stacked(values):
+    """Numbers, or arrays of them (states) that broadcast, as one array with the states last."""
     try:
-        return np.linalg.solve(A, b)
-    except np.linalg.LinAlgError:
-        singular = np.linalg.slogdet(A)[0] == 0.0
-        raise SingularError(code, singular if np.any(singular) else True) from None
+        return np.array(values, dtype=float)
+    except ValueError:  # of different shapes
+        return np.array(np.broadcast_arrays(*values), dtype=float)
+
+
+def symdyn_each(function, n_out, values):
+    """n_out results of a function of a list of numbers, which branches, state by state, and whether there are none: it gives
+    None, or divides by zero and the like."""
+    def found(state):
+        try:
+            return function(state)
+        except (ArithmeticError, ValueError):
+            return None
+
+    states = symdyn_stacked(values)
+    if states.ndim == 1:
+        results = found(states.tolist())
+        return [math.nan] * n_out if results is None else results, results is None
+    flat = [found(state) for state in states.reshape(len(values), -1).T.tolist()]
+    failed = np.array([results is None for results in flat]).reshape(states.shape[1:])
+    results = np.array([[math.nan] * n_out if results is None else results for results in flat], dtype=float)
+    return results.T.reshape(n_out, *states.shape[1:]), failed
+
+
+# A mass below this part of the largest is none.
+SYMDYN_MASSLESS = 1e-12
+# Rounds of iteration, and how often what rounding leaves outside the range of C is taken off.
+SYMDYN_ROUNDS = 5
+SYMDYN_CLEANINGS = 2
+
+
+def symdyn_less(xp, start, products):
+    """start - products[0] - products[1] - ..., in this order."""
+    return xp.subtract.reduce(np.concatenate([start[None], products]), axis=0)
+
+
+def symdyn_loose(A, least):
+    """Whether a pivot of the symmetric A (n, n) is no more than this part of its entry: nothing holds some direction then.
+
+    The pivot that is the largest part of its entry goes first, so that rounding stays small."""
+    n, entries = len(A), symdyn_diagonal(A)
+    loose, waiting = (entries <= 0).any(axis=0), np.ones(entries.shape, dtype=bool)
+    parts = 1 / np.where(loose, 1, entries)
+    for _ in range(n):
+        if loose.all():
+            break
+        part = np.where(waiting, symdyn_diagonal(A) * parts, -np.inf)
+        p = part.argmax(axis=0)[None]
+        loose = loose | (np.take_along_axis(part, p, 0)[0] <= least)
+        column = np.take_along_axis(A, p[None], 1)[:, 0]
+        A = A - column[:, None] * column / np.where(loose, 1, np.take_along_axis(column, p, 0)[0])
+        np.put_along_axis(waiting, p, False, 0)
+    return loose
+
+
+def symdyn_diagonal(A):
+    """The entries A[k, k], (n,)."""
+    return A[np.arange(len(A)), np.arange(len(A))]
+
+
+def symdyn_factorize(xp, A):
+    """A = L D L^T by the lower triangle, L below the diagonal and D on it, and whether a pivot is not positive; what is no
+    number passes, and so do infinite entries, which become that."""
+    entries, A = symdyn_diagonal(A), A.copy()
+    for j in range(len(A)):
+        v = A[j, :j] * symdyn_diagonal(A[:j])
+        A[j:, j] = symdyn_less(xp, A[j:, j], np.swapaxes(A[j:, :j], 0, 1) * v[:, None])
+        A[j, j] = A[j, j] + 0 * entries[j]
+        A[j + 1:, j] = xp.divide(A[j + 1:, j], A[j, j])
+    return A, xp.logical_or.reduce(xp.less_equal(symdyn_diagonal(A), 0))
+
+
+def symdyn_substitute(xp, A, right):
+    """A^-1 right by these factors, (n,)."""
+    x = right.copy()
+    for k in range(len(x)):
+        x[k + 1:] = x[k + 1:] - A[k + 1:, k] * x[k]
+    x = xp.divide(x, symdyn_diagonal(A))
+    for i in reversed(range(len(x) - 1)):
+        x[i:i + 1] = symdyn_less(xp, x[i:i + 1], (A[i + 1:, i] * x[i + 1:])[:, None])
+    return x
+
+
+def symdyn_saddle_point(xp, n, m, values, least):
+    """x (n) of M x + C^T lam = f, C x = d, and whether there is none: M symmetric, perhaps singular, the m rows of C perhaps
+    dependent. Values: e, M lower triangle row by row, C row by row, scales of the rows (m) and columns (n) of C, f, d.
+
+    The iterated augmented Lagrangian of Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988), scaled:
+    (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d) with a = M_kk / e^2; each round takes the residual again.
+    There is none where a pivot is no more than the part `least` of its entry; None: that is not looked at.
+    """
+    e, triangle, C, rows, columns, f, d = np.split(values, np.cumsum([1, n * (n + 1) // 2, m * n, m, n, n]))
+    i, j = np.indices((n, n))
+    M = triangle[np.maximum(i, j) * (np.maximum(i, j) + 1) // 2 + np.minimum(i, j)]
+    C = C.reshape(m, n, *values.shape[1:])
+    # Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
+    masses = columns * columns * symdyn_diagonal(M)
+    largest = xp.maximum.reduce(masses)
+    largest = xp.where(xp.greater(largest, 0), largest, 1)
+    lighter = xp.sqrt(xp.divide(largest, xp.where(xp.greater(masses, SYMDYN_MASSLESS * largest), masses, largest)))
+    columns = columns * lighter
+    rows = xp.divide(rows, xp.maximum.reduce(xp.where(xp.not_equal(C, 0), lighter, 1), axis=1))
+    C = rows[:, None] * columns * C
+    Ct = np.swapaxes(C, 0, 1)
+    M = columns[:, None] * columns * M
+    a = xp.divide(largest, e[0] * e[0])
+    f, d = columns * f, rows * d
+    A = M + a * symdyn_less(xp, np.zeros_like(M), -(C[:, :, None] * C[:, None, :]))
+    loose = False if least is None else symdyn_loose(A, least)
+    A, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
+    x, lam = np.zeros_like(f), np.zeros_like(d)
+    for _ in range(SYMDYN_ROUNDS):
+        gap = a * symdyn_less(xp, d, Ct * x[:, None]) - lam
+        r = symdyn_less(xp, symdyn_less(xp, f, M * x[:, None]), -(C * gap[:, None]))
+        x = x + symdyn_substitute(xp, A, r)
+        lam = lam - a * symdyn_less(xp, d, Ct * x[:, None])
+    return columns * x, xp.logical_or(loose, failed)
+
+
+def symdyn_least_multipliers(xp, n, m, values, e):
+    """lam (m) of C^T lam = g of least norm after scaling, and whether there is none: rows of C perhaps dependent. Values: C row
+    by row, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam)."""
+    C, rows, columns, g = np.split(values, np.cumsum([m * n, m, n]))
+    C = rows[:, None] * columns * C.reshape(m, n, *values.shape[1:])
+    Ct, g, smoothed = np.swapaxes(C, 0, 1), columns * g, e * e
+    start = np.zeros((m, m, *values.shape[1:]), dtype=C.dtype)
+    start[np.arange(m), np.arange(m)] = smoothed
+    A, failed = symdyn_factorize(xp, symdyn_less(xp, start, -(Ct[:, :, None] * Ct[:, None, :])))
+    lam = np.zeros_like(rows)
+    for _ in range(SYMDYN_ROUNDS):
+        rest = symdyn_less(xp, g, C * lam[:, None])
+        lam = lam + symdyn_substitute(xp, A, symdyn_less(xp, np.zeros_like(lam), -(Ct * rest[:, None])))
+    for _ in range(SYMDYN_CLEANINGS):
+        rest = lam  # what rounding has left outside the range of C, when all else has vanished
+        for _ in range(SYMDYN_ROUNDS):
+            rest = symdyn_substitute(xp, A, smoothed * rest)
+        lam = lam - rest
+    return rows * lam, failed
 
 
 def symdyn_multipliers(n, m, values, code):
-    """lam (m) of C^T lam = g of least norm for numbers or arrays of them (states): values are C row by row, scales of its rows
-    and columns, and g; iterated, lam += (C C^T + e^2)^-1 C (g - C^T lam) with e = 1e-05."""
-    shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-    flat = np.array(values if not shape else np.broadcast_arrays(*values), dtype=float)
-    flat = np.ascontiguousarray(np.moveaxis(flat, 0, -1))
-    C, rows, columns, g = np.split(flat, np.cumsum([m * n, m, n]), axis=-1)
-    C = rows[..., :, None] * C.reshape(*shape, m, n) * columns[..., None, :]
-    g, Ct = columns * g, np.swapaxes(C, -1, -2)
-    B = C @ Ct + 1e-05**2 * np.eye(m)
-    lam = np.zeros((*rows.shape, 1))
-    for _ in range(5):
-        lam = lam + _symdyn_solve(B, C @ (g[..., None] - Ct @ lam), code)
-    for _ in range(2):
-        rest = lam  # what rounding has left outside the range of C, when all else has vanished
-        for _ in range(5):
-            rest = 1e-05**2 * _symdyn_solve(B, rest, code)
-        lam = lam - rest
-    return np.moveaxis(rows * lam[..., 0], -1, 0)
+    """symdyn_least_multipliers for numbers or arrays of them (states)."""
+    with np.errstate(all="ignore"):
+        lam, failed = symdyn_least_multipliers(np, n, m, symdyn_stacked(values), 1e-05)
+    if np.any(failed):
+        raise SingularError(code, failed)
+    return lam
 
 
 def symdyn_saddle(n, m, values, code):
-    """x (n) of M x + C^T lam = f, C x = d for numbers or arrays of them (states): values are e, the lower triangle of M, C row by
-    row, scales of the rows and columns of C, f and d; the iterated augmented Lagrangian of Bayo, Garcia de Jalon and Serna,
-    Comput. Methods Appl. Mech. Eng. 71 (1988)."""
-    shape = np.broadcast_shapes(*[np.shape(v) for v in values])
-    flat = np.array(values if not shape else np.broadcast_arrays(*values), dtype=float)
-    flat = np.ascontiguousarray(np.moveaxis(flat, 0, -1))
-    e, triangle, C, rows, columns, f, d = np.split(flat, np.cumsum([1, n * (n + 1) // 2, m * n, m, n, n]), axis=-1)
-    M = np.empty((*shape, n, n))
-    M[(..., *np.tril_indices(n))] = triangle
-    M[(..., *np.tril_indices(n)[::-1])] = triangle
-    C = C.reshape(*shape, m, n)
-    masses = columns**2 * np.diagonal(M, axis1=-2, axis2=-1)
-    largest = np.max(masses, axis=-1)[..., None]
-    largest = np.where(largest > 0, largest, 1.0)
-    lighter = np.sqrt(largest / np.where(masses > 1e-12 * largest, masses, largest))
-    columns = columns * lighter
-    rows = rows / np.max(np.where(C != 0, lighter[..., None, :], 1.0), axis=-1, initial=1.0)
-    M = columns[..., :, None] * M * columns[..., None, :]
-    C = rows[..., :, None] * C * columns[..., None, :]
-    f, d, Ct = columns * f, rows * d, np.swapaxes(C, -1, -2)
-    a = largest / e**2
-    A = M + a[..., None] * (Ct @ C)
-    left, entries, waiting = A.copy(), np.diagonal(A, axis1=-2, axis2=-1), np.ones((*shape, n), dtype=bool)
-    parts, loose = 1.0 / np.where(entries > 0, entries, np.inf), (entries <= 0).any(axis=-1)
-    for _ in range(n):  # a pivot that is next to nothing of its entry is none: nothing holds some direction; the largest goes first
-        part = np.where(waiting, np.diagonal(left, axis1=-2, axis2=-1) * parts, -np.inf)
-        p = part.argmax(axis=-1)[..., None]
-        loose |= np.take_along_axis(part, p, -1)[..., 0] <= 1e-14
-        column = np.take_along_axis(left, p[..., None], -1)[..., 0]
-        pivot = np.where(loose[..., None], 1.0, np.take_along_axis(column, p, -1))
-        left = left - column[..., :, None] * (column / pivot)[..., None, :]
-        np.put_along_axis(waiting, p, False, -1)
-    if loose.any():
-        raise SingularError(code, loose)
-    x, lam = np.zeros(f.shape), np.zeros(d.shape)
-    for _ in range(5):
-        gap = d - (C @ x[..., None])[..., 0]
-        r = f - (M @ x[..., None])[..., 0] + (Ct @ (a * gap - lam)[..., None])[..., 0]
-        x = x + _symdyn_solve(A, r[..., None], code)[..., 0]
-        lam = lam - a * (d - (C @ x[..., None])[..., 0])
-    return np.moveaxis(columns * x, -1, 0)
+    """symdyn_saddle_point for numbers or arrays of them (states)."""
+    with np.errstate(all="ignore"):
+        x, failed = symdyn_saddle_point(np, n, m, symdyn_stacked(values), 1e-14)
+    if np.any(failed):
+        raise SingularError(code, failed)
+    return x
 
 
 class _OneState:
@@ -1509,7 +1596,7 @@ REFERENCE = [
         "results": {
             "rhs": (1e-11, [-0.0006638302270933178, -0.00043377443092171454, 0.00015608466193168169, -6.125409153292262, 8.634714604765826, -2.5832352579355335]),
             "lam": (1e-11, [180.87246976487668, 483.7248817313454]),
-            "reactions": (1e-11, [187.59703853356694, 525.4595503854447, 0.0, 0.0, 0.0, -7.573064690121713e-29, 185.29076554218605, 516.4768392445893, 0.0, 0.0, 0.0, 1.0097419586828951e-28, 180.78921967682567, 498.47053968771684, 0.0, 0.0, 0.0, 0.0, -180.87246976487668, -483.7248817313454, 0.0, 0.0, 0.0, 0.0]),
+            "reactions": (1e-11, [187.59703853356694, 525.4595503854447, 0.0, 0.0, 0.0, 0.0, 185.29076554218605, 516.4768392445893, 0.0, 0.0, 0.0, 0.0, 180.78921967682567, 498.47053968771684, 0.0, 0.0, 0.0, 0.0, -180.87246976487668, -483.7248817313454, 0.0, 0.0, 0.0, 0.0]),
         },
     },
 ]

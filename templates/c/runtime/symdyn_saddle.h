@@ -7,14 +7,17 @@
 // Whether a pivot of the symmetric A, which is used up, is next to nothing of its entry: nothing holds some direction then.
 // The pivot that is the largest part of its entry goes first, so that rounding stays small.
 static int symdyn_loose(int n, double A[SYMDYN_SADDLE_N][SYMDYN_SADDLE_N]) {
-    double entries[SYMDYN_SADDLE_N];
+    double parts[SYMDYN_SADDLE_N];
     int gone[SYMDYN_SADDLE_N] = {0};
-    for (int i = 0; i < n; i++) entries[i] = A[i][i];
+    for (int i = 0; i < n; i++) {
+        if (A[i][i] <= 0.0) return 1;
+        parts[i] = 1.0 / A[i][i];
+    }
     for (int step = 0; step < n; step++) {
         int p = -1;
         for (int i = 0; i < n; i++)
-            if (!gone[i] && (p < 0 || A[i][i] * entries[p] > A[p][p] * entries[i])) p = i;
-        if (A[p][p] <= SYMDYN_LOOSE * entries[p] || A[p][p] <= 0.0) return 1;
+            if (!gone[i] && (p < 0 || A[i][i] * parts[i] > A[p][p] * parts[p])) p = i;
+        if (A[p][p] * parts[p] <= SYMDYN_LOOSE) return 1;
         gone[p] = 1;
         for (int i = 0; i < n; i++)
             for (int j = 0; j < n && !gone[i]; j++)

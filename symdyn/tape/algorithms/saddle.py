@@ -1,0 +1,122 @@
+"""Solvers for M x + C^T lam = f, C x = d; see Saddle and Multipliers in symdyn.tape.kernels.
+
+`xp` is the arithmetic: NumPy, or what has its names for other numbers. Arrays have the entries of vectors and matrices first, and
+then states, of which there may be none.
+"""
+
+import numpy as np
+
+# A mass below this part of the largest is none.
+SYMDYN_MASSLESS = 1e-12
+# Rounds of iteration, and how often what rounding leaves outside the range of C is taken off.
+SYMDYN_ROUNDS = 5
+SYMDYN_CLEANINGS = 2
+
+
+def symdyn_less(xp, start, products):
+    """start - products[0] - products[1] - ..., in this order."""
+    return xp.subtract.reduce(np.concatenate([start[None], products]), axis=0)
+
+
+def symdyn_loose(A, least):
+    """Whether a pivot of the symmetric A (n, n) is no more than this part of its entry: nothing holds some direction then.
+
+    The pivot that is the largest part of its entry goes first, so that rounding stays small."""
+    n, entries = len(A), symdyn_diagonal(A)
+    loose, waiting = (entries <= 0).any(axis=0), np.ones(entries.shape, dtype=bool)
+    parts = 1 / np.where(loose, 1, entries)
+    for _ in range(n):
+        if loose.all():
+            break
+        part = np.where(waiting, symdyn_diagonal(A) * parts, -np.inf)
+        p = part.argmax(axis=0)[None]
+        loose = loose | (np.take_along_axis(part, p, 0)[0] <= least)
+        column = np.take_along_axis(A, p[None], 1)[:, 0]
+        A = A - column[:, None] * column / np.where(loose, 1, np.take_along_axis(column, p, 0)[0])
+        np.put_along_axis(waiting, p, False, 0)
+    return loose
+
+
+def symdyn_diagonal(A):
+    """The entries A[k, k], (n,)."""
+    return A[np.arange(len(A)), np.arange(len(A))]
+
+
+def symdyn_factorize(xp, A):
+    """A = L D L^T by the lower triangle, L below the diagonal and D on it, and whether a pivot is not positive; what is no
+    number passes, and so do infinite entries, which become that."""
+    entries, A = symdyn_diagonal(A), A.copy()
+    for j in range(len(A)):
+        v = A[j, :j] * symdyn_diagonal(A[:j])
+        A[j:, j] = symdyn_less(xp, A[j:, j], np.swapaxes(A[j:, :j], 0, 1) * v[:, None])
+        A[j, j] = A[j, j] + 0 * entries[j]
+        A[j + 1:, j] = xp.divide(A[j + 1:, j], A[j, j])
+    return A, xp.logical_or.reduce(xp.less_equal(symdyn_diagonal(A), 0))
+
+
+def symdyn_substitute(xp, A, right):
+    """A^-1 right by these factors, (n,)."""
+    x = right.copy()
+    for k in range(len(x)):
+        x[k + 1:] = x[k + 1:] - A[k + 1:, k] * x[k]
+    x = xp.divide(x, symdyn_diagonal(A))
+    for i in reversed(range(len(x) - 1)):
+        x[i:i + 1] = symdyn_less(xp, x[i:i + 1], (A[i + 1:, i] * x[i + 1:])[:, None])
+    return x
+
+
+def symdyn_saddle_point(xp, n, m, values, least):
+    """x (n) of M x + C^T lam = f, C x = d, and whether there is none: M symmetric, perhaps singular, the m rows of C perhaps
+    dependent. Values: e, M lower triangle row by row, C row by row, scales of the rows (m) and columns (n) of C, f, d.
+
+    The iterated augmented Lagrangian of Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988), scaled:
+    (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d) with a = M_kk / e^2; each round takes the residual again.
+    There is none where a pivot is no more than the part `least` of its entry; None: that is not looked at.
+    """
+    e, triangle, C, rows, columns, f, d = np.split(values, np.cumsum([1, n * (n + 1) // 2, m * n, m, n, n]))
+    i, j = np.indices((n, n))
+    M = triangle[np.maximum(i, j) * (np.maximum(i, j) + 1) // 2 + np.minimum(i, j)]
+    C = C.reshape(m, n, *values.shape[1:])
+    # Columns are scaled until all masses are equal, rows back by the largest of their columns' factors.
+    masses = columns * columns * symdyn_diagonal(M)
+    largest = xp.maximum.reduce(masses)
+    largest = xp.where(xp.greater(largest, 0), largest, 1)
+    lighter = xp.sqrt(xp.divide(largest, xp.where(xp.greater(masses, SYMDYN_MASSLESS * largest), masses, largest)))
+    columns = columns * lighter
+    rows = xp.divide(rows, xp.maximum.reduce(xp.where(xp.not_equal(C, 0), lighter, 1), axis=1))
+    C = rows[:, None] * columns * C
+    Ct = np.swapaxes(C, 0, 1)
+    M = columns[:, None] * columns * M
+    a = xp.divide(largest, e[0] * e[0])
+    f, d = columns * f, rows * d
+    A = M + a * symdyn_less(xp, np.zeros_like(M), -(C[:, :, None] * C[:, None, :]))
+    loose = False if least is None else symdyn_loose(A, least)
+    A, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
+    x, lam = np.zeros_like(f), np.zeros_like(d)
+    for _ in range(SYMDYN_ROUNDS):
+        gap = a * symdyn_less(xp, d, Ct * x[:, None]) - lam
+        r = symdyn_less(xp, symdyn_less(xp, f, M * x[:, None]), -(C * gap[:, None]))
+        x = x + symdyn_substitute(xp, A, r)
+        lam = lam - a * symdyn_less(xp, d, Ct * x[:, None])
+    return columns * x, xp.logical_or(loose, failed)
+
+
+def symdyn_least_multipliers(xp, n, m, values, e):
+    """lam (m) of C^T lam = g of least norm after scaling, and whether there is none: rows of C perhaps dependent. Values: C row
+    by row, scales of its rows (m) and columns (n), g. Iterated: lam += (C C^T + e^2)^-1 C (g - C^T lam)."""
+    C, rows, columns, g = np.split(values, np.cumsum([m * n, m, n]))
+    C = rows[:, None] * columns * C.reshape(m, n, *values.shape[1:])
+    Ct, g, smoothed = np.swapaxes(C, 0, 1), columns * g, e * e
+    start = np.zeros((m, m, *values.shape[1:]), dtype=C.dtype)
+    start[np.arange(m), np.arange(m)] = smoothed
+    A, failed = symdyn_factorize(xp, symdyn_less(xp, start, -(Ct[:, :, None] * Ct[:, None, :])))
+    lam = np.zeros_like(rows)
+    for _ in range(SYMDYN_ROUNDS):
+        rest = symdyn_less(xp, g, C * lam[:, None])
+        lam = lam + symdyn_substitute(xp, A, symdyn_less(xp, np.zeros_like(lam), -(Ct * rest[:, None])))
+    for _ in range(SYMDYN_CLEANINGS):
+        rest = lam  # what rounding has left outside the range of C, when all else has vanished
+        for _ in range(SYMDYN_ROUNDS):
+            rest = symdyn_substitute(xp, A, smoothed * rest)
+        lam = lam - rest
+    return rows * lam, failed

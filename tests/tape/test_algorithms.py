@@ -1,0 +1,209 @@
+"""Numeric algorithms in C and in Python: the same bits, and the same inputs rejected, for ten thousand inputs of each."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symdyn.backend.source import Content, render
+from symdyn.runtime.building.compiler import find_compiler, require_compiler
+from symdyn.tape import Recorder, Tape
+from symdyn.tape.catenary import Catenary
+from symdyn.tape.cube import Cube
+from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.kernels import LOOSE, SMOOTHED, Kernel, Multipliers, Saddle
+from symdyn.tape.node import INPUT
+from tests.backend.c_warnings import RUNTIME
+
+INPUTS = 10_000
+SIZES = ((1, 1), (2, 1), (3, 2), (4, 4), (6, 3), (9, 12))
+EACH = INPUTS // len(SIZES) + 1
+
+needs_c = pytest.mark.skipif(find_compiler() is None or require_compiler().kind not in ("gcc", "clang"),
+                             reason="no compiler that takes these options")
+
+
+# -- inputs
+
+
+def constraints(rng: np.random.Generator, n: int, m: int, kind: int) -> np.ndarray:
+    """Rows, by kind: of full rank, one that depends on others, all but so, one that is zero, zero columns."""
+    C = rng.normal(size=(m, n))
+    last = rng.choice([-1.0, 0.5, 2.0], m - 1) @ C[:-1]
+    if kind == 1:
+        C[-1] = last
+    elif kind == 2:
+        C[-1] = last + 10.0 ** rng.uniform(-16, -2) * C[-1]
+    elif kind == 3:
+        C[-1] = 0
+    elif kind == 4:
+        C[:, : 1 + n // 3] = 0
+    return C
+
+
+def masses(rng: np.random.Generator, n: int, kind: int) -> np.ndarray:
+    """Symmetric, by kind: regular, far apart, some without mass, singular, next to singular, not positive, zero."""
+    L = rng.normal(size=(n, n))
+    if kind == 1:
+        L *= 10.0 ** rng.uniform(-8, 8, n)[:, None]
+    elif kind == 2:
+        L[: 1 + n // 2] = 0
+    elif kind == 3:
+        L = L @ np.diag(np.arange(n) > 0)
+    elif kind == 4:
+        L[-1] = L[0] * (1 + 10.0 ** rng.uniform(-16, -6))
+    M = L @ L.T
+    return M - 2 * np.diag(np.diag(M)) if kind == 5 else M * (kind != 6)
+
+
+def saddle_points(n: int, m: int) -> np.ndarray:
+    rng, rows = np.random.default_rng(n), []
+    for k in range(EACH):
+        w = 10.0 ** rng.uniform(-3, 3, n)
+        M, C = masses(rng, n, k % 7) / w[:, None] / w, constraints(rng, n, m, k // 7 % 5) / w
+        rows.append(np.concatenate([[rng.choice([SMOOTHED, 1e-3])], M[np.tril_indices(n)], C.ravel(), rng.uniform(0.1, 3, m), w,
+                                    rng.normal(size=n + m) * 10.0 ** rng.uniform(-5, 5)]))
+    return broken(rng, np.array(rows))
+
+
+def forces(n: int, m: int) -> np.ndarray:
+    rng, rows = np.random.default_rng(n), []
+    for k in range(EACH):
+        w = 10.0 ** rng.uniform(-3, 3, n)
+        C = constraints(rng, n, m, k % 5) / w
+        rows.append(np.concatenate([C.ravel(), rng.uniform(0.1, 3, m), w, rng.normal(size=n)]))
+    return broken(rng, np.array(rows))
+
+
+def cuts(order: int, n: int = INPUTS // 3 + 1) -> np.ndarray:
+    """Of cubes in any attitude, dry and sunk, along faces and edges, and what has no attitude; (n, 4)."""
+    rng = np.random.default_rng(order)
+    e = rng.normal(size=(n, 4)) * 10.0 ** rng.uniform(-3, 1, (n, 4))
+    e[:, 0] = rng.uniform(-0.7, 0.7, n) * np.abs(e[:, 1:]).sum(axis=1)
+    e[::4, 1:] = rng.choice([0.0, 1.0, -2.0, 1e-17, -1e-9, 1e-200], e[::4, 1:].shape)
+    e[::4, 0] = (rng.choice([-0.5, 0.0, 0.5], e[::4, 1:].shape) * e[::4, 1:]).sum(axis=1)
+    return broken(rng, e)
+
+
+def lines(seabed: int, n: int = INPUTS // 2) -> np.ndarray:
+    """Taut, slack, stiff and soft, with friction and without, and ends that no line has; (n, 4)."""
+    rng = np.random.default_rng(seabed)
+    x, z = rng.uniform(0, 1.2, n), rng.uniform(0, 1, n) * 10.0 ** rng.uniform(-3, 0, n)
+    x[::10], z[1::20] = 10.0 ** rng.uniform(-12, -6, len(x[::10])), -z[1::20]
+    e, friction = 10.0 ** rng.uniform(-9, 0, n), 10.0 ** rng.uniform(-6, 1, n)
+    e[::3], friction[::2], e[5::50], friction[7::70] = 0, 0, -1, -1
+    return broken(rng, np.column_stack([x, z, e, friction]))
+
+
+def broken(rng: np.random.Generator, rows: np.ndarray) -> np.ndarray:
+    """The rows, a few of them with what is no number or none at all."""
+    some = rng.choice(len(rows), len(rows) // 50, replace=False)
+    rows[some, rng.integers(0, rows.shape[1], len(some))] = rng.choice([np.nan, np.inf, -np.inf, 0.0, 1e200], len(some))
+    return rows
+
+
+# -- both texts
+
+
+Compiled = Callable[[Kernel, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def in_c(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
+    """kernel, rows of values (n, n_in) -> results (n, n_out), and where there are none."""
+    def run(kernel: Kernel, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        folder = tmp_path_factory.mktemp("c")
+        numbers = {"LOOSE": LOOSE, "MASSLESS": 1e-12, "ROUNDS": 5, "CLEANINGS": 2, "SMOOTHED": SMOOTHED}
+        sizes = kernel.sizes if len(kernel.sizes) == 2 else (1, 1)
+        for name in ("SADDLE", "MULTIPLIERS"):
+            numbers |= {f"{name}_N": sizes[0], f"{name}_M": sizes[1], f"{name}_ONE_SIZE": 0}
+        head = "".join(f"#define SYMDYN_{name} {value!r}\n" for name, value in numbers.items())
+        given = "".join(f"{size}, " for size in kernel.sizes)
+        (folder / "main.c").write_text(
+            f'{head}#define SYMDYN_LINKED static\n#include "{kernel.name}.h"\n'
+            f"void run(int n, const double *in, double *out, int *codes) {{\n"
+            f"    for (int k = 0; k < n; k++)\n"
+            f"        codes[k] = {kernel.name}({given}in + k * {values.shape[1]}, out + k * {kernel.n_out});\n}}\n")
+        command = [*require_compiler().command, "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", f"-I{RUNTIME}",
+                   "-o", folder / "main.so", folder / "main.c", "-lm"]
+        subprocess.run(command, check=True, capture_output=True)
+        out, codes = np.full((len(values), kernel.n_out), np.nan), np.zeros(len(values), dtype=np.intc)
+        library = ctypes.CDLL(str(Path(folder / "main.so")))
+        pointers = [np.ascontiguousarray(a).ctypes.data_as(ctypes.c_void_p) for a in (values, out, codes)]
+        library.run(len(values), *pointers)
+        return out, codes != 0
+
+    return run
+
+
+KERNELS: dict[str, tuple[Kernel, Callable[[], np.ndarray]]] = {
+    **{f"saddle {n} {m}": (Saddle((n, m), ""), lambda n=n, m=m: saddle_points(n, m)) for n, m in SIZES},
+    **{f"multipliers {n} {m}": (Multipliers((n, m), ""), lambda n=n, m=m: forces(n, m)) for n, m in SIZES},
+    **{f"cube {order}": (Cube((order,), ""), lambda order=order: cuts(order)) for order in (0, 1, 2)},
+    **{f"catenary {seabed}": (Catenary((seabed,), ""), lambda seabed=seabed: lines(seabed)) for seabed in (0, 1)},
+}
+
+
+@needs_c
+@pytest.mark.parametrize("name", KERNELS)
+def test_c_and_python_give_the_same_bits_and_reject_the_same(name: str, in_c: Compiled) -> None:
+    kernel, inputs = KERNELS[name]
+    values = inputs()
+    expected, rejected = in_c(kernel, values)
+    found = kernel.rows(values.T)
+    expected[rejected] = np.nan
+    np.testing.assert_array_equal(found, expected)
+    assert 0.3 < np.isfinite(found).all(axis=1).mean() < 1
+    for k in range(0, len(values), 97):  # state by state as all at once
+        np.testing.assert_array_equal(kernel.rows(values[k].tolist()), found[k])
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_generated_python_has_the_text_of_the_package(name: str) -> None:
+    """The same bits; what is rejected raises, and tells at which states."""
+    kernel, inputs = KERNELS[name]
+    values = inputs()[::3]
+    recorder = Recorder()
+    names = [f"v{k}" for k in range(values.shape[1])]
+    tape = Tape.of(recorder, solve=recorder.call(kernel, [recorder.leaf(n, INPUT) for n in names]))
+    groups = {group: names if group == "inputs" else [] for group in ("q", "u", "z", "ud", "inputs", "p")}
+    content = Content("kernels", "test", {"solve": tape}, {"solve": "solve"}, groups, {}, {}, {})
+    text, = render(content, "numpy", standalone=False, integrator=False).files.values()
+    module: dict[str, object] = {"__name__": "kernels"}
+    exec(text, module)
+    expected = kernel.rows(values.T)
+    rejected = np.isnan(expected).any(axis=1)
+    solve, failure = module[kernel.name], module["SingularError"]
+    assert callable(solve) and isinstance(failure, type) and issubclass(failure, ArithmeticError)
+    np.testing.assert_array_equal(np.array(solve(*kernel.sizes, list(values[~rejected].T), 1)).T, expected[~rejected])
+    if isinstance(kernel, Multipliers):  # there are always some, but of what is no number
+        assert not np.isfinite(np.array(solve(*kernel.sizes, list(values.T), 1)).T[rejected]).all(axis=1).any()
+        return
+    with pytest.raises(failure) as caught:
+        solve(*kernel.sizes, list(values.T), 1)
+    states = caught.value.states  # type: ignore[attr-defined]
+    assert states.any() and not states[~rejected].any()
+
+
+@pytest.mark.parametrize("name", [name for name in KERNELS if name.startswith(("saddle", "multipliers"))])
+def test_statements_are_those_of_the_text(name: str) -> None:
+    """Recorded on a tape, for bounds of rounding errors; e is divided by there by multiplying with its inverse."""
+    kernel, inputs = KERNELS[name]
+    values = inputs()[::35]  # the regular ones
+    recorder = Recorder()
+    names = [f"v{k}" for k in range(values.shape[1])]
+    leaves: list = [recorder.leaf(n, INPUT) for n in names]
+    if isinstance(kernel, Saddle):
+        values[:, 0] = leaves[0] = SMOOTHED
+    found = kernel.statements(recorder, leaves)
+    rows = evaluate_rows(Tape.of(recorder, solve=found), dict(zip(names, values.T, strict=True)), len(values))["solve"]
+    expected = kernel.rows(values.T)
+    regular = np.isfinite(expected).all(axis=1)
+    assert regular.mean() > 0.9
+    errors = np.abs(rows - expected)[regular].max(axis=1) / np.abs(expected[regular]).max(axis=1)
+    assert np.median(errors) < 1e-15 and errors.max() < 1e-9
