@@ -10,30 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.backend.metadata import Metadata
-from symdyn.backend.right_side import RightSide, key_of
+from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Source
 from symdyn.emission import emit, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.functions.tapes import all_columns_of
-from symdyn.runtime.building.compiler import plain, require_compiler
-from symdyn.runtime.building.library import Unit, loaded
+from symdyn.runtime.building.library import Unit
+from symdyn.runtime.building.texts import Texts
 
 
 class Libraries:
     """The libraries of a module, each made when it is first requested; pickled with the text of those that were made.
 
     again       derives the equations; None: only those that were made can be had elsewhere
-    equations   None where they were not needed so far
+    equations   None where they were not needed so far; texts: what was generated already
     """
 
     def __init__(self, again: Callable[[], Equations] | None, backend: str, templates: str | os.PathLike | None,
-                 specialize: Mapping[Any, float] | None, fallback: str, equations: Equations | None = None) -> None:
+                 specialize: Mapping[Any, float] | None, fallback: str, equations: Equations | None = None,
+                 texts: Texts | None = None) -> None:
         self.again, self.backend, self.templates, self.specialize, self.fallback = again, backend, templates, specialize, fallback
         self._equations = equations
-        self._made: dict[str, tuple[str, Metadata]] = {}
+        self.texts = texts or Texts(backend)
 
     @property
     def equations(self) -> Equations:
@@ -45,8 +45,7 @@ class Libraries:
         return self._equations
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback,
-                        {key: (text, metadata.as_plain()) for key, (text, metadata) in self._made.items()})
+        return Libraries, (self.again, self.backend, self.templates, self.specialize, self.fallback, None, self.texts)
 
     @cached_property
     def rhs(self) -> Source:
@@ -63,22 +62,10 @@ class Libraries:
 
     def __call__(self, what: str | RightSide) -> Unit:
         """The library for a right-hand side, or that holds a function."""
-        key = self._holder(what)
-        if key not in self._made:
+        if what not in self.texts:
             source = self.rhs if what == RightSide() else self._source(what)
-            self._made[key] = next(iter(source.files.values())), source.metadata
-        text, metadata = self._made[key]
-        compiler = require_compiler() if self.backend == "c" else None
-        if compiler is not None and isinstance(what, str) and groups.seldom_called(what):
-            compiler = plain(compiler)
-        return loaded(text, metadata, compiler)
-
-    def _holder(self, what: str | RightSide) -> str:
-        """The key of what was made with a function; other right-hand sides than the plain one have a "rhs" of their own."""
-        plain_side = key_of(RightSide())
-        with_it = (key for key, (_, metadata) in self._made.items()
-                   if what in metadata.shapes and (key == plain_side or not key.startswith("{")) and key != groups.BATCH)
-        return next(with_it, key_of(what)) if isinstance(what, str) else key_of(what)
+            self.texts.add(what, next(iter(source.files.values())), source.metadata)
+        return self.texts.load(what)
 
     def structure(self, name: str) -> np.ndarray | None:
         """Where a matrix of derivatives may differ from zero; None for other functions and for what has no columns."""
@@ -92,10 +79,3 @@ class Libraries:
         from symdyn.report.text import report
 
         return report(self.equations, self.backend, self.fallback)
-
-
-def _libraries(again: Callable[[], Equations] | None, backend: str, templates: Any, specialize: Any, fallback: str,
-           made: Mapping[str, tuple[str, Mapping[str, Any]]]) -> Libraries:
-    libraries = Libraries(again, backend, templates, specialize, fallback)
-    libraries._made = {key: (text, Metadata.of_plain(metadata)) for key, (text, metadata) in made.items()}
-    return libraries

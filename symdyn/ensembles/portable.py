@@ -1,4 +1,5 @@
-"""A module in a form that other processes and machines take: its names and the text that was generated for it."""
+"""A module in a form that other processes and machines take: its names and the text that was generated for it, and nothing that
+could be derived there."""
 
 from __future__ import annotations
 
@@ -9,11 +10,11 @@ import zlib
 from collections.abc import Sequence
 from typing import Any
 
-from symdyn.backend.metadata import Metadata, ModuleMetadata
-from symdyn.backend.right_side import RightSide, key_of
+from symdyn.backend.metadata import ModuleMetadata
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import SymdynError
-from symdyn.runtime.building.compiler import require_compiler
-from symdyn.runtime.building.library import Unit, loaded
+from symdyn.runtime.building.library import Unit
+from symdyn.runtime.building.texts import Texts
 from symdyn.runtime.module import Module
 
 
@@ -29,7 +30,7 @@ class PortableModule:
     """
 
     def __init__(self, module: Module, functions: Sequence[str]) -> None:
-        self._units: dict[str, dict[str, Any]] = {}
+        self._texts = Texts(module.backend)
         self._given = module
         self._functions = tuple(functions)
         self.module = Module(module.metadata, self._provide, module.backend, module.fallback)
@@ -37,23 +38,23 @@ class PortableModule:
 
     def _provide(self, what: str | RightSide) -> Unit:
         unit: Any = self._given.unit(what)
-        self._units[key_of(what)] = {"source": unit.source, "metadata": unit.metadata.as_plain()}
+        self._texts.add(what, unit.source, unit.metadata)
         return unit  # type: ignore[no-any-return]
 
     def key(self) -> str:
         """Changes with what is computed."""
         self.module.unit("rhs")
-        return hashlib.sha256(self._units[key_of(RightSide())]["source"].encode()).hexdigest()
+        return hashlib.sha256(self._texts.source(RightSide()).encode()).hexdigest()
 
     @functools.cached_property
     def _packed(self) -> bytes:
         for name in self._functions:
             self.module.unit(name)
-        record = {"metadata": self.module.metadata.as_plain(), "units": self._units}
+        record = {"metadata": self.module.metadata.as_plain(), "units": self._texts.as_plain()}
         return zlib.compress(json.dumps(record).encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unpacked, (self.module.backend, self._packed)
+        return _Arrived, (self.module.backend, self._packed)
 
 
 class _Arrived:
@@ -66,29 +67,20 @@ class _Arrived:
         self.module = _module(backend, packed)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unpacked, self._sent
-
-
-def _unpacked(backend: str, packed: bytes) -> _Arrived:
-    return _Arrived(backend, packed)
+        return _Arrived, self._sent
 
 
 @functools.lru_cache(maxsize=4)
 def _module(backend: str, packed: bytes) -> Module:
     """Loaded once in a process, however many chunks it computes."""
     record = json.loads(zlib.decompress(packed))
-    units = record["units"]
+    metadata, texts = ModuleMetadata.of_plain(record["metadata"]), Texts(backend, record["units"])
 
     def provide(what: str | RightSide) -> Unit:
-        there = key_of(what)
-        if there not in units and isinstance(what, str):
-            there = next((key for key, u in units.items() if what in u["metadata"]["shapes"]), there)
-        if there not in units:
+        if what not in texts:
             label = what if isinstance(what, str) else what.label
             raise NotSent(f"{metadata.name}: {label} was not sent along; it was not used by the samples that were tried in "
                           "advance. Name it in `functions`")
-        compiler = require_compiler() if backend == "c" else None
-        return loaded(units[there]["source"], Metadata.of_plain(units[there]["metadata"]), compiler)
+        return texts.load(what)
 
-    metadata = ModuleMetadata.of_plain(record["metadata"])
     return Module(metadata, provide, backend)

@@ -23,6 +23,7 @@ from symdyn.ensembles.axes import read_axis
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.samples import _permuted
 from symdyn.errors import ArgumentError, CompilerNotFound, EnsembleStopped
+from symdyn.runtime.building import texts
 from symdyn.runtime.building.recall import recall
 
 T = (0.0, 0.5)
@@ -533,7 +534,7 @@ def test_what_a_worker_lacks_is_no_fault_of_its_members(module, monkeypatch):
     def nothing():
         raise CompilerNotFound("there is no C compiler")
 
-    monkeypatch.setattr(portable, "require_compiler", nothing)
+    monkeypatch.setattr(texts, "require_compiler", nothing)
     portable._module.cache_clear()
     with pytest.raises(EnsembleStopped, match="tried 3 times: CompilerNotFound: there is no C compiler"):
         sd.ensemble(module, drawn(), T, ["max energy"], executor=Sending(1))

@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import symdyn
-from symdyn.backend.metadata import Metadata, ModuleMetadata
-from symdyn.backend.right_side import RightSide, key_of
+from symdyn.backend.metadata import ModuleMetadata
+from symdyn.backend.right_side import RightSide
 from symdyn.runtime.building import cache
-from symdyn.runtime.building.compiler import Compiler, find_compiler, no_compiler_reason, require_compiler
-from symdyn.runtime.building.library import Unit, loaded
+from symdyn.runtime.building.compiler import find_compiler, no_compiler_reason, require_compiler
+from symdyn.runtime.building.library import Unit
 from symdyn.runtime.building.stored import read_sealed, write_sealed
+from symdyn.runtime.building.texts import Texts
 from symdyn.runtime.module import Module
 
 
@@ -36,7 +37,7 @@ def recall(name: str, options: Mapping[str, Any], backend: str | None = None, fo
     """
     compiler = require_compiler() if backend == "c" else find_compiler() if backend is None else None
     chosen = backend or ("c" if compiler else "numpy")
-    memory = _Memory(name, options, chosen, compiler, formulation, coordinates)
+    memory = _Memory(name, options, chosen, formulation, coordinates)
     fallback = no_compiler_reason() if backend is None and compiler is None else ""
     return Module(memory.metadata, memory.unit, chosen, fallback, lambda folder: memory.derived.write(folder),
                   lambda: memory.derived.report())
@@ -45,16 +46,16 @@ def recall(name: str, options: Mapping[str, Any], backend: str | None = None, fo
 class _Memory:
     """The record of one system in one formulation with one backend."""
 
-    def __init__(self, name: str, options: Mapping[str, Any], backend: str, compiler: Compiler | None,
-                 formulation: str, coordinates: str) -> None:
-        self.name, self.options, self.backend, self.compiler = name, dict(options), backend, compiler
+    def __init__(self, name: str, options: Mapping[str, Any], backend: str, formulation: str, coordinates: str) -> None:
+        self.name, self.options, self.backend = name, dict(options), backend
         self.formulation, self.coordinates = formulation, coordinates
         about = name, sorted(self.options.items()), backend, formulation, coordinates
         own = hashlib.sha256(repr(about).encode()).hexdigest()[:16]
         self.path = cache.cache_dir() / f"{name}-{own}.json"
         self.state = _state_of_symdyn()
-        self.record = self._read() or {"state": self.state, "metadata": self.derived.metadata.as_plain(), "units": {}}
-        self.metadata = ModuleMetadata.of_plain(self.record["metadata"])
+        found = self._read()
+        self.metadata = ModuleMetadata.of_plain(found["metadata"]) if found else self.derived.metadata
+        self.texts = Texts(backend, found["units"] if found else None)
 
     @cached_property
     def derived(self) -> Module:
@@ -68,13 +69,12 @@ class _Memory:
 
     def unit(self, what: str | RightSide) -> Unit:
         """A unit from the record, else a derived one, which is put into it."""
-        units, key = self.record["units"], key_of(what)
-        if key in units:
-            return loaded(units[key]["source"], Metadata.of_plain(units[key]["metadata"]), self.compiler)
+        if what in self.texts:
+            return self.texts.load(what)
         unit: Any = self.derived.unit(what)
-        units[key] = {"source": unit.source, "metadata": unit.metadata.as_plain()}
+        self.texts.add(what, unit.source, unit.metadata)
         self._write()
-        return unit
+        return unit  # type: ignore[no-any-return]
 
     def _read(self) -> dict[str, Any] | None:
         try:
@@ -87,7 +87,8 @@ class _Memory:
     def _write(self) -> None:
         """Whoever reads sees a whole record; if the disk is full there is none, and the next run derives again."""
         with contextlib.suppress(OSError):
-            write_sealed(self.path, json.dumps(self.record).encode())
+            record = {"state": self.state, "metadata": self.metadata.as_plain(), "units": self.texts.as_plain()}
+            write_sealed(self.path, json.dumps(record).encode())
 
 
 def _state_of_symdyn() -> str:
