@@ -20,6 +20,7 @@ from symdyn.model.loop_check import CARRIER
 from symdyn.runtime.consistent import number
 from symdyn.shown import shown
 from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.kernels import RANK
 
 if TYPE_CHECKING:
     from symdyn.formulation.constraints.augmented import ConstrainedTree
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 
 STATES = 6
 SPREAD = 0.3
-# Of the largest residual that counts as fulfilled, and of singular values that count as zero.
-FULFILLED, RANK = 1e-10, 1e-8
+# A residual that counts as fulfilled.
+FULFILLED = 1e-10
 # States nearer than this are the same: where rank is lost they are not known any better.
 APART = 1e-4
 # Changes along motions, rad or parts of the length: half a turn.

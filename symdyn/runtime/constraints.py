@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symdyn.tape.kernels import RANK
 from symdyn.turning import turns
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Singular values of the scaled Jacobian below this part of the largest one count as zero.
-RANK_TOLERANCE = 1e-8
 # Residuals up to this part of the mechanism's length, and of its speed, are projected away; larger ones are a mistake.
 CONSISTENT = 1e-6
 
@@ -70,7 +69,7 @@ def scaled_jacobian(module: Module, t: Any, x: Any, params: Any) -> np.ndarray:
     return rows / as_velocities(module, params)
 
 
-def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
+def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK) -> np.ndarray:
     """Rank of the scaled Jacobian, (...)."""
     if not names(module):
         return np.zeros(np.shape(x)[:-1], dtype=int)
@@ -78,7 +77,7 @@ def rank(module: Module, t: Any, x: Any, params: Any, tolerance: float = RANK_TO
     return counted(values, tolerance).sum(axis=-1)
 
 
-def counted(values: np.ndarray, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
+def counted(values: np.ndarray, tolerance: float = RANK) -> np.ndarray:
     """Which singular values (..., k), the largest first, are not zero; a Jacobian that vanishes as a whole has none."""
     result: np.ndarray = values > tolerance * np.maximum(values[..., :1], 1)
     return result

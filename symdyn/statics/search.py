@@ -18,7 +18,8 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.runtime.constraints import turning
 from symdyn.statics.selection import Selection
-from symdyn.statics.terms import RANK, Place
+from symdyn.statics.terms import Place
+from symdyn.tape.kernels import RANK
 
 # Angles change by at most this in one step, rad.
 LARGEST_TURN = 0.5

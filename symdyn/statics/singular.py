@@ -17,11 +17,10 @@ from symdyn.runtime.constraints import names, scaled_jacobian, turning
 from symdyn.statics.manifold import held_indices, natural_scales
 from symdyn.statics.selection import Selection
 from symdyn.statics.terms import Place
+from symdyn.tape.kernels import RANK
 
 # Positions nearby are so far away, in rad or lengths of the mechanism; so many are tried.
 AWAY, TRIES = 0.03, 4
-# Singular values below this part of the largest, or of 1, are zero.
-RANK = 1e-8
 
 
 def singular_configuration(place: Place, selection: Selection) -> str:

@@ -17,12 +17,11 @@ from symdyn.arguments import fixed
 from symdyn.backend.metadata import ModuleMetadata
 from symdyn.runtime.constraints import names as constraint_names
 from symdyn.runtime.inputs.following import RATES
+from symdyn.tape.kernels import RANK
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-# Singular values below this part of the largest count as zero where ranks of constraints are computed.
-RANK = 1e-8
 
 
 @dataclass(frozen=True, eq=False)

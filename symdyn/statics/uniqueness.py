@@ -15,7 +15,8 @@ from symdyn.statics.noise import ENTRIES, EPSILON, SAFETY, SAMPLES, rounded
 from symdyn.statics.search import Search, Trial
 from symdyn.statics.sensitivity import second
 from symdyn.statics.spectrum import ZERO
-from symdyn.statics.terms import RANK, Place, coordinate_names, multiplier, null_space
+from symdyn.statics.terms import Place, coordinate_names, multiplier, null_space
+from symdyn.tape.kernels import RANK
 
 # Where parameters or inputs are solved for, less than this part of the largest stiffness, scaled, counts as none.
 LEAST = 1e-9

@@ -24,6 +24,9 @@ from symdyn.tape.algorithms.saddle import (
 )
 from symdyn.tape.algorithms.states import symdyn_stacked
 
+# Singular values of constraints, scaled to rows of about 1, that are below this part of the largest are zero, wherever a rank is
+# looked for.
+RANK = 1e-8
 # Singular values of the scaled constraints below this count less and less, in accelerations and in multipliers ...
 SMOOTHED = 1e-5
 # ... and in corrections, which would else be as large as a tiny error divided by a tiny singular value.

@@ -17,6 +17,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.shown import name_of
 from symdyn.tape.differentiate import forward, jacobian
 from symdyn.tape.evaluate import evaluate
+from symdyn.tape.kernels import RANK
 from symdyn.tape.tape import Tape
 from symdyn.verification.sample import Sample
 
@@ -24,8 +25,6 @@ from symdyn.verification.sample import Sample
 SPREADS = (0.3, 1.0, 2.0)
 # Newton steps that take 12 digits to all.
 STEPS = 5
-# Singular values below this part of the largest count as zero.
-RANK_TOLERANCE = 1e-8
 
 
 def samples(equations: Equations, states: int, digits: int, params: Mapping[Any, float] | None, seed: int) -> list[Sample]:
@@ -149,7 +148,7 @@ def _independent(J: np.ndarray) -> list[int]:
     A = J.astype(float)
     size = np.linalg.norm(A, axis=1, keepdims=True)
     A = A / np.where(size > 0, size, 1.0)
-    rank = int((np.linalg.svd(A, compute_uv=False) > RANK_TOLERANCE).sum())
+    rank = int((np.linalg.svd(A, compute_uv=False) > RANK).sum())
     return sorted(int(k) for k in qr(A.T, pivoting=True, mode="r")[1][:rank])
 
 

@@ -17,14 +17,13 @@ from symdyn.formulation.equations import Equations
 from symdyn.formulation.printed.augmented import AugmentedEquations
 from symdyn.formulation.probes.dependent_rows import Ranks
 from symdyn.formulation.probes.rank import first_dependent
+from symdyn.tape.kernels import MASSLESS
 from symdyn.tape.node import is_zero
 from symdyn.tape.tape import Tape
 
 Q = TypeVar("Q", bound=Constrained)
 Rows = tuple[int, ...]
 Pivots = tuple[tuple[int, int], ...]
-# Mass in a direction that the constraints leave, by the largest: below this there is none.
-MASSLESS = 1e-12
 # Orders of elimination that are compared, each the best at one state.
 CANDIDATES = 8
 

@@ -11,9 +11,8 @@ import numpy as np
 from symdyn.formulation.constraints.consistent_states import FULFILLED, ConstraintStates
 from symdyn.formulation.equations import Equations
 from symdyn.tape.floats import evaluate_rows
+from symdyn.tape.kernels import RANK
 
-# Singular values of the scaled Jacobian below this part of the largest count as zero.
-RANK_TOLERANCE = 1e-8
 # Walks of so many steps, each of this part of the mechanism's length (or, of a turning speed, about so many rad).
 WALKS, STEPS, STRIDE = 6, 12, 0.25
 # Starts that are tried, the initial state and others up to 1 m or 1 rad away.
@@ -80,7 +79,7 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     places = np.concatenate([q, *walked(states, q, stream)])
     samples = scaled(states, places)
     sizes = np.linalg.svd(samples, compute_uv=False)
-    counts = (sizes > RANK_TOLERANCE * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
+    counts = (sizes > RANK * np.maximum(sizes[:, :1], 1e-300)).sum(axis=1)
     rank = int(counts.max(initial=0))
     samples = samples[counts == rank]
     mass = _mass(equations, states, np.concatenate([places, consistent]))
@@ -139,7 +138,7 @@ def scaled_of(states: ConstraintStates, found: dict[str, np.ndarray]) -> np.ndar
 
 def _along(A: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Directions (s, n_u) without what the rows of A (s, m, n_u) hold."""
-    held = np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ (A @ direction[..., None])
+    held = np.linalg.pinv(A, rcond=RANK) @ (A @ direction[..., None])
     return direction - held[..., 0]  # type: ignore[no-any-return]
 
 
