@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import symdyn
@@ -29,12 +29,12 @@ def upward() -> set[str]:
     return set(re.findall(r"^- `([\w/.]+)`", _section("Who may import whom"), re.MULTILINE))
 
 
-def files() -> Iterator[tuple[str, str, ast.Module]]:
+@functools.cache
+def files() -> list[tuple[str, str, ast.Module]]:
     """Path in the package, name of the first level, syntax tree."""
-    for path in sorted(PACKAGE.rglob("*.py")):
-        inside = path.relative_to(PACKAGE)
-        if inside.parts[0] not in ("__init__.py", "__main__.py"):
-            yield inside.as_posix(), inside.parts[0].removesuffix(".py"), ast.parse(path.read_text(encoding="utf-8"))
+    paths = [(path, path.relative_to(PACKAGE)) for path in sorted(PACKAGE.rglob("*.py"))]
+    return [(inside.as_posix(), inside.parts[0].removesuffix(".py"), ast.parse(path.read_text(encoding="utf-8")))
+            for path, inside in paths if inside.parts[0] not in ("__init__.py", "__main__.py")]
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -88,3 +88,10 @@ def test_only_the_command_line_runs_the_laboratory() -> None:
     outside = [f"{path} imports symdyn.{name}" for path, own, tree in files() if own not in ("lab", "cli")
                for node in ast.walk(tree) for name in imported(node) if name == "lab"]
     assert not outside
+
+
+def test_the_recursions_of_the_lecture_are_no_source_of_code() -> None:
+    """They print pages, and verification compares the lean ones with them."""
+    readers = {path for path, _, tree in files() for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+               and (node.module or "").startswith("symdyn.formulation.textbook") and "formulation/textbook" not in path}
+    assert readers == {"formulation/trees/recursive.py"}

@@ -91,6 +91,7 @@ CHECKS: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
     ("M_tilde is positive definite", holds.positive_definite, 0.0),
     ("M_tilde u_dot + k_tilde = F_tilde", holds.equations_hold, 1e-20),
     ("inverse dynamics of the accelerations gives zero", holds.inverse_of_forward, 1e-20),
+    ("recursions in spatial vectors, as pages of links show them, give the same", holds.pages_of_links, 1e-20),
     ("rate of energy equals power of the loads", holds.energy_balance, 1e-20),
     ("kinetic energy is quadratic in u with M_tilde", holds.kinetic_energy_quadratic, 1e-20),
     ("J u is the rate of the positions and rotations", holds.jacobian_of_positions, 1e-15),

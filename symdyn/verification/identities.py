@@ -64,6 +64,19 @@ def inverse_of_forward(s: Sample) -> float | None:
     return max(residual, other)
 
 
+def pages_of_links(s: Sample) -> float | None:
+    """Inverse dynamics at given accelerations, and accelerations, by the recursions that pages of links show, in spatial vectors,
+    against those that code is made from."""
+    if not s.has("page_inverse_dynamics"):
+        return None
+    given = s.at({f"{u.name}_dot": mpmath.sin(3 * k + 1) for k, u in enumerate(s.equations.symbols.speeds)})
+    wanted = given["inverse_dynamics"]
+    residual = relative(given["page_inverse_dynamics"] - wanted, np.concatenate([wanted, s["F_tilde"], s["k_tilde"]]))
+    if not s.has("page_accelerations"):
+        return residual
+    return max(residual, relative(s["page_accelerations"] - s["accelerations"], s["accelerations"]))
+
+
 def energy_balance(s: Sample) -> float | None:
     if not s.has("energy", "power"):
         return None

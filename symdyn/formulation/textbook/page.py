@@ -18,7 +18,7 @@ from symdyn.formulation.textbook.forward_dynamics import ForwardDynamics, forwar
 from symdyn.formulation.textbook.inverse_dynamics import InverseDynamics, inverse_dynamics
 from symdyn.formulation.textbook.momentum import Momentum, momentum
 from symdyn.formulation.textbook.own_speeds import own_speeds
-from symdyn.formulation.textbook.velocities import joint_accelerations
+from symdyn.formulation.textbook.velocities import generalized, joint_accelerations
 from symdyn.formulation.trees.tree import Tree
 from symdyn.spatial.vectors import vector
 
@@ -37,6 +37,8 @@ class Page:
     v_G_k, a_G_k, f_G_k   (6,) in the frame at the centre of mass; f_G the resultant on the link, weight counted as in a
 
     Of all: coriolis (n_u, n_u), gravity_load (n_u,), momentum and momentum_G (6,), center_of_mass (3,); see their modules.
+    page_inverse_dynamics and page_accelerations (n_u,): what these recursions give for inverse_dynamics and accelerations, which
+    code is made from; they are compared in symdyn.verification.
     `notes` tells what the mechanism does not have, and why.
     """
 
@@ -92,6 +94,10 @@ class Page:
         own: dict[str, Callable[[], Any]] = {
             "gravity_load": lambda: gravity_load(self.tree).load, "momentum": lambda: self.momenta.h_0,
             "momentum_G": lambda: self.momenta.h_G, "center_of_mass": lambda: self.momenta.center}
+        if not self.loads.implicit:
+            own["page_inverse_dynamics"] = lambda: generalized(self.tree, self.inverse.tau - self.applied.joint)
+            if self.propagates:
+                own["page_accelerations"] = lambda: self.forward.u_dot
         if not self.given:
             own["coriolis"] = lambda: self.of_coriolis.C
         return {**named, **own}

@@ -16,7 +16,7 @@ from symdyn.formulation.textbook.forward_dynamics import forward_dynamics
 from symdyn.formulation.textbook.inverse_dynamics import inverse_dynamics
 from symdyn.formulation.textbook.momentum import momentum
 from symdyn.formulation.textbook.page import Page
-from symdyn.formulation.textbook.velocities import joint_accelerations
+from symdyn.formulation.textbook.velocities import generalized, joint_accelerations
 from symdyn.formulation.trees.tree import build
 from symdyn.spatial.sixvectors import force_cross
 from symdyn.tape import Recorder, Tape
@@ -50,6 +50,7 @@ def test_floats_give_what_the_tape_gives_with_30_digits(seed: int, options: dict
     inverse = inverse_dynamics(here.tree, joint_accelerations(here.tree, u_dot), wrenches=here.applied.wrenches)
     expected: dict[str, Any] = {"gravity_load": gravity_load(here.tree).load, "momentum": momentum(here.tree).h_0,
                                 "momentum_G": momentum(here.tree).h_G, "center_of_mass": momentum(here.tree).center}
+    expected["page_inverse_dynamics"] = generalized(here.tree, inverse.tau - here.applied.joint)
     for k, link in enumerate(here.tree.links):
         center = at_center(link.inertia, inverse.velocities.v[k], inverse.a[k], inverse.f_B[k])
         expected |= {f"{letter}_{k + 1}": getattr(inverse.velocities, letter)[k]
@@ -59,6 +60,7 @@ def test_floats_give_what_the_tape_gives_with_30_digits(seed: int, options: dict
     if "gears" not in options:
         forward = forward_dynamics(here.tree, here.applied.joint, here.applied.wrenches)
         expected |= {f"{letter}_{k + 1}": getattr(forward, letter)[k] for letter in ("I_A", "p_A") for k in range(len(forward.a))}
+        expected["page_accelerations"] = forward.u_dot
     if "driven" not in options:
         expected["coriolis"] = coriolis(here.tree).C
     assert set(expected) == set(found)
