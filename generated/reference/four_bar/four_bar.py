@@ -145,25 +145,26 @@ def symdyn_diagonal(A):
 
 
 def symdyn_factorize(xp, A):
-    """A = L D L^T by the lower triangle, L below the diagonal and D on it, and whether a pivot is not positive; what is no
-    number passes, and so do infinite entries, which become that."""
-    entries, A = symdyn_diagonal(A), A.copy()
+    """L, its columns below the diagonal, and D of A = L D L^T by the lower triangle, and whether a pivot is not positive; what
+    is no number passes, and so do infinite entries, which become that."""
+    entries, A, L = symdyn_diagonal(A), A.copy(), []
+    D = A[:, 0].copy()
     for j in range(len(A)):
-        v = A[j, :j] * symdyn_diagonal(A[:j])
-        A[j:, j] = symdyn_less(xp, A[j:, j], np.swapaxes(A[j:, :j], 0, 1) * v[:, None])
-        A[j, j] = A[j, j] + 0 * entries[j]
-        A[j + 1:, j] = xp.divide(A[j + 1:, j], A[j, j])
-    return A, xp.logical_or.reduce(xp.less_equal(symdyn_diagonal(A), 0))
+        column = symdyn_less(xp, A[j:, j], np.swapaxes(A[j:, :j], 0, 1) * (A[j, :j] * D[:j])[:, None])
+        D[j] = column[0] + 0 * entries[j]
+        A[j + 1:, j] = xp.divide(column[1:], D[j])
+        L.append(A[j + 1:, j].copy())
+    return (L, D), xp.logical_or.reduce(xp.less_equal(D, 0))
 
 
-def symdyn_substitute(xp, A, right):
+def symdyn_substitute(xp, factors, right):
     """A^-1 right by these factors, (n,)."""
-    x = right.copy()
-    for k in range(len(x)):
-        x[k + 1:] = x[k + 1:] - A[k + 1:, k] * x[k]
-    x = xp.divide(x, symdyn_diagonal(A))
-    for i in reversed(range(len(x) - 1)):
-        x[i:i + 1] = symdyn_less(xp, x[i:i + 1], (A[i + 1:, i] * x[i + 1:])[:, None])
+    (L, D), x = factors, right.copy()
+    for k, column in enumerate(L):
+        x[k + 1:] -= column * x[k]
+    x = xp.divide(x, D)
+    for i in range(len(x) - 2, -1, -1):
+        x[i] = xp.subtract.reduce(np.concatenate([x[i:i + 1], L[i] * x[i + 1:]]), axis=0)
     return x
 
 
@@ -193,12 +194,12 @@ def symdyn_saddle_point(xp, n, m, values, least):
     f, d = columns * f, rows * d
     A = M + a * symdyn_less(xp, np.zeros_like(M), -(C[:, :, None] * C[:, None, :]))
     loose = False if least is None else symdyn_loose(A, least)
-    A, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
+    factors, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
     x, lam = np.zeros_like(f), np.zeros_like(d)
     for _ in range(SYMDYN_ROUNDS):
         gap = a * symdyn_less(xp, d, Ct * x[:, None]) - lam
         r = symdyn_less(xp, symdyn_less(xp, f, M * x[:, None]), -(C * gap[:, None]))
-        x = x + symdyn_substitute(xp, A, r)
+        x = x + symdyn_substitute(xp, factors, r)
         lam = lam - a * symdyn_less(xp, d, Ct * x[:, None])
     return columns * x, xp.logical_or(loose, failed)
 
@@ -211,15 +212,15 @@ def symdyn_least_multipliers(xp, n, m, values, e):
     Ct, g, smoothed = np.swapaxes(C, 0, 1), columns * g, e * e
     start = np.zeros((m, m, *values.shape[1:]), dtype=C.dtype)
     start[np.arange(m), np.arange(m)] = smoothed
-    A, failed = symdyn_factorize(xp, symdyn_less(xp, start, -(Ct[:, :, None] * Ct[:, None, :])))
+    factors, failed = symdyn_factorize(xp, symdyn_less(xp, start, -(Ct[:, :, None] * Ct[:, None, :])))
     lam = np.zeros_like(rows)
     for _ in range(SYMDYN_ROUNDS):
         rest = symdyn_less(xp, g, C * lam[:, None])
-        lam = lam + symdyn_substitute(xp, A, symdyn_less(xp, np.zeros_like(lam), -(Ct * rest[:, None])))
+        lam = lam + symdyn_substitute(xp, factors, symdyn_less(xp, np.zeros_like(lam), -(Ct * rest[:, None])))
     for _ in range(SYMDYN_CLEANINGS):
         rest = lam  # what rounding has left outside the range of C, when all else has vanished
         for _ in range(SYMDYN_ROUNDS):
-            rest = symdyn_substitute(xp, A, smoothed * rest)
+            rest = symdyn_substitute(xp, factors, smoothed * rest)
         lam = lam - rest
     return rows * lam, failed
 
