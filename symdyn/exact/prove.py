@@ -19,6 +19,8 @@ from sympy.core.function import AppliedUndef
 
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.exact.common import without_common_steps
+from symdyn.exact.ideal import Ideal
+from symdyn.exact.manifold import States, nonzero_parameters, relations_of
 from symdyn.exact.ring import BOUND, TooLarge
 from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.taken import recorded, value_unknown
@@ -44,6 +46,8 @@ DECIMAL = "decimal numbers are the binary fractions next to them, with which the
 # Axes of decimal numbers are divided by their length at sixty digits; that their squares add up to one is true up to this. Their
 # denominators are between these, those of products of them are longer.
 UNIT, LONG = Fraction(1, 10**50), (10**50, 10**70)
+ON = "on the relations"
+CONTRADICTING = "the relations contradict each other: nothing fulfils them, and anything would follow"
 DIRECTIONS = "for axes of decimal numbers, divided by their length exactly"
 # Terms that a product may have where what both sides share is replaced: where that suffices, normal forms are short.
 SHARED = 20_000
@@ -84,31 +88,40 @@ class Proof:
         return str(self)
 
 
-def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0) -> Proof:
+def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
+          on: Scalar | Matrix | Equations | sp.Eq | Sequence[Scalar | sp.Eq] | None = None) -> Proof:
     """Whether two expressions or matrices of SymPy are equal, for real values of their symbols, where both are defined.
 
     a, b   expressions, numbers, or matrices of one shape; b = 0 stands for a matrix of zeros too
+    on     relations that hold: expressions that are zero, equations (sp.Eq), lists of these; or the equations of a mechanism,
+           whose constraints hold with their rates, no parameter being zero
     Numbers are taken exactly: 0.1 is the double next to 1/10, which is not 1/10. Derivatives are taken; integrals are letters,
     with which nothing is refuted. A function without a value, such as f(x), stands for any function; dynamicsymbols stand for
-    coordinates of their name where a side holds such. Raises ArgumentError for what is neither expression nor matrix, and for
-    matrices of different shapes.
+    coordinates of their name where a side holds such. On relations a claim is proved by multiples of them that add up to the
+    difference of the sides, symbols assumed not to be zero being divisors, and refuted at a state that fulfils them. Raises
+    ArgumentError for what is neither expression nor matrix, for matrices of different shapes, and for what is no relation.
 
     >>> import sympy as sp, symdyn as sd
     >>> x, y = sp.symbols("x y")
     >>> sd.prove(sp.sin(x)*sp.cos(y) + sp.cos(x)*sp.sin(y), sp.sin(x + y))
     proved
+    >>> sd.prove(x**4 + x**2*y**2, x**2, on=x**2 + y**2 - 1)
+    proved: on the relations
     """
     left, right, columns = _entries(a, b)
-    if any(isinstance(s, Timed) for e in (*left, *right) for s in symbols_of(e)):
-        left, right = list(map(take_over, left)), list(map(take_over, right))
+    relations = [] if on is None else relations_of(on, [*left, *right])
+    if any(isinstance(s, Timed) for e in (*left, *right, *relations) for s in symbols_of(e)):
+        left, right, relations = (list(map(take_over, side)) for side in (left, right, relations))
     try:
-        nodes, symbols = recorded(map(_with_known_angles, [*left, *right]), _same_functions([*left, *right]))
+        entries = [*left, *right, *relations]
+        nodes, symbols = recorded(map(_with_known_angles, entries), _same_functions(entries))
     except (UnsupportedExpression, ZeroDivisionError) as error:
         return Proof(False, reason=str(error))
     n = len(left)
     recorder = _recorder(nodes)
     pairs = [(x if isinstance(x, Node) else recorder.add(x, 0), y) for x, y in zip(nodes[:n], nodes[n:])]
-    proof = decide(recorder, pairs, symbols, columns=columns)
+    proof = decide(recorder, pairs, symbols, columns=columns, relations=[e for e in nodes[2 * n:] if isinstance(e, Node)],
+                   nonzero=nonzero_parameters(on))
     if not proof.refuted:
         return proof
     letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
@@ -220,12 +233,15 @@ def _without_relations(exact: Exact) -> str:
 
 
 def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mapping[Node, sp.Expr], columns: int = 0,
-           unit_vectors: Sequence[Sequence[Node]] = (), bound: int = BOUND) -> Proof:
+           unit_vectors: Sequence[Sequence[Node]] = (), bound: int = BOUND, relations: Sequence[Node] = (),
+           nonzero: Collection[sp.Expr] = ()) -> Proof:
     """Whether both nodes of every pair have equal values.
 
     columns        of the matrix that the pairs are the entries of, row by row; 0: scalars
     unit_vectors   groups of leaves whose squares add up to one
     bound          terms that a product may have
+    relations      nodes that are zero where the claim is made; nonzero: symbols in them that are not zero, beside those that are
+                   assumed to be so
     """
     def index(k: int) -> tuple[int, ...] | None:
         return None if not columns else (k,) if columns == 1 else divmod(k, columns)
@@ -235,10 +251,17 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     reason = ""
     try:
         differences = [recorder.sub(x, y) for x, y in pairs]
-        exact = Exact(differences, bound, unit_vectors, not_negative(symbols), of_calls=True)
-        doubtful = [k for k, value in enumerate(exact.values) if len(value.num)]
+        exact = Exact([*differences, *relations], bound, unit_vectors, not_negative(symbols), of_calls=True)
+        doubtful = [k for k, value in enumerate(exact.values[:len(pairs)]) if len(value.num)]
         if not doubtful:
             return Proof(True)
+        if relations:
+            ideal = _ideal(exact, exact.values[len(pairs):], symbols, nonzero)
+            if ideal.contains(exact.ring.one.num):
+                return Proof(False, reason=CONTRADICTING)
+            doubtful = [k for k in doubtful if not ideal.contains(exact.values[k].num)]
+            if not doubtful:
+                return Proof(True, reason=ON)
         if _proved_for_directions([differences[k] for k in doubtful], bound, unit_vectors, symbols):
             return Proof(True, reason=DIRECTIONS)
         reason = "the normal forms differ, at no state that was tried do the values"
@@ -251,7 +274,11 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
     except ZeroDivisionError as error:
         return Proof(False, reason=str(error))
     decimal = any(isinstance(a, Fraction) and printed_as_decimal(a) for node in reachable(differences) for a in node.args)
-    k, state = _different(recorder, pairs, doubtful, unit_vectors, ROUNDED if decimal else SAME, symbols)
+    k, state = _different(recorder, pairs, doubtful, unit_vectors, ROUNDED if decimal else SAME, symbols, relations,
+                          nonzero)
+    if k is None and relations and not state:
+        return Proof(False, reason="no state was found that fulfils the relations, and no multiples of them add up to the "
+                                   "difference of the sides")
     if k is None and decimal and exact is not None:
         return Proof(False, reason=f"the sides differ by no more than the rounding of decimal numbers, {ROUNDED:g} of their size")
     if k is None:
@@ -261,6 +288,13 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         return Proof(False, True, "the values differ", index(k), where)
     difference = Writer(exact, symbols).write(exact.values[k])
     return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _ideal(exact: Exact, relations: Sequence[Any], symbols: Mapping[Node, sp.Expr], nonzero: Collection[sp.Expr]) -> Ideal:
+    """The multiples of values that are zero."""
+    divisors = [k for k, leaf in exact.leaves.items()
+                if leaf in symbols and (symbols[leaf].is_nonzero or symbols[leaf] in nonzero)]
+    return Ideal(exact.ring, [value.num for value in relations], divisors)
 
 
 def _proved_apart(pairs: Sequence[tuple[Any, Any]], differences: Sequence[Any], bound: int,
@@ -309,15 +343,23 @@ def rounded_directions(entries: Sequence[Any]) -> list[tuple[Fraction, ...]]:
 
 def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: Sequence[int],
                unit_vectors: Sequence[Sequence[Node]], same: float, symbols: Mapping[Node, sp.Expr],
-               ) -> tuple[int | None, dict[Node, Any]]:
-    """A pair whose values differ, and the values of the leaves there."""
+               relations: Sequence[Node] = (), nonzero: Collection[sp.Expr] = ()) -> tuple[int | None, dict[Node, Any]]:
+    """A pair whose values differ, and the values of the leaves there; without such a pair the values that were tried last."""
     taken = range(len(pairs)) if same != SAME else doubtful
-    tape = Tape.of(recorder, left=[pairs[k][0] for k in taken], right=[pairs[k][1] for k in taken])
+    tape = Tape.of(recorder, left=[pairs[k][0] for k in taken], right=[pairs[k][1] for k in taken], zero=list(relations))
+    on = States(recorder, relations, symbols, nonzero) if relations else None
     draw = random.Random(1)
+    tried: dict[Node, Any] = {}
     for attempt in range(STATES):
         # Positive numbers first: roots and logarithms of them are real.
         least = 0.2 if attempt % 2 == 0 else -2.0
         values = drawn_state(draw, tape.inputs, least, symbols, unit_vectors)
+        if on is not None:
+            reached = on.near(values, 2 * DIGITS)
+            if reached is None:
+                continue
+            values = reached
+        tried = values
         found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
@@ -330,7 +372,7 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
             for place, difference in apart:
                 if abs(again["left"][place] - again["right"][place]) > REMAINDER * difference:
                     return taken[place], values
-    return None, {}
+    return None, tried
 
 
 def drawn_state(draw: random.Random, leaves: Sequence[Node], least: float, symbols: Mapping[Node, sp.Expr],

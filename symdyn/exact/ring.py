@@ -79,6 +79,11 @@ class Ring:
 
     # -- polynomials
 
+    @property
+    def relations(self) -> list[Any]:
+        """Polynomials that are zero: r^2 - a of roots, s^2 + c^2 - 1 of sines and cosines."""
+        return [relation for _, relation in (*self._roots, *self._relations)]
+
     def reduced(self, p: Any) -> Any:
         """The normal form."""
         if len(p) == 0:

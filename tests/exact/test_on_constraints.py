@@ -1,0 +1,118 @@
+"""Claims and shortest forms on relations: constraints of mechanisms, and expressions that are zero."""
+
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError
+from symdyn.exact.ideal import Ideal
+from symdyn.exact.taken import recorded
+from symdyn.exact.walk import Exact
+
+x, y = sp.symbols("x y", real=True)
+l = sp.Symbol("l", positive=True)
+s, c = sp.sin, sp.cos
+
+
+@pytest.fixture(scope="module")
+def four_bar():
+    eq = sd.systems.get("four_bar").augmented()
+    lengths = {p.name: p for p in eq.symbols.parameters}
+    return eq, eq.symbols.coordinates, eq.symbols.speeds, [lengths[name] for name in ("l1", "l2", "l3", "d")]
+
+
+@pytest.mark.parametrize(("a", "b", "on"), [
+    (x**4 + x**2 * y**2, x**2, x**2 + y**2 - 1),
+    (x, 0, x**2),
+    (c(x) ** 2, c(y) ** 2, [sp.Eq(s(x), s(y))]),
+    (s(x), -s(y), l * (s(x) + s(y))),
+    (sp.Matrix([x * y, y**2]), sp.Matrix([1, y**2]), sp.Matrix([x * y - 1])),
+    (x + sp.sqrt(y), 2 * x, [x**2 - y, sp.sqrt(y) - x]),
+])
+def test_proved_on_relations(a, b, on):
+    assert not sd.prove(a, b)
+    assert str(sd.prove(a, b, on=on)) == "proved: on the relations"
+
+
+@pytest.mark.parametrize(("a", "on"), [(x - y, x**2 + y**2 - 1), (c(x) - c(y), s(x) - s(y)), (x, [x**2 - l**2])])
+def test_refuted_at_a_state_that_fulfils_the_relations(a, on):
+    proof = sd.prove(a, on=on)
+    assert proof.refuted and abs(a.subs(proof.state)) > 1e-6
+    assert all(abs(e.subs(proof.state)) < 1e-12 for e in (on if isinstance(on, list) else [on]))
+
+
+def test_proved_without_the_relations_says_so():
+    assert str(sd.prove(s(x) ** 2 + c(x) ** 2, 1, on=x - y)) == "proved"
+
+
+@pytest.mark.parametrize(("on", "reason"), [
+    ([x, x - 1], "undecided: the relations contradict each other: nothing fulfils them, and anything would follow"),
+    (x**2 + y**2 + 1, "undecided: no state was found that fulfils the relations, and no multiples of them add up to the "
+                      "difference of the sides"),
+])
+def test_relations_that_nothing_fulfils_prove_nothing(on, reason):
+    assert str(sd.prove(x, y, on=on)) == reason
+
+
+def test_closed_loop_of_four_bars(four_bar):
+    eq, (q1, q2, q3), (u1, u2, u3), (l1, l2, l3, d) = four_bar
+    # Freudenstein, Approximate synthesis of four-bar linkages, Trans. ASME 77 (1955): the coupler is as long as it is.
+    coupler = (d - l1 * c(q1) - l3 * c(q1 + q2 + q3)) ** 2 + (l1 * s(q1) + l3 * s(q1 + q2 + q3)) ** 2
+    assert sd.prove(coupler, l2**2, on=eq) and sd.prove(coupler, l2**2, on=list(eq.C)) and not sd.prove(coupler, l2**2)
+    wrong = sd.prove(coupler, l1**2, on=eq)
+    assert wrong.refuted and max(abs(e.subs(wrong.state)) for e in eq.C) < 1e-12
+    # Ratios of the angular velocities hold with the rates of the constraints, not with their positions alone.
+    ratio = u1 + u2, -l1 * u1 * s(q2 + q3) / (l2 * s(q3))
+    assert sd.prove(*ratio, on=eq) and sd.prove(*ratio, on=[eq.C, eq.explicit("C_dot")])
+    assert sd.prove(*ratio, on=eq.C).refuted
+    a1, a2, a3 = (u.dot for u in (u1, u2, u3))
+    rate = (a1 * l1 * s(q2) - (a1 + a2 + a3) * l3 * s(q3), (u1 + u2 + u3) * l3 * u3 * c(q3) - l1 * u1 * u2 * c(q2))
+    assert sd.prove(*rate, on=eq) and sd.prove(rate[0], 2 * rate[1], on=eq).refuted
+
+
+def test_parameters_of_a_mechanism_are_not_zero_in_its_constraints():
+    eq = sd.systems.get("slider_crank").augmented()
+    theta, phi = eq.symbols.coordinates
+    assert sd.prove(c(theta) ** 2, c(phi + theta) ** 2, on=eq)
+    assert sd.prove(c(theta) ** 2, c(phi + theta) ** 2, on=eq.C).refuted
+    assert sd.prove(c(theta), c(phi + theta), on=eq).refuted
+
+
+def test_euler_parameters_have_unit_norm_on_constraints():
+    p = sd.coordinates("p0:4")
+    system = sd.System("ball", gravity=[0, 0, -9.81])
+    body = system.add_body("ball", mass=1, inertia=[1, 1, 2])
+    system.add_joint(sd.Spherical("tip", system.ground, body, coordinates=list(p), orientation=sd.EulerParameters()))
+    system.add_constraint(sd.rotation_matrix(body)[0, 2])
+    eq = system.augmented()
+    assert sd.prove(sum(e**2 for e in p), 1, on=eq) and sd.prove(p[1] * p[3], -p[0] * p[2], on=eq)
+    # The body's z-axis stays in a plane: a component of its angular velocity follows.
+    assert sd.prove((eq.C_r * sp.Matrix(eq.symbols.speeds))[0], 0, on=eq)
+
+
+def test_limits_keep_what_was_found():
+    """A basis that is cut short proves less, and nothing wrong."""
+    nodes, _ = recorded([x * (x * y - 1), x * y - 1, x + y])
+    exact = Exact(nodes)
+    ideal = Ideal(exact.ring, [exact.values[1].num])
+    assert ideal.contains(exact.values[0].num) and not ideal.contains(exact.values[2].num)
+    assert not Ideal(exact.ring, []).contains(exact.values[0].num)
+
+
+@pytest.mark.parametrize(("on", "message"), [
+    ("x", "on takes expressions that are zero, equations and lists of these, or equations of a mechanism with constraints; "
+          "found 'x'"),
+    (True, "found True"),
+    (sp.zoo, "found zoo"),
+    (3, "on takes expressions that are zero somewhere; 3 is not"),
+    ([x, sp.Integer(1)], "on takes expressions that are zero somewhere; 1 is not"),
+])
+def test_what_is_no_relation_is_refused(on, message):
+    with pytest.raises(ArgumentError) as error:
+        sd.prove(x, y, on=on)
+    assert message in str(error.value)
+
+
+def test_equations_without_constraints_are_refused():
+    with pytest.raises(ArgumentError, match=r"two_link_arm \(embedding\) has no constraints that a claim could hold on"):
+        sd.prove(x, y, on=sd.systems.two_link_arm().embedding())
