@@ -20,7 +20,7 @@ from symdyn.formulation.algebra import given_by_time
 from symdyn.formulation.equations import Equations
 from symdyn.spatial.vectors import inner
 from symdyn.tape.differentiate import forward
-from symdyn.tape.node import ACCELERATION, is_zero
+from symdyn.tape.node import ACCELERATION, SEED, is_zero
 from symdyn.tape.tape import reachable
 
 # Terms that a product may have in a proof: what is larger is left to verify().
@@ -28,6 +28,8 @@ BOUND = 100_000
 
 # The same in proofs that verify() tries before it evaluates states.
 QUICK = 10_000
+# Accelerations of more speeds are quotients of longer polynomials than these.
+SPEEDS = 6
 
 # Pairs that are equal, and the columns of the matrix that they are the entries of (0: scalars, 1: a vector).
 Pairs = tuple[list[tuple[Any, Any]], int]
@@ -130,11 +132,16 @@ class _Subject:
         return len(self.q) == len(self.u) and all(a is b for a, b in zip(self["rates"].ravel(), self.u))
 
     @property
-    def driven(self) -> bool:
-        """Whether something moves without speeds."""
-        moved = forward(self.recorder, self["positions"].ravel().tolist(), given_by_time(self.equations.leaves)) \
+    def moved(self) -> bool:
+        """Whether a body moves without speeds."""
+        rates = forward(self.recorder, self["positions"].ravel().tolist(), given_by_time(self.equations.leaves)) \
             if self.has("positions") else []
-        return not all(map(is_zero, [*moved, *(self["C_t"] if self.has("C_t") else [])]))
+        return not all(map(is_zero, rates))
+
+    @property
+    def driven(self) -> bool:
+        """Whether something moves without speeds, a body or a constraint."""
+        return self.moved or not all(map(is_zero, self["C_t"] if self.has("C_t") else []))
 
 
 def _symmetric(s: _Subject) -> Pairs | None:
@@ -179,6 +186,37 @@ def _energy(s: _Subject) -> Pairs | None:
         return None
     rate: Any = sum(s.rate(s["energy"].ravel()))
     return [(rate, s["power"].ravel()[0] + inner(np.array(s.u, dtype=object), s["inverse_dynamics"]))], 0
+
+
+def _energy_on_constraints(s: _Subject) -> Pairs | None:
+    """On C_dot = 0 and M_tilde u_dot + k_tilde + C_r^T lam = F_tilde, for any multipliers: the rate less the power is the sum of
+    u_k times the k-th equation less lam_i times the i-th rate, which vanish there."""
+    if not s.has("energy", "power", "rates", "inverse_dynamics", "C_r", "C_t", "C_dot", "lam") or not s.equations.constraints:
+        return None
+    if s.moved or s.equations.implicit_loads:
+        return None
+    lam = np.array([s.recorder.leaf(f"lam{k + 1}", SEED) for k in range(len(s.equations.constraints))], dtype=object)
+    rate: Any = sum(s.rate(s["energy"].ravel()))
+    # The power holds that of moving constraints with the multipliers of the motion that the loads make.
+    power = s["power"].ravel()[0] + (inner(lam - s["lam"], s["C_t"]) if s.driven else 0)
+    left = inner(np.array(s.u, dtype=object), s["inverse_dynamics"] + s["C_r"].T @ lam) - inner(lam, s["C_dot"])
+    return [(rate, power + left)], 0
+
+
+def _solved(s: _Subject) -> Pairs | None:
+    """What the accelerations are solved from."""
+    if not s.has("M_tilde", "k_tilde", "F_tilde", "accelerations") or s.equations.implicit_loads or len(s.u) > SPEEDS:
+        return None
+    left = s["M_tilde"] @ s["accelerations"] + s["k_tilde"]
+    if s.equations.constraints:
+        left = left + s["C_r"].T @ s["lam"]
+    return list(zip(left, s["F_tilde"])), 1
+
+
+def _constraints_fulfilled(s: _Subject) -> Pairs | None:
+    if not s.has("C_r", "F_d", "accelerations") or not s.equations.constraints or len(s.u) > SPEEDS:
+        return None
+    return list(zip(s["C_r"] @ s["accelerations"], s["F_d"])), 1
 
 
 def _jacobian(s: _Subject) -> Pairs | None:
@@ -248,7 +286,7 @@ def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
     units = [[equations.leaves[p] for p in group] for group in equations.unit_groups]
     positive = not_negative(equations.printed_leaves())
     proved = set()
-    for name, pairs_of in CLAIMS:
+    for name, pairs_of in (*CLAIMS, *SOLUTIONS):
         try:
             found = pairs_of(subject) if name in names else None
             if found is not None and zero(equations.recorder, found[0], QUICK, units, positive):
@@ -258,6 +296,7 @@ def proved_quickly(equations: Equations, names: Collection[str]) -> set[str]:
     return proved
 
 
+POWER = "rate of energy is the power of loads and moving constraints, on C_dot = 0 with multipliers"
 CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
     ("M_tilde is symmetric", _symmetric),
     ("M_tilde is the second derivative of the kinetic energy by the speeds", _hessian),
@@ -265,6 +304,7 @@ CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
     ("the bias of the recursion is k_tilde - F_tilde", _bias),
     ("Lagrange: d/dt dT/du - dT/dq is M_tilde u_dot + k_tilde", _lagrange),
     ("rate of energy is the power of the loads", _energy),
+    (POWER, _energy_on_constraints),
     ("J u is the rate of positions and rotations", _jacobian),
     ("Coriolis matrix times u is k_tilde", _coriolis),
     ("rate of M_tilde less twice the Coriolis matrix is skew", _skew),
@@ -272,4 +312,10 @@ CLAIMS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
     ("C_dot is C_r u + C_t", _constraint_parts),
     ("C_r is the derivative of C_dot by the speeds", _constraint_jacobian),
     ("C_r u_dot - F_d is the rate of C_dot", _constraint_accelerations),
+)
+
+# Quotients of determinants, which are short for few speeds.
+SOLUTIONS: tuple[tuple[str, Callable[[_Subject], Pairs | None]], ...] = (
+    ("the accelerations solve the equations of motion", _solved),
+    ("the accelerations fulfil C_r u_dot = F_d", _constraints_fulfilled),
 )

@@ -1,11 +1,14 @@
 """Claims and shortest forms on relations: constraints of mechanisms, and expressions that are zero."""
 
+import dataclasses
+
 import pytest
 import sympy as sp
 
 import symdyn as sd
 from symdyn.errors import ArgumentError
 from symdyn.exact.ideal import Ideal
+from symdyn.exact.mechanism import POWER
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Exact
 
@@ -116,3 +119,19 @@ def test_what_is_no_relation_is_refused(on, message):
 def test_equations_without_constraints_are_refused():
     with pytest.raises(ArgumentError, match=r"two_link_arm \(embedding\) has no constraints that a claim could hold on"):
         sd.prove(x, y, on=sd.systems.two_link_arm().embedding())
+
+
+def test_energy_of_constrained_mechanisms_with_multipliers():
+    for name in ("four_bar", "particle_on_moving_slope", "rolling_disc"):
+        proofs = sd.systems.get(name).augmented().prove()
+        claim = next(claim for claim in proofs.claims if claim.name.endswith("on C_dot = 0 with multipliers"))
+        assert claim.proof.proved and proofs.proved
+
+
+def test_a_mistake_in_the_rates_of_constraints_spoils_the_power_of_multipliers():
+    eq = sd.systems.get("four_bar").augmented()
+    rates = eq.quantity("C_dot").copy()
+    rates[0] = rates[0] * 2
+    spoilt = dataclasses.replace(eq, _recorded={**eq._recorded, "C_dot": rates}, _printed={})
+    verdicts = {claim.name: claim.proof.verdict for claim in spoilt.prove().claims}
+    assert verdicts[POWER] == "refuted"
