@@ -20,8 +20,8 @@ from symdyn.errors import SymdynError
 
 # Terms that a product may have; so many take about a gigabyte with forty generators.
 BOUND = 2_000_000
-# All products of one set of values may have so many times as many.
-ALL = 20
+# All products of one set of values may have so many times as many; all values together, which are kept, so many times.
+ALL, KEPT = 20, 2
 # Denominators with more terms than this are not split into factors.
 FACTORED = 400
 # Trial divisions of longer numerators are left out.
@@ -56,7 +56,7 @@ class Ring:
         self.sines = sines
         self.squares: dict[int, Any] = {}
         self._relations = [(s, self.generators[s] ** 2 + self.generators[c] ** 2 - 1) for s, c in sines]
-        self._work = 0
+        self._work = self._kept = 0
         self._roots: list[tuple[int, Any]] = []
         self.factors: list[Any] = []
         self._known: dict[str, int] = {}
@@ -105,7 +105,14 @@ class Ring:
         self._work += len(a) * len(b)
         if self._work > ALL * self.bound:
             raise TooLarge(f"products have more than {ALL * self.bound:,} terms together")
-        return self.reduced(a * b)
+        return self._formed(self.reduced(a * b))
+
+    def _formed(self, p: Any) -> Any:
+        """A polynomial that is kept."""
+        self._kept += len(p)
+        if self._kept > KEPT * self.bound:
+            raise TooLarge(f"values have more than {KEPT * self.bound:,} terms together")
+        return p
 
     def _check(self, terms: int) -> None:
         if terms > self.bound:
@@ -116,7 +123,7 @@ class Ring:
     def add(self, a: Value, b: Value) -> Value:
         """a + b."""
         if a.under == b.under:
-            return self._short(a.num + b.num, a.under)
+            return self._short(self._formed(a.num + b.num), a.under)
         powers = dict(a.under)
         for k, n in b.under:
             powers[k] = max(n, powers.get(k, 0))

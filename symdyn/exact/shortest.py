@@ -17,6 +17,8 @@ import sympy as sp
 
 from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.exact.arrange import Arranger, Letter, Polynomial, Sum, Tree, total
+from symdyn.exact.ideal import Ideal
+from symdyn.exact.reduce import relations_in_letters, shortened
 from symdyn.exact.represent import Basis, Letters, better_basis, contracted, divided, fourier, plain, with_tangents
 from symdyn.exact.ring import BOUND, TooLarge, Value
 from symdyn.exact.taken import recorded
@@ -46,9 +48,10 @@ class Writer:
     """Writes values of one Exact.
 
     symbols   leaf -> the user's symbol; leaves without one keep their names
+    zeros     numerators that vanish, by which the shortest form is made shorter
     """
 
-    def __init__(self, exact: Exact, symbols: Mapping[Node, sp.Expr], form: str = "shortest") -> None:
+    def __init__(self, exact: Exact, symbols: Mapping[Node, sp.Expr], form: str = "shortest", zeros: Sequence[Any] = ()) -> None:
         self.exact, self.symbols, self.form = exact, symbols, form
         self._expressions: dict[int, sp.Expr] = {}
         self._angles: dict[tuple[int, ...], sp.Expr] = {}
@@ -64,6 +67,7 @@ class Writer:
         if n > 1 and longest is not None and form == "shortest":
             other = better_basis(exact, self.letters, longest)
             self.bases += [other] if other else []
+        self._zeros = relations_in_letters(zeros, self.bases, self.letters) if zeros else []
 
     # -- letters
 
@@ -221,6 +225,7 @@ class Writer:
                     found += [series, contracted(series, letters)]
                 if len(base) <= SHORT:
                     found.append(contracted(base, letters))
+        found += [shortened(p, self._zeros) for p in found if self._zeros]
         if value.under:
             found = [self._over(p, value) for p in found]
             found += self._parts(value)
@@ -310,22 +315,28 @@ def _times(coefficient: Any, parts: list[sp.Expr]) -> sp.Expr:
 
 
 def written(entries: Sequence[Any], symbols: Mapping[Node, sp.Expr], form: str = "shortest", bound: int | None = None,
-            unit_vectors: Sequence[Sequence[Node]] = ()) -> list[sp.Expr]:
-    """Entries (nodes and numbers) in SymPy, each in the form asked for; unit_vectors: leaves whose squares add up to one.
+            unit_vectors: Sequence[Sequence[Node]] = (), zeros: Sequence[Any] = ()) -> list[sp.Expr]:
+    """Entries (nodes and numbers) in SymPy, each in the form asked for; unit_vectors: leaves whose squares add up to one;
+    zeros: entries that vanish where the forms are to hold.
 
     Raises SymdynError for an unknown form, TooLarge beyond the bound on terms, UnsupportedExpression for what has no explicit
     form."""
     if form not in FORMS:
         raise SymdynError(f"the form {shown(form)} was asked for; there are {', '.join(FORMS)}")
-    exact = Exact(entries, BOUND if bound is None else bound, unit_vectors, positive=not_negative(symbols))
+    exact = Exact([*entries, *zeros], BOUND if bound is None else bound, unit_vectors, positive=not_negative(symbols))
+    vanishing = [value.num for value in exact.values[len(entries):]]
+    ideal = Ideal(exact.ring, vanishing) if zeros else None
+    del exact.values[len(entries):]
     terms = sum(len(value.num) for value in exact.values)
     if terms > TERMS:
         raise TooLarge(f"it has {terms:,} terms, above the bound of {TERMS:,} for printing")
-    writer = Writer(exact, symbols, form)
+    writer = Writer(exact, symbols, form, vanishing)
     sizes = written_out(entries) if form == "shortest" else {}
     known: dict[str, sp.Expr] = {}
     result = []
     for entry, value in zip(entries, exact.values):
+        if ideal is not None and ideal.contains(value.num):
+            value = exact.ring.zero
         key = exact.ring.key(value)
         if key not in known:
             opposite = known.get(exact.ring.key(exact.ring.neg(value)))
@@ -348,13 +359,36 @@ def shortest(value: Any, form: str = "shortest") -> Any:
     return sp.Matrix(*value.shape, result) if isinstance(value, sp.MatrixBase) else result[0]
 
 
-def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "shortest") -> Any:
-    """An output of a tape as explicit SymPy: a scalar expression, or a matrix (column for a vector). Raises as `written`."""
-    entries = written(output.entries, symbols, form)
+def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "shortest", zeros: Sequence[Any] = ()) -> Any:
+    """An output of a tape as explicit SymPy: a scalar expression, or a matrix (column for a vector); zeros: entries that vanish
+    where it is to hold. Raises as `written`."""
+    entries = written(output.entries, symbols, form, zeros=zeros)
     if output.shape == ():
         return entries[0]
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
     return sp.Matrix(rows, columns, entries)
+
+
+def apart(output: Output, symbols: Mapping[Node, sp.Expr], zeros: Sequence[Any] = ()) -> Any:
+    """An output as `explicit` gives it, entry by entry, those of few operations first, until the bounds on terms are reached;
+    from there on as derived."""
+    sizes = written_out(output.entries)
+    found: list[Any] = [None] * len(output.entries)
+    left = TERMS
+    for k in sorted(range(len(found)), key=lambda k: sizes.get(output.entries[k], 0)):
+        entry = output.entries[k]
+        try:
+            terms = sum(len(value.num) for value in Exact([entry], positive=not_negative(symbols)).values)
+            if terms > left:
+                raise TooLarge(f"it has {terms:,} terms")
+            found[k], = written([entry], symbols, zeros=zeros)
+            left -= terms
+        except (TooLarge, ZeroDivisionError):
+            found[k] = expand(Output.of("entry", entry), symbols)
+    if output.shape == ():
+        return found[0]
+    rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)
+    return sp.Matrix(rows, columns, found)
 
 
 def not_negative(symbols: Mapping[Node, sp.Expr]) -> set[Node]:

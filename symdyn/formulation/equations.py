@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -20,8 +19,6 @@ from symdyn.tape.recorder import Recorder
 from symdyn.tape.sympy_bridge import expand
 from symdyn.tape.tape import Tape
 
-# Seconds for an explicit form where less, or nothing, is left for its simplification.
-_EXPANDED = 1.0
 # A quantity of more operations is not written out where it is too large for exact algebra.
 _UNREADABLE = 50_000
 
@@ -161,7 +158,8 @@ class Equations:
         """
         return Tape.of(self.recorder, **{name: self.quantity(name) for name in names})
 
-    def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: bool = False) -> Any:
+    def explicit(self, name: str, simplify: bool = True, form: str = "shortest", intermediates: bool = False,
+                 on_constraints: bool = False) -> Any:
         """The quantity as explicit SymPy in its shortest form, by exact algebra (symdyn.exact).
 
         simplify   False: as it was derived, in any time that this takes
@@ -169,50 +167,62 @@ class Equations:
                    cosines of sums of angles; "factored"; "speeds", "parameters", "angles": gathered by these; "nested"
         intermediates   True: the quantity in named intermediates, and the list of these: (symbol, expression, meaning, unit),
                    constants of the mechanism first, then sines and cosines, then what stands in several places
-        What is too large for exact algebra is simplified as far as the time limit `simplify_seconds` allows. Raises SymdynError
-        for an unknown form, for one that is too large, for a quantity that is too large to be read, and if the quantity is so
-        long that the time is over before it is multiplied into one expression; ArgumentError for a form of what has none.
+        on_constraints  True: made shorter by C = 0 and its rate; it equals the quantity where these hold
+        What is too large for exact algebra as a whole is written entry by entry, those that are too large alone as they were
+        derived; nothing depends on time. Raises SymdynError for an unknown form, for one that is too large, and for a quantity
+        that is too large to be read; ArgumentError for a form of what has none, and for constraints where there are none.
 
         >>> equations = sd.systems.pendulum().embedding()
         >>> equations.explicit("k_tilde", form="polynomial")
         Matrix([[0]])
         """
         text(name, "the name of a quantity", "M_tilde")
-        if text(form, "the form", "fourier") != "shortest" and (intermediates or not simplify):
-            raise ArgumentError(f"{self.name}: the form {form!r} of {name} was asked for, together with "
-                                f"{'intermediates=True' if intermediates else 'simplify=False'}; take one of them")
-        if flag(intermediates, "intermediates"):
+        flag(intermediates, "intermediates"), flag(simplify, "simplify"), flag(on_constraints, "on_constraints")
+        asked = [what for what, wanted in (("intermediates=True", intermediates), ("simplify=False", not simplify),
+                                           ("on_constraints=True", on_constraints)) if wanted]
+        if text(form, "the form", "fourier") != "shortest" and asked:
+            raise ArgumentError(f"{self.name}: the form {form!r} of {name} was asked for, together with {asked[0]}; take one "
+                                "of them")
+        if on_constraints and len(asked) > 1:
+            raise ArgumentError(f"{self.name}: {name} was asked for on the constraints, together with {asked[0]}; take one of "
+                                "them")
+        if intermediates:
             return self._in_intermediates(name)
-        if not flag(simplify, "simplify"):
+        if not simplify:
             return expand(self.tape(name).outputs[name], self.printed_leaves())
-        key = (name, form)
+        key = (name, "on constraints" if on_constraints else form)
         if key not in self._printed:
             from symdyn.exact.ring import TooLarge
-            from symdyn.exact.shortest import explicit, written_out
-            from symdyn.report.limit import TimeUp, within
+            from symdyn.exact.shortest import apart, explicit, written_out
 
             output = self.tape(name).outputs[name]
-            limit = max(self.simplify_seconds, _EXPANDED)
-            begin = clock.monotonic()
+            zeros = self._vanishing() if on_constraints else ()
             try:
-                self._printed[key] = within(limit, lambda: explicit(output, self.printed_leaves(), form))
-            except (TooLarge, TimeUp, ZeroDivisionError) as error:
+                self._printed[key] = explicit(output, self.printed_leaves(), form, zeros)
+            except (TooLarge, ZeroDivisionError) as error:
                 if form != "shortest":
-                    reason = f"{error}" if isinstance(error, TooLarge) else f"it takes more than {limit:g} s"
-                    raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {reason}; print its steps "
+                    raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {error}; print its steps "
                                       f"with latex({name!r}, intermediates=True), or as derived with explicit({name!r}, "
                                       "simplify=False)") from None
                 sizes = written_out(output.entries)
                 operations = sum(sizes.get(e, 0) for e in output.entries if isinstance(e, Node))
-                if isinstance(error, TooLarge) and operations > _UNREADABLE:
+                if operations > _UNREADABLE:
                     raise SymdynError(
                         f"{self.name}: {name} is too large to be read: {error}, and {operations:,} operations as it was derived; "
                         f"ask for named intermediates with explicit({name!r}, intermediates=True), print its steps with "
                         f"latex({name!r}, intermediates=True), evaluate it with lambdify({name!r}), or take it as derived with "
                         f"explicit({name!r}, simplify=False)") from None
-                left = self.simplify_seconds - (clock.monotonic() - begin)
-                self._printed[key] = self._simplified(name, limit, left)
+                self._printed[key] = apart(output, self.printed_leaves(), zeros)
         return self._printed[key]
+
+    def _vanishing(self) -> list[Any]:
+        """What is zero where the constraints hold: C, its rate, the norm of Euler parameters less one."""
+        if not self.constraints:
+            raise ArgumentError(f"{self.name} ({self.formulation}) has no constraints that a quantity could be written on; leave "
+                                "out on_constraints")
+        units = [sum((self.leaves[p] * self.leaves[p] for p in group), -1) for group in self.unit_groups]
+        positions = [e for e, holonomic in zip(self.quantity("C"), self.holonomic, strict=True) if holonomic]
+        return [e for e in (*positions, *self.quantity("C_dot"), *units) if isinstance(e, Node)]
 
     def _in_intermediates(self, name: str) -> Any:
         """The quantity in named intermediates, and these."""
@@ -235,23 +245,6 @@ class Equations:
         if self.identification is None or "base_parameters" not in self.quantities:
             return {}
         return dict(zip(self.identification.base.names, self.quantity("base_parameters").tolist(), strict=True))
-
-    def _simplified(self, name: str, limit: float, left: float) -> Any:
-        """By SymPy's methods, within the seconds that are left; the expression itself within a limit."""
-        from symdyn.report.limit import TimeUp, within
-        from symdyn.report.simplify import simplified
-
-        output = self.tape(name).outputs[name]
-        begin = clock.monotonic()
-        try:
-            value = within(limit, lambda: expand(output, self.printed_leaves()))
-        except TimeUp:
-            raise SymdynError(
-                f"{self.name}: {name} has {len(self.tape(name).steps)} steps and is no explicit expression within "
-                f"{limit:g} s; print its steps with latex({name!r}, intermediates=True), "
-                f"evaluate it with lambdify({name!r}), or wait for it without a limit with explicit({name!r}, "
-                "simplify=False)") from None
-        return simplified(value, left - (clock.monotonic() - begin))
 
     def latex(self, name: str, shorthand: bool = False, intermediates: bool = False, width: int = 80,
               simplify: bool = True) -> Typeset:

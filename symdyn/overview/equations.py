@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from symdyn.comparison.typeset import mathml
@@ -16,8 +16,8 @@ USUAL, OF_CONSTRAINTS = ("M_tilde", "k_tilde", "F_tilde"), ("C", "C_r", "F_d")
 # Operations written out up to which a quantity is simplified and shown whole; operations of its tape up to which it is shown
 # step by step.
 WHOLE, BY_STEPS = 500, 1000
-# s a quantity is simplified for at most; letters in a line.
-SIMPLIFY, WIDTH = 2.0, 100
+# Letters in a line.
+WIDTH = 100
 # Lines of a quantity from which on its entries are folded away.
 MANY = 25
 # 0.09999999999999998 is read better as 0.1.
@@ -85,10 +85,9 @@ def symbols(equations: Equations) -> list[dict[str, Any]]:
 
 def quantities(equations: Equations) -> list[Quantity]:
     """The matrices of the equations of motion, with constraints also theirs."""
-    quick = replace(equations, simplify_seconds=min(SIMPLIFY, equations.simplify_seconds))
     typeset = typesetter()
     names = (*USUAL, *OF_CONSTRAINTS * bool(equations.constraints))
-    return [_quantity(quick, name, typeset) for name in names if name in equations.quantities]
+    return [_quantity(equations, name, typeset) for name in names if name in equations.quantities]
 
 
 def _quantity(equations: Equations, name: str, typeset: Callable[[str], str]) -> Quantity:

@@ -1,7 +1,8 @@
-"""Simplification for printing only, within a time limit; nothing on the way to numbers goes through here.
+"""Simplification for printing only; nothing on the way to numbers goes through here.
 
-Exact algebra writes an expression in its shortest form (symdyn.exact). What is too large for it, or has functions that it does
-not know, is searched by SymPy's methods.
+Exact algebra writes an expression in its shortest form (symdyn.exact), within bounds on terms and not on time, so that the form
+is the same on every machine. What is too large for it, or has functions that it does not know, is searched by SymPy's methods
+within a time limit.
 """
 
 from __future__ import annotations
@@ -28,21 +29,17 @@ _LONGEST = 4000
 
 
 def simplified(value: Any, seconds: float) -> Any:
-    """An expression or a matrix, entry by entry, as simple as it gets before the time is up; short entries first.
+    """An expression or a matrix, entry by entry, in its shortest form; short entries first.
 
-    Every entry is equal to the one given; entries whose turn comes after the limit stay as they are, and the entry at whose turn
-    the time is up is as simple as it was then.
+    Every entry is equal to the one given. Those that exact algebra does not write are as simple as SymPy's methods make them
+    before the time is up.
     """
     deadline = clock.monotonic() + seconds
     if not isinstance(value, sp.MatrixBase):
         return _entry(value, deadline)
     known: dict[sp.Expr, sp.Expr] = {}
     result = value.copy().as_mutable()
-    try:
-        order = within(seconds, lambda: sorted(range(len(value)), key=lambda k: sp.count_ops(value[k])))
-    except TimeUp:
-        return result
-    for k in order:
+    for k in sorted(range(len(value)), key=lambda k: sp.count_ops(value[k])):
         e = value[k]
         if e not in known:
             opposite = known.get(-e)
@@ -60,8 +57,8 @@ def shown_zero(e: sp.Expr) -> bool:
 def _entry(e: sp.Expr, deadline: float) -> sp.Expr:
     """The shortest form, or the shortest of what each method makes of the best so far."""
     try:
-        return within(deadline - clock.monotonic(), partial(shortest, e))
-    except (TimeUp, TooLarge, UnsupportedExpression, ZeroDivisionError):
+        return shortest(e)
+    except (TooLarge, UnsupportedExpression, ZeroDivisionError):
         return _searched(e, deadline)
 
 

@@ -115,8 +115,8 @@ CONSTRAINED: tuple[tuple[str, Callable[[Sample], float | None], float], ...] = (
 
 
 # Claims of symdyn.exact.mechanism that together imply a check.
-_SOLVED, _FULFILLED, _NEWTON_EULER = ("the accelerations solve the equations of motion", "the accelerations fulfil C_r u_dot = F_d",
-                                      "Newton-Euler: inverse dynamics is M_tilde u_dot + k_tilde - F_tilde")
+_SOLVED, _FULFILLED = "the accelerations solve the equations of motion", "the accelerations fulfil C_r u_dot = F_d"
+_NEWTON_EULER = "Newton-Euler: inverse dynamics is M_tilde u_dot + k_tilde - F_tilde"
 PROVED_BY: Mapping[Callable[[Sample], float | None], tuple[str, ...]] = {
     holds.symmetric: ("M_tilde is symmetric",),
     holds.equations_hold: (_SOLVED,),

@@ -135,3 +135,43 @@ def test_a_mistake_in_the_rates_of_constraints_spoils_the_power_of_multipliers()
     spoilt = dataclasses.replace(eq, _recorded={**eq._recorded, "C_dot": rates}, _printed={})
     verdicts = {claim.name: claim.proof.verdict for claim in spoilt.prove().claims}
     assert verdicts[POWER] == "refuted"
+
+
+# -- forms that hold on the constraints
+
+
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "spatial_slider_crank", "skate"])
+def test_forms_on_the_constraints_are_shorter_and_proved(name):
+    eq = sd.systems.get(name).augmented()
+    shorter = 0
+    for quantity in ("M_tilde", "k_tilde", "C_r", "F_d", "T"):
+        plain, short = eq.explicit(quantity), eq.explicit(quantity, on_constraints=True)
+        assert sp.count_ops(short) <= sp.count_ops(plain) and sd.prove(plain, short, on=eq)
+        shorter += sp.count_ops(short) < sp.count_ops(plain)
+    assert shorter >= 1
+
+
+def test_constraints_vanish_on_themselves(four_bar):
+    eq, (q1, q2, q3), _, (l1, l2, l3, d) = four_bar
+    assert eq.explicit("C", on_constraints=True).is_zero_matrix and not eq.C.is_zero_matrix
+    assert eq.explicit("C_r", on_constraints=True) == sp.Matrix([
+        [0, l1 * s(q1), -l3 * s(q1 + q2 + q3)], [d, l2 * c(q1 + q2) + l3 * c(q1 + q2 + q3), l3 * c(q1 + q2 + q3)]])
+
+
+def test_slider_crank_on_its_constraint():
+    eq = sd.systems.get("slider_crank").augmented()
+    l, m = (next(p for p in eq.symbols.parameters if p.name == name) for name in "lm")
+    theta, phi = eq.symbols.coordinates
+    assert eq.explicit("k_tilde", on_constraints=True) == sp.Matrix([0, l**2 * m * theta.dot**2 * s(phi) / 2])
+
+
+def test_what_cannot_be_written_on_constraints_is_refused(four_bar):
+    eq = four_bar[0]
+    with pytest.raises(ArgumentError, match="has no constraints that a quantity could be written on; leave out on_constraints"):
+        sd.systems.two_link_arm().embedding().explicit("k_tilde", on_constraints=True)
+    with pytest.raises(ArgumentError, match="the form 'fourier' of C_r was asked for, together with on_constraints=True"):
+        eq.explicit("C_r", form="fourier", on_constraints=True)
+    with pytest.raises(ArgumentError, match="C_r was asked for on the constraints, together with intermediates=True"):
+        eq.explicit("C_r", intermediates=True, on_constraints=True)
+    with pytest.raises(ArgumentError, match="on_constraints"):
+        eq.explicit("C_r", on_constraints="yes")

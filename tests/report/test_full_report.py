@@ -88,7 +88,6 @@ def text(written: tuple[Path, list[str]]) -> str:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of text alone."""
-    monkeypatch.setattr(full_equations, "SIMPLIFY", 0.05)
     monkeypatch.setattr(full, "stress", lambda subject, short: StressReport())
     monkeypatch.setattr(full, "_show_condition", lambda part, subject: part.shown.update(
         found=SimpleNamespace(told=(), places=(), near=False), curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
@@ -204,7 +203,6 @@ def test_long_quantities_are_shown_by_steps_or_counted(monkeypatch: pytest.Monke
     count, shared = full_equations.written_out(equations, "M_tilde"), equations.tape("M_tilde").operations
     assert count > shared
     monkeypatch.setattr(full_equations, "WHOLE", 50)
-    monkeypatch.setattr(full_equations, "SIMPLIFY", 0.01)
     steps = full_equations.quantities(equations)[0]
     assert steps.name == "M_tilde" and steps.steps > 3 and f"{count} operations written out, {shared} in steps" in steps.note
     assert all("<math" in line.math for line in steps.lines) and steps.shown == len(steps.lines)
