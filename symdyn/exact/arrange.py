@@ -16,9 +16,8 @@ from fractions import Fraction
 from math import gcd, lcm
 from typing import Any
 
-from flint import fmpq_mpoly_ctx
+from flint import fmpz_mpoly_ctx
 
-from symdyn.exact.ring import fraction
 from symdyn.tape.sympy_bridge import printed_as_decimal
 
 Monomial = tuple[tuple[int, int], ...]
@@ -49,7 +48,7 @@ class Letter:
     below: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Sum:
     """Two or more terms."""
 
@@ -57,7 +56,7 @@ class Sum:
     cost: Cost
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Product:
     """number * factors."""
 
@@ -84,9 +83,12 @@ class _Parts(dict[Monomial, tuple[Monomial, Monomial]]):
         self.letters, self.kinds = letters, kinds
 
     def __missing__(self, m: Monomial) -> tuple[Monomial, Monomial]:
-        own = tuple([item for item in m if self.letters[item[0]].kind in self.kinds])
-        self[m] = own, tuple([item for item in m if item not in own])
-        return self[m]
+        own: list[tuple[int, int]] = []
+        rest: list[tuple[int, int]] = []
+        for item in m:
+            (own if self.letters[item[0]].kind in self.kinds else rest).append(item)
+        parts = self[m] = tuple(own), tuple(rest)
+        return parts
 
 
 class Arranger:
@@ -105,14 +107,19 @@ class Arranger:
         """number * factors, without factors to the power zero."""
         kept = tuple([item for item in factors if item[1]])
         operations, length = max(len(kept) - 1, 0), 0
+        letters = self.letters
         for base, power in kept:
-            if isinstance(base, int):
-                letter = self.letters[base]
-                operations += letter.operations + (power > 1)
-                length += letter.length + (power > 1)
+            if type(base) is int:
+                letter = letters[base]
+                operations += letter.operations
+                length += letter.length
             else:
-                operations += base.cost[0] + (power > 1)
-                length += base.cost[1] + (power > 1) + 2
+                own = base.cost  # type: ignore[union-attr]
+                operations += own[0]
+                length += own[1] + 2
+            if power > 1:
+                operations += 1
+                length += 1
         above, below = abs(number.numerator), number.denominator
         if below != 1 and isinstance(number, Fraction) and printed_as_decimal(number):
             above, below = 2, 1
@@ -152,8 +159,8 @@ class Arranger:
         first = sorted(item for item in parts.items() if isinstance(item[0], int))
         sums = [item for item in parts.items() if not isinstance(item[0], int)]
         best = self.product(number, [*first, *sums])
-        size = abs(Fraction(number))
-        if size != 1 and not printed_as_decimal(size):
+        size: Number = number if number > 0 else -number
+        if size != 1 and not printed_as_decimal(Fraction(size)):
             # l (2 a + b) / 2 is l (a + b / 2).
             for k, (base, power) in enumerate(sums):
                 if power == 1:
@@ -285,7 +292,13 @@ class Arranger:
         left = [sum(len(a) + len(b) for a, b in g) for g in groups]
         if len(q) > ALL and groups:
             groups = [groups[left.index(min(left))]] if min(left) < len(q) else []
-        found: list[Tree] = [self._gathered(g, self.nested) for g in groups]
+        found: list[Tree] = []
+        used = {letter for m in q for letter, _ in m}
+        once = len(used) - 1 + sum([self.letters[letter].operations for letter in used])
+        for group in groups:
+            found.append(self._gathered(group, self.nested))
+            if total(found[-1])[0] == once:  # each letter stands in it once
+                return found[-1]
         if not groups or len(q) <= BOTH or min(left) > CLEAR * len(q):
             found.append(self.horner(q))
         squares = self._squares(q) if len(q) <= BOTH else None
@@ -356,21 +369,24 @@ class Arranger:
             return self._split[key]
         used = sorted({letter for m in q for letter, _ in m})
         place = {letter: k for k, letter in enumerate(used)}
-        context = fmpq_mpoly_ctx.get(("x", len(used)), "lex")
+        context = fmpz_mpoly_ctx.get(("x", len(used)), "lex")
         rows: dict[tuple[int, ...], Any] = {}
         for m, c in q.items():
             exponents = [0] * len(used)
             for letter, power in m:
                 exponents[place[letter]] = power
             rows[tuple(exponents)] = c
+        if _coprime(rows, context):
+            self._split[key] = None
+            return None
         unit, parts = context.from_dict(rows).factor()
         if len(parts) == 1 and parts[0][1] == 1:
             self._split[key] = None
             return None
         result: list[tuple[Polynomial, int]] = []
-        number = fraction(unit)
+        number = Fraction(int(unit))
         for part, power in parts:
-            poly: Polynomial = {tuple((used[k], int(n)) for k, n in enumerate(exponents) if n): integer(fraction(c))
+            poly: Polynomial = {tuple((used[k], int(n)) for k, n in enumerate(exponents) if n): int(c)
                                 for exponents, c in part.terms()}
             scale, _, poly = stripped(poly)
             number *= scale ** int(power)
@@ -446,10 +462,30 @@ def multiplied(a: Monomial, b: Monomial) -> Monomial:
         return a + b
     if b[-1][0] < a[0][0]:
         return b + a
+    if len(b) == 1:
+        (letter, n), = b
+        for k, (own, power) in enumerate(a):
+            if own == letter:
+                return (*a[:k], (own, power + n), *a[k + 1:])
+            if own > letter:
+                return (*a[:k], b[0], *a[k:])
     powers = dict(a)
     for letter, n in b:
         powers[letter] = powers.get(letter, 0) + n
     return tuple(sorted(powers.items()))
+
+
+def _coprime(rows: Mapping[tuple[int, ...], int], context: Any) -> bool:
+    """Whether the polynomial is a x + b without factors that a and b have in common, for a letter x: then it has no others."""
+    degrees = list(map(max, zip(*rows)))
+    terms = [sum(1 for exponents in rows if exponents[k]) for k in range(len(degrees))]
+    linear = [k for k, degree in enumerate(degrees) if degree == 1]
+    if not linear:
+        return False
+    x = min(linear, key=lambda k: (terms[k], k))
+    above = {(*e[:x], 0, *e[x + 1:]): c for e, c in rows.items() if e[x]}
+    below = {e: c for e, c in rows.items() if not e[x]}
+    return bool(context.from_dict(above).gcd(context.from_dict(below)).is_constant())
 
 
 def _irreducible(q: Polynomial) -> bool:

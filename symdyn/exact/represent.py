@@ -16,6 +16,7 @@ from symdyn.exact.ring import fraction
 from symdyn.exact.walk import Exact
 
 Vector = tuple[int, ...]
+Partner = tuple[int, int, tuple[int, int], tuple[int, int]]
 # Fourier forms with this many times the terms of the polynomial are not made; products of more sines neither.
 GROWTH, DEGREE = 4, 8
 # Sums of angles that are tried as base angles.
@@ -38,6 +39,8 @@ class Letters:
         self._inverses: dict[int, int] = {}
         self.turns: dict[int, tuple[str, Vector]] = {}
         self._numbers: dict[tuple[str, Vector], int] = {}
+        self._series: dict[Monomial, list[tuple[Monomial, int]]] = {}
+        self._partners: dict[tuple[int, int], Partner | None] = {}
         self.sines = exact.sines
         for k, (s, c) in enumerate(exact.sines):
             unit = tuple(int(i == k) for i in range(n))
@@ -65,6 +68,19 @@ class Letters:
             letter = self._inverses[key] = self._new()
             self.below[letter] = key
         return letter
+
+    def series(self, own: Monomial) -> list[tuple[Monomial, int]]:
+        """A product of d sines and cosines, times 2^d, as a sum of them: letter (or none) and number."""
+        if own not in self._series:
+            self._series[own] = _series(own, self)
+        return self._series[own]
+
+    def partner(self, x: int, y: int) -> Partner | None:
+        """Letters that stand beside x and y in the other term of a theorem of sums, and what both are with letters and sign, for
+        the same number and the opposite; None where there is no such theorem."""
+        if (x, y) not in self._partners:
+            self._partners[x, y] = _partner(x, y, self)
+        return self._partners[x, y]
 
     def _new(self) -> int:
         self._next += 1
@@ -220,7 +236,7 @@ def fourier(p: Polynomial, letters: Letters) -> Polynomial | None:
         if degree > DEGREE:
             return None
         scale = 2 ** (DEGREE - degree)
-        for trig, factor in _series(own, letters):
+        for trig, factor in letters.series(own):
             factor *= scale
             for rest, c in row:
                 m = multiplied(rest, trig)
@@ -297,22 +313,7 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
     """Pairs of terms: the cosines of the angles that they stand for, both terms, what they become together, and its number as a
     multiple of the first one's."""
     turns, of = letters.turns, letters.of
-    pairs: dict[tuple[int, int], tuple[int, int, tuple[int, int], tuple[int, int]] | None] = {}
-
-    def partner(x: int, y: int) -> tuple[int, int, tuple[int, int], tuple[int, int]] | None:
-        """Letters that stand in the other term, and what both are with letters and sign: for the same number and the opposite."""
-        name, v = turns[x]
-        second, w = turns[y]
-        if v == w or (name == "sin" and second == "sin"):
-            return None
-        up = of(name, tuple([i + j for i, j in zip(v, w)]))
-        down = of(name, tuple([i - j for i, j in zip(v, w)]))
-        other = "cos" if name == "sin" else "sin"
-        a, b = of(other, v)[0], of("sin", w)[0]
-        if name == "sin":
-            return a, b, up, down
-        return (a, b, down, up) if second == "cos" else None
-
+    have = {letter for m in p for letter, _ in m}
     for m, a in list(p.items()):
         trig = [item for item in m if item[0] in turns and turns[item[0]][0] != "tan"]
         for x, n in trig:
@@ -330,12 +331,12 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
                 # Cosines once a pair; a sine first.
                 if x == y or (x > y and turns[x][0] == "cos"):
                     continue
-                if (x, y) not in pairs:
-                    pairs[x, y] = partner(x, y)
-                found = pairs[x, y]
+                found = letters.partner(x, y)
                 if found is None:
                     continue
                 one, two, same, opposite = found
+                if one not in have or two not in have:
+                    continue
                 rest = _less(_less(m, x, 1), y, 1)
                 other_term = multiplied(rest, ((one, 1), (two, 1)) if one < two else ((two, 1), (one, 1)))
                 b = p.get(other_term)
@@ -343,6 +344,20 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
                     continue
                 letter, sign = same if b == a else opposite
                 yield (x, y), m, other_term, multiplied(rest, ((letter, 1),)), sign
+
+
+def _partner(x: int, y: int, letters: Letters) -> Partner | None:
+    name, v = letters.turns[x]
+    second, w = letters.turns[y]
+    if v == w or (name == "sin" and second == "sin"):
+        return None
+    up = letters.of(name, tuple([i + j for i, j in zip(v, w)]))
+    down = letters.of(name, tuple([i - j for i, j in zip(v, w)]))
+    other = "cos" if name == "sin" else "sin"
+    a, b = letters.of(other, v)[0], letters.of("sin", w)[0]
+    if name == "sin":
+        return a, b, up, down
+    return (a, b, down, up) if second == "cos" else None
 
 
 def _less(m: Monomial, letter: int, power: int) -> Monomial:

@@ -33,15 +33,17 @@ FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters"
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
 _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
-# nested, in the two shortest representations, and of more than LONG terms in one.
-WORSE, SHORT, LONG = 1.5, 25, 150
+# nested, in the two shortest representations, of more than MIDDLE terms in the shortest one, and of more than LONG terms only one
+# is made.
+WORSE, SHORT, MIDDLE, LONG = 1.5, 25, 60, 150
 # Terms that all entries together may have to be arranged, which takes less than ten seconds.
 TERMS = 20_000
 # Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
 MULTIPLE = 10
-# Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before SymPy
-# combines terms; up to FACTOR_TERMS operations common factors are taken out of it.
-LONGER, FACTOR_TERMS = 2.1, 250
+# Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before
+# SymPy combines terms; up to FACTOR_TERMS operations common factors are taken out of it, if it then has no more than NEAR times
+# as many.
+LONGER, FACTOR_TERMS, NEAR = 2.1, 250, 1.6
 
 
 class Writer:
@@ -155,19 +157,19 @@ class Writer:
 
     # -- values
 
-    def write(self, value: Value, operations: float = math.inf, derived: Callable[[], tuple[sp.Expr, int]] | None = None
+    def write(self, value: Value, operations: float = math.inf, derived: Callable[[float], tuple[sp.Expr, int]] | None = None
               ) -> sp.Expr:
         """The value in the form asked for.
 
         operations   of the form in which it was derived, before SymPy combines equal terms; derived: makes that form and
-                     counts its operations; it is taken if it is the shortest
+                     counts its operations, taking factors out up to so many; it is taken if it is the shortest
         """
         if derived is not None and operations <= len(value.num):
-            return derived()[0]
+            return derived(math.inf)[0]
         tree = self.tree(value)
         result = self.tree_expression(tree)
         if derived is not None and operations <= LONGER * total(tree)[0]:
-            other, count = derived()
+            other, count = derived(NEAR * total(tree)[0])
             if count < sp.count_ops(result):
                 return min((other, _taken_out(other)), key=sp.count_ops) if count <= FACTOR_TERMS else other
         return result
@@ -188,7 +190,7 @@ class Writer:
         least = min(map(len, found))
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
-            found = found[:2]
+            found = found[:2 if least <= MIDDLE else 1]
         return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
 
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
@@ -424,10 +426,12 @@ def _taken_out(e: Any) -> Any:
     return sp.Mul(common, _taken_out(inside)) + _taken_out(sp.Add(*[sp.Mul(*term) for term in terms if common not in term]))
 
 
-def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float) -> tuple[sp.Expr, int]:
-    """As it stands on the tape, and its operations; common factors are taken out of sums where that is shorter and does not take
-    long."""
+def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, near: float) -> tuple[sp.Expr, int]:
+    """As it stands on the tape, and its operations; where these are no more than `near`, common factors are taken out of sums if
+    that is shorter and does not take long."""
     found = expand(Output.of("entry", entry), symbols)
-    forms = (found, sp.factor_terms(found)) if size <= FACTOR_TERMS else (found,)
-    counts = [int(sp.count_ops(form)) for form in forms]
-    return forms[counts.index(min(counts))], min(counts)
+    count = int(sp.count_ops(found))
+    if size > FACTOR_TERMS or count > near:
+        return found, count
+    factored = sp.factor_terms(found)
+    return min((found, count), (factored, int(sp.count_ops(factored))), key=lambda form: form[1])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
+from symdyn.collector import collector_paused
 from symdyn.counting import counted
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.kinds import flag, text
@@ -198,7 +199,8 @@ class Equations:
             output = self.tape(name).outputs[name]
             zeros = self._vanishing() if on_constraints else ()
             try:
-                self._printed[key] = explicit(output, self.printed_leaves(), form, zeros)
+                with collector_paused():
+                    self._printed[key] = explicit(output, self.printed_leaves(), form, zeros)
             except (TooLarge, ZeroDivisionError) as error:
                 if form != "shortest":
                     raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {error}; print its steps "
