@@ -12,6 +12,8 @@ from symdyn.backend.methods import Method
 # The functions that a projection calls, besides those that a method needs.
 OF_PROJECTION = ("position_correction", "velocity_correction", "violation")
 OF_EVENTS = ("events", "event_resets", "reset_directions")
+# Of sensitivities: their part of a projection, the derivatives of events.
+OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
 # Functions of bounds, six of each leaf in the place of ud.
 OF_BOUNDS = ("event_ranges", "event_bounds")
 # Events that wait until they are taken are rows of which, time, state before, state after.
@@ -48,6 +50,7 @@ class Shape:
     events     see EventRecord
     leaves     what values at events are bounded by: 0 for t, then come x and the inputs
     directed   whether there are directions in which the constraints let entries of [q; u] be reset
+    columns    of sensitivities, each as long as the state, which are the last entries of x
     """
 
     sizes: Mapping[str, int]
@@ -56,6 +59,7 @@ class Shape:
     events: Sequence[EventRecord]
     leaves: Sequence[int] = ()
     directed: bool = False
+    columns: int = 0
 
     @property
     def n_x(self) -> int:
@@ -83,7 +87,7 @@ def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: C
 
     call   (name, result) -> arguments of a call at t and x
     """
-    names = ("rhs", *method.needs, *OF_EVENTS, *(OF_PROJECTION if projects else ()))
+    names = ("rhs", *method.needs, *OF_EVENTS, *OF_COLUMNS, *(OF_PROJECTION if projects else ()))
     at = [Integrated("field" if name == "rhs" else f"{name}_at", name, call(name, "out"),
                      n_in > 0 and (name == "rhs" or "inputs" in arguments_of[name]))
           for name in names if name in arguments_of]
@@ -102,6 +106,10 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
         result.append(("SYMDYN_SECOND_ERROR", int(method.tableau.second is not None)))
     if "second_order" in gathered:
         result.append(("SYMDYN_SECOND_ORDER", int(gathered["second_order"])))
+    if shape.columns:
+        result.append(("SYMDYN_COLUMNS", shape.columns))
+    if shape.columns or method.template == "radau":
+        result.append(("SYMDYN_STATE", shape.n_x // (1 + shape.columns)))
     if shape.n_rows:
         result.append(("SYMDYN_ROWS", shape.n_rows))
     if shape.unit_groups:
@@ -129,7 +137,8 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> dict[
             "SYMDYN_DENSE_STAGES": tableau is not None and bool(tableau.dense_stages),
             "SYMDYN_SECOND_ORDER": bool(gathered.get("second_order")), "SYMDYN_UNROLLED": gathered.get("n_lanes") == 1,
             "SYMDYN_CROSSES": method.crosses and shape.projects, "SYMDYN_PROJECTS": shape.projects,
-            "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0, "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
+            "SYMDYN_SENSITIVE": shape.columns > 0, "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0,
+            "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
             "SYMDYN_HAS_INPUTS": shape.sizes["inputs"] > 0, "SYMDYN_EVENTS": bool(shape.events),
             "SYMDYN_HAS_RESETS": bool(shape.resets), "SYMDYN_KEEPS_RESETS": bool(shape.held),
             "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves)}

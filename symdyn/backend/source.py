@@ -62,7 +62,8 @@ class Content:
     otherwise     tapes by function name for where the first ones fail
     events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
-    columns       Jacobians whose tapes are derivatives along directions
+    columns       of sensitivities, which are the last entries of z
+    jacobians     those whose tapes are derivatives along directions
     """
 
     name: str
@@ -79,7 +80,8 @@ class Content:
     otherwise: Mapping[str, Tape] = field(default_factory=dict)
     events: Sequence[EventRecord] = ()
     event_leaves: Sequence[int] = ()
-    columns: Mapping[str, Columns] = field(default_factory=dict)
+    columns: int = 0
+    jacobians: Mapping[str, Columns] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,8 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     places = {"t": ("t", 0)}
     for group, names in content.groups.items():
         places.update({name: (group, k) for k, name in enumerate(names)})
-    vectors = read_dialect(folder / "columns") if content.columns else None
-    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.columns,
+    vectors = read_dialect(folder / "columns") if content.jacobians else None
+    program = build(dialect, content.tapes, content.titles, places, otherwise=content.otherwise, columns=content.jacobians,
                     vectors=vectors)
     lanes = None
     if batch and backend == "c" and "rhs" in content.tapes:
@@ -178,13 +180,13 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
     n_rows = context["projection"]["n_rows"] if context["projection"] else 0
     shape = Shape({g: len(content.groups[g]) for g in groups}, n_rows, context["unit_groups"],
                   content.events if context["has_events"] else (), content.event_leaves if context["has_events"] else (),
-                  "reset_directions" in context["arguments_of"])
+                  "reset_directions" in context["arguments_of"], content.columns)
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
              and method.template != "taylor")
     called = functions(method, context["arguments_of"], context["field_call"], shape.sizes["inputs"], n_rows > 0)
     return {"runtime": Parts(read, switches(method, shape, gathered)), "runtime_sizes": runtime_sizes(method, shape, gathered),
-            "integrated": called, "resets": shape.resets, "held": shape.held,
+            "integrated": called, "sensitive": shape.columns > 0, "resets": shape.resets, "held": shape.held,
             "divided": units, "linked": "SYMDYN_HIDDEN" if units else "static"}
 
 

@@ -13,6 +13,7 @@ import sympy as sp
 from symdyn.formulation.adjoint import Adjoint
 from symdyn.formulation.algebra import TapeAlgebra, accelerations_of
 from symdyn.formulation.linearization import Varied
+from symdyn.formulation.sensitivities import Sensitive
 from symdyn.formulation.trees.mass_matrix import factorize
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
@@ -64,7 +65,7 @@ class Motion:
             "unknowns": self.unknowns, **{f"unknowns_along_{group}": partial(self.along, group) for group in self.groups()}}
         shared = ("M_tilde", "bias", "accelerations")
         return {**{name: partial(self.recall, name) if name in shared else record for name, record in recorded.items()},
-                **Varied(self).quantities(), **Adjoint(self).quantities()}
+                **Varied(self).quantities(), **Adjoint(self).quantities(), **Sensitive(self).quantities()}
 
     def M_tilde(self) -> np.ndarray:
         raise NotImplementedError

@@ -13,6 +13,7 @@ from symdyn.formulation.constraints.motion import BAUMGARTE
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.printed.skipped import skipped
+from symdyn.functions.sensitivities import column_names
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import columns_of, given_rates, has_function, switches, tapes_of
 from symdyn.model.symbols import GivenMotion
@@ -29,15 +30,15 @@ WORK = "(work)"
 
 
 def content_of(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
-               right_side: RightSide, columns: bool = False) -> Content:
+               right_side: RightSide, jacobians: bool = False) -> Content:
     """What a backend takes to emit the named functions.
 
     standalone   with what is documented in a file that is written
     bound        parameters that become numbers in the code, by name
-    columns      whether Jacobians may be directional derivatives, several columns at once
+    jacobians    whether these may be directional derivatives, several columns at once
     """
     symbols = equations.symbols
-    found = {name: columns_of(equations, name, right_side) for name in names} if columns else {}
+    found = {name: columns_of(equations, name, right_side) for name in names} if jacobians else {}
     several = {name: made for name, made in found.items() if made is not None}
     one_by_one = tapes_of(equations, [n for n in names if n not in several], right_side)
     tapes = {n: several[n].tape if n in several else one_by_one[n] for n in names}
@@ -50,7 +51,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     tapes = _together(tapes, balance)
     otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
-              "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work], "ud": given_rates(equations, names),
+              "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
+                    *column_names(symbols, right_side.sensitivities)], "ud": given_rates(equations, names),
               "inputs": [s.name for s in symbols.inputs],
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte]}
     outputs = output_shapes(equations) if "outputs" in names else ()
@@ -59,8 +61,9 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    {s.name: unit for s, unit in symbols.units.items()}, _by_name(symbols.defaults),
                    _by_name(symbols.initial), outputs, skipped(equations) if standalone else (),
                    [[q.name for q in group] for group in equations.unit_groups], otherwise,
-                   event_records(equations) if "events" in names else (), event_leaves(equations) if BOUNDS in names else (),
-                   {name: replace(made, tape=tapes[name]) for name, made in several.items()})
+                   event_records(equations) if "events" in names else (),
+                   _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
+                   len(right_side.sensitivities), {name: replace(made, tape=tapes[name]) for name, made in several.items()})
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
@@ -100,6 +103,13 @@ def event_records(equations: Equations) -> tuple[EventRecord, ...]:
     about = zip(equations.events, enclosed(equations), unproved(equations), unknowns(equations), strict=True)
     return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
                              tuple(functions), why) for e, can, why, (inputs, functions) in about)
+
+
+def _leaf_places(equations: Equations, n_x: int) -> list[int]:
+    """What bounds events, see `event_leaves`, where x has n_x entries, of which the last ones may be those of the run."""
+    symbols = equations.symbols
+    own = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
+    return [k if k <= own else k + n_x - own for k in event_leaves(equations)]
 
 
 def _entries(tape: Tape) -> tuple[Any, ...]:

@@ -25,6 +25,8 @@ from symdyn.formulation.derivatives import (
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES, bound_names, event_bounds, event_leaves
 from symdyn.formulation.linearization import multiplier_names, variation_names
+from symdyn.formulation.sensitivities import direction_names
+from symdyn.functions import sensitivities as columns
 from symdyn.functions.table import ALL, DERIVATIVES, STATICS, VARIATIONS, quantity_of
 from symdyn.tape.balance import balance
 from symdyn.tape.jumps import Jump, jumps
@@ -44,6 +46,8 @@ def has_function(equations: Equations, name: str) -> bool:
         return bool(switches(equations))
     if name in (BOUNDS, RANGES):
         return bool(event_leaves(equations))
+    if name in columns.COLUMNS:
+        return name in columns.functions_of(equations)
     return quantity_of(name) in equations.quantities
 
 
@@ -81,7 +85,10 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
 def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) -> dict[str, Tape]:
     """The tapes of functions; of rhs and its derivative by x with what the right-hand side is made with."""
     work, baumgarte = right_side.work, right_side.baumgarte
-    tapes = {name: tape_as_derived(equations, name) for name in names}
+    of_columns = right_side.sensitivities
+    with_columns = ("rhs", *columns.COLUMNS) if of_columns else ()
+    tapes = {name: columns.tape_of(equations, name, of_columns) if name in with_columns else tape_as_derived(equations, name)
+             for name in names}
     if work or baumgarte:
         field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
         if work:
@@ -99,8 +106,8 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
 def columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
     """The derivatives along directions that a matrix of derivatives consists of; None where its columns one by one take less, and
     for other functions."""
-    columns = all_columns_of(equations, name, right_side)
-    return columns if columns is not None and columns.pays() else None
+    made = all_columns_of(equations, name, right_side)
+    return made if made is not None and made.pays() else None
 
 
 def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
@@ -162,6 +169,8 @@ def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
         return bound_names(event_leaves(equations))
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
+    if "outputs_sensitivity" in names:
+        return direction_names(symbols)
     given = [f"{s.name}_dot" for s in symbols.speeds]
     if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
         given += multiplier_names(n_c)

@@ -611,7 +611,7 @@ class Module:
                  steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
                  progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
                  events: bool | str | Sequence[str] = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                 extend: str = "error") -> Solution:
+                 extend: str = "error", sensitivities: Names | None = None, sensitivity_control: bool = True) -> Solution:
         """Integrate the motion.
 
         t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
@@ -643,6 +643,10 @@ class Module:
         events      which of the system's events are looked for: True (all), False, or names; see `Solution.events`
         event_spacing   the longest time between samples of the events, s, for pulses that last as long; 0: they are sampled as
                     they vary, with a warning where zeros between samples cannot be ruled out
+        sensitivities   what the motion is differentiated by, exactly: parameters and constant inputs, by name or symbol, and
+                    initial values, as "q1(0)"; see `Solution.sensitivity` and docs/derivatives.md. Compiled methods only
+        sensitivity_control   whether the steps keep the errors of the sensitivities within the tolerances, too; False: those of
+                    the state alone
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
@@ -660,7 +664,7 @@ class Module:
         return simulate(self, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method, steps=steps,
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
                         stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
-                        extend=extend)
+                        extend=extend, sensitivities=sensitivities, sensitivity_control=sensitivity_control)
 
     def simulate_batch(self, q: Values | None = None, u: Values | None = None,
                        params: Values | None = None, *, z: Values | None = None, t: Row | None = None,

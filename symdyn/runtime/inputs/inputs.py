@@ -121,6 +121,17 @@ class Inputs:
         moving = [names[k] for m in self.function.followed if not m.breaks for k in m.places]
         return [name for _, name, _ in self.function.functions] + moving
 
+    def varying(self, names: Sequence[str]) -> list[str]:
+        """Those of the inputs, in order, that are not constant: given by functions, tables or controllers."""
+        given = set(self.by_function(names)) | {names[k] for k in (self.places if self.are_held else ())}
+        if isinstance(self.function, Mixed):
+            given |= {names[k] for m in self.function.followed for k in m.places}
+        pieces = self.function.pieces if isinstance(self.function, Mixed) else self.pieces
+        if pieces is not None:
+            rows = pieces.coefficients
+            given |= {names[k] for k in range(len(names)) if rows[:, k, 1:].any() or np.ptp(rows[:, k, 0])}
+        return [name for name in names if name in given]
+
     @property
     def are_held(self) -> bool:
         """Whether controllers set some of them at instants, or did so."""

@@ -22,6 +22,7 @@ class Request:
     stabilization   what keeps the state on its constraints
     carried   of events, where the run goes on from the end of another one
     event_spacing   of the samples of events at the most, s; 0: as they vary
+    columns   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
     """
 
     span: tuple[float, float]
@@ -39,6 +40,12 @@ class Request:
     look: np.ndarray | None = None
     carried: Carried | None = None
     event_spacing: float = 0.0
+    columns: tuple[str, ...] = ()
+
+    @property
+    def works(self) -> bool:
+        """Whether the last entry of x0 is the work of the loads."""
+        return len(self.x0) > self.n_state * (1 + len(self.columns))
 
     @property
     def field_p(self) -> np.ndarray:

@@ -30,6 +30,7 @@ from symdyn.runtime.integrating.held_run import run_held
 from symdyn.runtime.integrating.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.scipy_run import run_scipy, solver_class_of, takes_changed_states
+from symdyn.runtime.integrating.sensitivities import Asked
 from symdyn.runtime.integrating.stabilization import Projector, Stabilization, choose, chosen_gain
 from symdyn.runtime.masses import real_parameters
 from symdyn.runtime.memory import demand
@@ -57,7 +58,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
              inputs: Any = None, rtol: float = 1e-8, atol: Any = None, method: Any = None, steps: bool = False,
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
              progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
-             event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error") -> Solution:
+             event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error", sensitivities: Any = None,
+             sensitivity_control: bool = True) -> Solution:
     """See Module.simulate."""
     metadata = module.metadata
     p = real_parameters(module, params)
@@ -77,6 +79,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
                       max_steps, len(start), look=wanted(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
+    asked, controlled = Asked.of(module, sensitivities, p, free), flag(sensitivity_control, f"{module.name}: sensitivity_control")
     if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
@@ -99,21 +102,26 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             check_ggl(module, start, p, span[0], stabilization, work)
         else:
             request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
+            if asked.columns:
+                asked.check(module, request, method, work)
             if request.stabilization.way == "baumgarte":
                 request = replace(request, x0=Projector(module, p)(span[0], start))
+        whole = request.with_work() if work else asked.added_to(request, controlled) if asked.columns else request
         begun = clock.perf_counter()
-        outcome = _run(module, request.with_work() if work else request, method, bar)
+        outcome = _run(module, whole, method, bar)
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
         solution = Solution(module, outcome, p, free, str(getattr(method, "__name__", method)), clock.perf_counter() - begun,
                             work, (request.rtol, float(request.atol.max(initial=0.0))), why,
-                            partial(_repeated, module, replace(request.with_work() if work else request, inputs=free), method))
+                            partial(_repeated, module, replace(whole, inputs=free), method), asked)
         if outcome.interrupted:
             raise SimulationInterrupted(solution, outcome.message)
         if not outcome.success:
             warnings.warn(outcome.message, SimulationWarning, stacklevel=3)
         for doubt in outcome.doubts:
+            warnings.warn(doubt, SimulationWarning, stacklevel=3)
+        for doubt in asked.doubts(module, replace(request, inputs=free), outcome):
             warnings.warn(doubt, SimulationWarning, stacklevel=3)
         if metadata.watches and len(solution.t):
             warn(module, solution.rows(WATCHES), "in this motion", 3)
@@ -130,7 +138,7 @@ def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outc
         from symdyn.runtime.integrating.dae_run import run_ggl
 
         return run_ggl(module, request, bar)
-    field = RightSide(work=len(request.x0) > request.n_state, baumgarte=request.stabilization.way == "baumgarte")
+    field = RightSide(work=request.works, baumgarte=request.stabilization.way == "baumgarte", sensitivities=request.columns)
     run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
     return run(module, request, method, bar, field)
 

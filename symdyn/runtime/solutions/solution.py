@@ -26,6 +26,7 @@ from symdyn.runtime.integrating.outcome import Outcome
 from symdyn.runtime.paths import as_path, writing
 from symdyn.runtime.solutions.energy_balance import reset_energy
 from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
+from symdyn.runtime.solutions.sensitivity import Sensitivity
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from symdyn.given import BodyOrName, JointOrName, PathName, Times
+    from symdyn.runtime.integrating.sensitivities import Asked
     from symdyn.runtime.module import Module
 
 # With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
@@ -61,11 +63,13 @@ class Solution:
 
     def __init__(self, module: Module, outcome: Outcome, params: np.ndarray, inputs: Inputs, method: str,
                  seconds: float, work: bool = False, tolerances: tuple[float, float] | None = None, why: str = "",
-                 repeat: Callable[[np.ndarray], np.ndarray] | None = None) -> None:
+                 repeat: Callable[[np.ndarray], np.ndarray] | None = None, asked: Asked | None = None) -> None:
         self.module = module
         self._repeat = repeat
         self.t = outcome.t
-        self.x = outcome.x[:, :-1] if work else outcome.x
+        self.x = outcome.x[:, :module.metadata.sizes.x]
+        self._columns = outcome.x[:, module.metadata.sizes.x:] if asked is not None and asked.columns else None
+        self._asked = asked
         self._work = outcome.x[:, -1] if work else None
         self.success, self.message, self.cause = outcome.success, outcome.message, outcome.cause
         self.doubts = (*outcome.warned, *outcome.doubts)
@@ -90,6 +94,10 @@ class Solution:
         long as the run. At the time of an event the state is that before it, as in the run.
         Raises ArgumentError for times outside of the motion and for motions that were not integrated by `simulate`.
         """
+        return self._at(t)[..., :self._sizes.x]
+
+    def _at(self, t: Times) -> np.ndarray:
+        """All that was integrated at any times, see above."""
         if self._repeat is None:
             raise ArgumentError(f"{self.module.name}: states at any time need a motion that simulate has integrated; this one "
                                 f"holds {len(self.t)} times, in sol.t")
@@ -105,7 +113,7 @@ class Solution:
             raise ArgumentError(f"{self.module.name}: the motion goes from t = {self.t[0]:.9g} s to t = {self.t[-1]:.9g} s, but "
                                 f"its state was asked for at t = {outside.flat[0]:.9g} s")
         times, places = np.unique(asked, return_inverse=True)
-        found = self._repeat(times)[:, :self._sizes.x]
+        found = self._repeat(times)
         return found[places.reshape(asked.shape)]
 
     def __getitem__(self, name: sp.Symbol | str) -> np.ndarray:
@@ -258,6 +266,22 @@ class Solution:
         if self.module.metadata.conservative:
             return np.zeros(len(self.t))
         raise ArgumentError(f"{self.module.name} has loads that do work; pass work=True to simulate")
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """Derivatives of the state along the motion by what `simulate` was asked for: sol.sensitivity["m1"] is (n_t, n_x).
+
+        Raises ArgumentError if the simulation was not asked for sensitivities.
+        """
+        if self._columns is None or self._asked is None:
+            raise ArgumentError(f"{self.module.name}: this motion has no sensitivities; pass simulate(..., sensitivities=[...]) "
+                                "the parameters, inputs and initial values that they are by")
+        return Sensitivity(self, self._asked.names, self._asked.columns, self._columns.reshape(len(self.t), -1, self._sizes.x))
+
+    def states_and_columns(self, t: Times) -> tuple[np.ndarray, np.ndarray]:
+        """States at any times of the motion, as by a call, (..., n_x), with the sensitivities, (..., n_columns, n_x)."""
+        found = self._at(t)
+        return found[..., :self._sizes.x], found[..., self._sizes.x:].reshape(*found.shape[:-1], -1, self._sizes.x)
 
     @property
     def has_work(self) -> bool:

@@ -261,6 +261,78 @@ static void symdyn_event_note(symdyn_run *run, int k, double t, const double *be
     }
 }
 
+#if SYMDYN_SENSITIVE
+// The right-hand side just before (way -1) or just after (way 1) an event at (t, x), where signs and conditions have the values of
+// that side: extrapolated from two states on the way, a millionth of the time in which the state changes away. Returns 0 or a
+// failure.
+static int symdyn_slope_beside(symdyn_run *run, double t, const double *x, double way, double *slope) {
+    double y[SYMDYN_NX], far[SYMDYN_NX];
+    int failure = symdyn_eval(run, t, x, slope);
+    if (failure) return failure;
+    const double change = symdyn_square(run, slope, x), size = symdyn_square(run, x, x);
+    const double most = fmin(run->h_max, fabs(run->t_end - run->t_old)), there = change > 0.0 ? sqrt(size / change) : most;
+    const double step = 1e-6 * run->direction * fmax(fabs(run->h_old), fmin(there, most)) * way;
+    for (int k = 2; k > 0; k--)
+        for (int round = 0; round < 3; round++) {  // the first ones go over to the side
+            for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i] + k * step * slope[i];
+            if ((failure = symdyn_eval(run, t + k * step, y, slope))) return failure;
+            if (k == 2)
+                for (int i = 0; i < SYMDYN_NX; i++) far[i] = slope[i];
+        }
+    for (int i = 0; i < SYMDYN_NX; i++) slope[i] = 2.0 * slope[i] - far[i];
+    return 0;
+}
+
+// The columns of sensitivities after the events at (t, x), behind the state after them: an event comes earlier by what its
+// quantity is moved by over its rate. (Saltation: Hiskens and Pai, Trajectory sensitivity analysis of hybrid systems, 2000.)
+// changed: whether they differ from those before. Returns 0 or a failure.
+static int symdyn_event_columns(symdyn_run *run, double t, const double *x, double *after, int *changed) {
+    enum { N = SYMDYN_STATE, WIDTH = 1 + SYMDYN_COLUMNS };
+    double slope[SYMDYN_NX], then[SYMDYN_NX], y[SYMDYN_NX], later[SYMDYN_COLUMNS];
+    double g[3][SYMDYN_N_EVENTS * WIDTH];
+    int failure, first = -1, reason = 0, same = 1;
+    for (int k = SYMDYN_N_EVENTS - 1; k >= 0; k--)
+        if (run->events.fired[k] && (first < 0 || symdyn_event[k].resets)) first = k;
+    *changed = 0;
+    if ((failure = symdyn_slope_beside(run, t, x, -1.0, slope))) return failure;
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = i < N ? after[i] : x[i];
+    if ((failure = symdyn_slope_beside(run, t, y, 1.0, then))) return failure;
+    for (int i = 0; i < N; i++) same &= after[i] == x[i] && fabs(then[i] - slope[i]) <= 1e-8 * (fabs(then[i]) + fabs(slope[i]));
+    if (same) return 0;
+    // Along the columns; along none, and along the motion in place of the first: their difference is the rate at a fixed time.
+    for (int i = 0; i < SYMDYN_NX; i++) y[i] = x[i];
+    for (int way = 0; way < 3 && !reason; way++) {
+        for (int i = N; i < SYMDYN_NX; i++) y[i] = way == 0 ? x[i] : way == 2 && i < 2 * N ? slope[i - N] : 0.0;
+        reason = symdyn_event_columns_at(&run->problem, t, y, g[way]);
+    }
+    if (reason) return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    const double rate = g[0][first * WIDTH] + (g[2][first * WIDTH + 1] - g[1][first * WIDTH + 1]);
+    for (int j = 0; j < SYMDYN_COLUMNS; j++) {
+        later[j] = -g[0][first * WIDTH + 1 + j] / rate;
+        for (int i = 0; i < N; i++) y[N * (j + 1) + i] = x[N * (j + 1) + i] + slope[i] * later[j];
+    }
+#if SYMDYN_HAS_RESETS
+    double becomes[SYMDYN_RESETS * WIDTH], columns[SYMDYN_NX];
+    if ((reason = symdyn_event_reset_columns_at(&run->problem, t, y, becomes)))
+        return symdyn_fail(run, SYMDYN_EVENT_FAILED, reason, -1, t, x);
+    for (int i = 0; i < SYMDYN_NX; i++) columns[i] = y[i];
+    for (int k = 0, r = 0; k < SYMDYN_N_EVENTS; k++)
+        for (int end = r + symdyn_event[k].resets; r < end; r++)
+            for (int j = 0; j < SYMDYN_COLUMNS && run->events.fired[k]; j++)
+                columns[N * (j + 1) + symdyn_reset_index[r]] = becomes[r * WIDTH + 1 + j] + becomes[r * WIDTH] * later[j];
+    for (int i = N; i < SYMDYN_NX; i++) y[i] = columns[i];
+#endif
+    for (int j = 0; j < SYMDYN_COLUMNS; j++)
+        for (int i = 0; i < N; i++) after[N * (j + 1) + i] = y[N * (j + 1) + i] - then[i] * later[j];
+    *changed = 1;
+#if SYMDYN_PROJECTS
+    if (run->problem.project && symdyn_correct_columns(run, t, after))
+        return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, run->reason, -1, t, x);
+#endif
+    return 0;
+}
+#endif
+
 // The state after the resets of the events at (t, x), on the constraints, whatever keeps the steps there. Returns 0 or a failure.
 static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double *after) {
     for (int i = 0; i < SYMDYN_NX; i++) after[i] = x[i];
@@ -385,6 +457,11 @@ static void symdyn_look_for_events(symdyn_run *run) {
             for (int i = 0; i < SYMDYN_NX; i++) run->events.after[i] = x[i];
         else
             failure = symdyn_event_reset(run, first, x, run->events.after);
+#if SYMDYN_SENSITIVE
+        int jumps = 0;
+        if (!cut && !failure) failure = symdyn_event_columns(run, first, x, run->events.after, &jumps);
+        resets |= jumps;
+#endif
         for (int k = 0; k < SYMDYN_N_EVENTS; k++)
             if (run->events.fired[k]) symdyn_event_note(run, k, first, x, run->events.after);
         left = first;

@@ -95,6 +95,20 @@ static int symdyn_corrections(symdyn_run *run, double t, double *x) {
 }
 #endif
 
+#if SYMDYN_SENSITIVE
+// Put the columns of sensitivities of a state on the constraints onto what derivatives fulfil there. Returns 0 or 1.
+SYMDYN_LINKED int symdyn_correct_columns(symdyn_run *run, double t, double *x) {
+    enum { WIDTH = SYMDYN_NQ + SYMDYN_NU };
+    double out[SYMDYN_COLUMNS * WIDTH];
+    run->reason = symdyn_corrected_columns_at(&run->problem, t, x, out);
+    if (!run->reason && !symdyn_all_finite(out, SYMDYN_COLUMNS * WIDTH)) run->reason = SYMDYN_NOT_FINITE;
+    if (run->reason) return 1;
+    for (int j = 0; j < SYMDYN_COLUMNS; j++)
+        for (int i = 0; i < WIDTH; i++) x[SYMDYN_STATE * (j + 1) + i] = out[WIDTH * j + i];
+    return 0;
+}
+#endif
+
 // Project x at t, in place: q first, then u. Returns 0 or PROJECTION_FAILED.
 SYMDYN_LINKED int symdyn_correct(symdyn_run *run, double t, double *x) {
     run->dq = run->du = run->residual = 0.0;
@@ -106,6 +120,9 @@ SYMDYN_LINKED int symdyn_correct(symdyn_run *run, double t, double *x) {
 #endif
 #if SYMDYN_HAS_CONSTRAINTS
     if (symdyn_corrections(run, t, x)) return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, run->reason, run->worst, t, run->before);
+#endif
+#if SYMDYN_SENSITIVE
+    if (symdyn_correct_columns(run, t, x)) return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, run->reason, -1, t, run->before);
 #endif
     (void)t;
     for (int i = 0; i < SYMDYN_NQ; i++) run->dq += (x[i] - run->before[i]) * (x[i] - run->before[i]);
@@ -126,6 +143,10 @@ SYMDYN_LINKED int symdyn_project_end(symdyn_run *run, double t, double *x, doubl
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++)
         moved |=
             fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * far[i >= SYMDYN_NQ];
+#if SYMDYN_SENSITIVE
+    for (int i = SYMDYN_STATE; i < SYMDYN_NX; i++)
+        moved |= fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * fabs(x[i]);
+#endif
     for (int i = 0; i < SYMDYN_NQ; i++) {
         way += (run->x_end[i] - run->x[i]) * (run->x_end[i] - run->x[i]);
         size += x[i] * x[i];

@@ -6,16 +6,16 @@
 // Factorize A + i B with exchanges among the rows of coordinates, then among the others: entries stay zero where q_dot = u, and
 // units are not compared with each other. Inverses on the diagonal. Returns 1 if it is singular.
 static int symdyn_newton_factorize(double *A, double *B, int *order) {
-    for (int k = 0; k < SYMDYN_NX; k++) {
-        double *const a = A + k * SYMDYN_NX, *const b = B + k * SYMDYN_NX, most = 0.0;
-        for (int i = k; i < (k < SYMDYN_NQ ? SYMDYN_NQ : SYMDYN_NX); i++) {
+    for (int k = 0; k < SYMDYN_STATE; k++) {
+        double *const a = A + k * SYMDYN_STATE, *const b = B + k * SYMDYN_STATE, most = 0.0;
+        for (int i = k; i < (k < SYMDYN_NQ ? SYMDYN_NQ : SYMDYN_STATE); i++) {
             if (fabs(a[i]) + fabs(b[i]) > most) {
                 most = fabs(a[i]) + fabs(b[i]);
                 order[k] = i;
             }
         }
         if (!(most > 0.0)) return 1;
-        for (int from = k, to = order[k]; from < SYMDYN_NX * SYMDYN_NX; from += SYMDYN_NX, to += SYMDYN_NX) {
+        for (int from = k, to = order[k]; from < SYMDYN_STATE * SYMDYN_STATE; from += SYMDYN_STATE, to += SYMDYN_STATE) {
             const double p = A[from], q = B[from];
             A[from] = A[to];
             B[from] = B[to];
@@ -25,16 +25,16 @@ static int symdyn_newton_factorize(double *A, double *B, int *order) {
         const double u = a[k] / most, v = b[k] / most, size = most * (u * u + v * v);
         a[k] = u / size;
         b[k] = -v / size;
-        for (int i = k + 1; i < SYMDYN_NX; i++) {
+        for (int i = k + 1; i < SYMDYN_STATE; i++) {
             const double p = a[i];
             a[i] = p * a[k] - b[i] * b[k];
             b[i] = p * b[k] + b[i] * a[k];
         }
-        for (int j = k + 1; j < SYMDYN_NX; j++) {
-            double *restrict const c = A + j * SYMDYN_NX, *restrict const d = B + j * SYMDYN_NX;
+        for (int j = k + 1; j < SYMDYN_STATE; j++) {
+            double *restrict const c = A + j * SYMDYN_STATE, *restrict const d = B + j * SYMDYN_STATE;
             const double p = c[k], q = d[k];
             if (p != 0.0 || q != 0.0) {
-                for (int i = k + 1; i < SYMDYN_NX; i++) {
+                for (int i = k + 1; i < SYMDYN_STATE; i++) {
                     c[i] -= p * a[i] - q * b[i];
                     d[i] -= p * b[i] + q * a[i];
                 }
@@ -44,24 +44,26 @@ static int symdyn_newton_factorize(double *A, double *B, int *order) {
     return 0;
 }
 
-// Solve (A + i B) w = x + i y, in place, by these factors.
+// Solve (A + i B) w = x + i y, in place, by these factors: for the state, and for every column of sensitivities.
 static void symdyn_newton_solve(const double *A, const double *B, const int *order, double *restrict x, double *restrict y) {
-    for (int k = 0; k < SYMDYN_NX; k++) {
-        const double p = x[order[k]], q = y[order[k]];
-        x[order[k]] = x[k];
-        y[order[k]] = y[k];
-        x[k] = p;
-        y[k] = q;
-    }
-    for (int step = 0; step < 2 * SYMDYN_NX; step++) {  // forth by columns of L, back by those of U
-        const int back = step >= SYMDYN_NX, k = back ? (2 * SYMDYN_NX - 1) - step : step;
-        const double *const a = A + k * SYMDYN_NX, *const b = B + k * SYMDYN_NX;
-        const double p = back ? x[k] * a[k] - y[k] * b[k] : x[k], q = back ? x[k] * b[k] + y[k] * a[k] : y[k];
-        x[k] = p;
-        y[k] = q;
-        for (int i = back ? 0 : k + 1; i < (back ? k : SYMDYN_NX); i++) {
-            x[i] -= p * a[i] - q * b[i];
-            y[i] -= p * b[i] + q * a[i];
+    for (int first = 0; first < SYMDYN_NX; first += SYMDYN_STATE, x += SYMDYN_STATE, y += SYMDYN_STATE) {
+        for (int k = 0; k < SYMDYN_STATE; k++) {
+            const double p = x[order[k]], q = y[order[k]];
+            x[order[k]] = x[k];
+            y[order[k]] = y[k];
+            x[k] = p;
+            y[k] = q;
+        }
+        for (int step = 0; step < 2 * SYMDYN_STATE; step++) {  // forth by columns of L, back by those of U
+            const int back = step >= SYMDYN_STATE, k = back ? (2 * SYMDYN_STATE - 1) - step : step;
+            const double *const a = A + k * SYMDYN_STATE, *const b = B + k * SYMDYN_STATE;
+            const double p = back ? x[k] * a[k] - y[k] * b[k] : x[k], q = back ? x[k] * b[k] + y[k] * a[k] : y[k];
+            x[k] = p;
+            y[k] = q;
+            for (int i = back ? 0 : k + 1; i < (back ? k : SYMDYN_STATE); i++) {
+                x[i] -= p * a[i] - q * b[i];
+                y[i] -= p * b[i] + q * a[i];
+            }
         }
     }
 }
@@ -89,7 +91,7 @@ static void symdyn_weights(double theta, double *w) {
 
 static int symdyn_begin(symdyn_run *run) {
     double r = run->rtol;
-    for (int i = 0; i < SYMDYN_NX; i++) r = fmax(r, run->atol[i]);
+    for (int i = 0; i < SYMDYN_STATE; i++) r = fmax(r, run->atol[i]);
     run->method.ease = fmin(1.0, 10.0 * sqrt(sqrt(r)));
     run->method.tolerance = r / run->method.ease;
     run->method.tried = run->method.warm = run->method.current = 0;
@@ -105,17 +107,17 @@ static int symdyn_prepare(symdyn_run *run, double h) {
         const int reason = symdyn_jacobian_x_at(&run->problem, run->t, run->x, run->method.jacobian);
         run->n_jacobians++;
         if (reason) return symdyn_fail(run, SYMDYN_FIELD_FAILED, reason, -1, run->t, run->x);
-        for (int i = 0; i < SYMDYN_NX * SYMDYN_NX; i++)
+        for (int i = 0; i < SYMDYN_STATE * SYMDYN_STATE; i++)
             if (!(fabs(run->method.jacobian[i]) <= symdyn_huge)) run->method.jacobian[i] = 0.0;  // infinite ones: no help
         run->method.current = 1;
     }
     for (int k = 0; k < SYMDYN_ROOTS; k++) {
-        for (int i = 0; i < SYMDYN_NX; i++)
-            for (int j = 0; j < SYMDYN_NX; j++) run->method.re[k][j * SYMDYN_NX + i] = -run->method.jacobian[i * SYMDYN_NX + j];
-        for (int i = 0; i < SYMDYN_NX * SYMDYN_NX; i++) run->method.im[k][i] = 0.0;
-        for (int i = 0; i < SYMDYN_NX; i++) {
-            run->method.re[k][i * (SYMDYN_NX + 1)] += symdyn_roots[k][0] / h;
-            run->method.im[k][i * (SYMDYN_NX + 1)] = symdyn_roots[k][1] / h;
+        for (int i = 0; i < SYMDYN_STATE; i++)
+            for (int j = 0; j < SYMDYN_STATE; j++) run->method.re[k][j * SYMDYN_STATE + i] = -run->method.jacobian[i * SYMDYN_STATE + j];
+        for (int i = 0; i < SYMDYN_STATE * SYMDYN_STATE; i++) run->method.im[k][i] = 0.0;
+        for (int i = 0; i < SYMDYN_STATE; i++) {
+            run->method.re[k][i * (SYMDYN_STATE + 1)] += symdyn_roots[k][0] / h;
+            run->method.im[k][i * (SYMDYN_STATE + 1)] = symdyn_roots[k][1] / h;
         }
         run->n_factorizations++;
         if (symdyn_newton_factorize(run->method.re[k], run->method.im[k], run->method.order[k])) return SYMDYN_STEP_TOO_SMALL;

@@ -8,6 +8,7 @@ typedef struct {
     double gap, h_gap, h_quiet;          // of the latest step tried: its gap, its length; of shorter ones gaps are rounding
     double ease, tolerance;  // the estimate is of lower order than the step: ease 10 r^(1/4) of it counts; r/ease, r as rtol
     double eta, theta;       // of Newton's iteration: its error by the latest change, its rate
-    double jacobian[SYMDYN_NX * SYMDYN_NX], re[SYMDYN_ROOTS][SYMDYN_NX * SYMDYN_NX], im[SYMDYN_ROOTS][SYMDYN_NX * SYMDYN_NX];
-    int order[SYMDYN_ROOTS][SYMDYN_NX];
+    double jacobian[SYMDYN_STATE * SYMDYN_STATE];
+    double re[SYMDYN_ROOTS][SYMDYN_STATE * SYMDYN_STATE], im[SYMDYN_ROOTS][SYMDYN_STATE * SYMDYN_STATE];
+    int order[SYMDYN_ROOTS][SYMDYN_STATE];
 } symdyn_method;

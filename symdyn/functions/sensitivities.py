@@ -1,0 +1,86 @@
+"""The functions of a right-hand side that integrates sensitivities along with the state, a column for each.
+
+Column j is the derivative of x = [q; u; z] by what it is called after: a parameter, a constant input, or an initial value, "".
+Its entries stand behind the extra states z, one column after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.equations import Equations, Symbols
+from symdyn.formulation.sensitivities import direction_names
+from symdyn.spatial.vectors import vector
+from symdyn.tape.node import ACCELERATION, STATE
+from symdyn.tape.passes import substitute
+from symdyn.tape.tape import Output, Tape
+
+# [q; u] of all columns after the projection of the state; of values at events, and of resets, their derivatives by the time and
+# along every column.
+CORRECTED, OF_EVENTS, OF_RESETS = COLUMNS = "corrected_columns", "event_columns", "event_reset_columns"
+
+
+def column_names(symbols: Symbols, sensitivities: Sequence[str]) -> list[str]:
+    """Names of the entries of all columns, which are extra states; no symbol can have them."""
+    states = [s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]
+    return [f"(d {x} by {k + 1} {by})" for k, by in enumerate(sensitivities) for x in states]
+
+
+def functions_of(equations: Equations) -> tuple[str, ...]:
+    """The functions that a run with sensitivities needs besides those of any run."""
+    names = [CORRECTED] if equations.constraints or equations.unit_groups else []
+    names += [OF_EVENTS] if "events" in equations.quantities else []
+    return (*names, *([OF_RESETS] if "event_resets" in equations.quantities else ()))
+
+
+def tape_of(equations: Equations, name: str, sensitivities: Sequence[str]) -> Tape:
+    """The tape of rhs, or of one of the functions above, with these columns."""
+    columns = _columns(equations, sensitivities)
+    if name == "rhs":
+        # As a matrix where many directions share it: measured, the counts meet where there are half as many as states.
+        way = "rhs_variation_by_matrix" if 2 * len(columns) > len(columns[0]["x"]) else "rhs_variation"
+        parts = [equations.quantity("rhs"), *[_with(equations, way, column) for column in columns]]
+        return _tape(equations, name, np.concatenate(parts))
+    if name == CORRECTED:
+        return _tape(equations, name, np.concatenate([_with(equations, "corrected_variation", _normal(equations, column))
+                                                      for column in columns]))
+    of = "events" if name == OF_EVENTS else "event_resets"
+    parts = [equations.quantity(f"{of}_rate"), *[_with(equations, f"{of}_variation", column) for column in columns]]
+    return _tape(equations, name, np.array(parts, dtype=object).T)
+
+
+def _tape(equations: Equations, name: str, values: np.ndarray) -> Tape:
+    return Tape(equations.recorder, {name: Output.of(name, values)})
+
+
+def _columns(equations: Equations, sensitivities: Sequence[str]) -> list[dict[str, Any]]:
+    """Of each column x, the leaves of its entries, and all, what stands for the direction, by name."""
+    symbols, recorder = equations.symbols, equations.recorder
+    n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
+    leaves = [recorder.leaf(name, STATE) for name in column_names(symbols, sensitivities)]
+    given = [s.name for s in (*symbols.inputs, *symbols.parameters)]
+    return [{"x": leaves[k * n_x:(k + 1) * n_x], "by": [int(name == by) for name in given]}
+            for k, by in enumerate(sensitivities)]
+
+
+def _with(equations: Equations, quantity: str, column: dict[str, Any]) -> np.ndarray:
+    """A derivative along a direction, along a column."""
+    recorder = equations.recorder
+    leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(equations.symbols)]
+    at = dict(zip(leaves, [*column["x"], *column["by"]], strict=True))
+    return vector(*substitute(tuple(equations.quantity(quantity)), at, recorder))
+
+
+def _normal(equations: Equations, column: dict[str, Any]) -> dict[str, Any]:
+    """The column without changes of the length of what has unit length."""
+    symbols, x = equations.symbols, list(column["x"])
+    places = {s: k for k, s in enumerate(symbols.coordinates)}
+    for group in equations.unit_groups:
+        unit, at = [equations.leaves[q] for q in group], [places[q] for q in group]
+        longer = sum((e * x[k] for e, k in zip(unit, at, strict=True)), 0)
+        for e, k in zip(unit, at, strict=True):
+            x[k] = x[k] - e * longer
+    return {**column, "x": x}

@@ -1,0 +1,163 @@
+"""Sensitivities that a run is asked for: what they are by, where they start, what they need, and what tolerances they have."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import ArgumentError
+from symdyn.runtime.integrating.methods import COMPILED
+from symdyn.runtime.integrating.outcome import Outcome, Request
+from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.inputs.inputs import Inputs
+    from symdyn.runtime.module import Module
+
+_INITIAL = re.compile(r"(?P<name>.+)\(0\)")
+# An absolute tolerance that no error comes near.
+_ANY = 1e300
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Sensitivities of one run, a column each.
+
+    names     as they are called: parameters, inputs, "q1(0)" for initial values
+    columns   as the right-hand side has them, see symdyn.backend.right_side.RightSide
+    starts    derivatives of the initial state, (n_columns, n_x)
+    sizes     of what the columns are by, (n_columns,): a derivative counts as its change over one of these
+    """
+
+    names: tuple[str, ...]
+    columns: tuple[str, ...]
+    starts: np.ndarray
+    sizes: np.ndarray
+
+    @classmethod
+    def of(cls, module: Module, given: Any, p: np.ndarray, inputs: Inputs) -> Asked:
+        """What is asked for by parameters, inputs and initial values. Raises ArgumentError for what does not fit."""
+        metadata = module.metadata
+        n_x = metadata.sizes.x
+        if given is None:
+            return cls((), (), np.zeros((0, n_x)), np.zeros(0))
+        if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+            raise ArgumentError(f"{module.name}: sensitivities is {shown(given)}; pass a list of parameters, inputs and initial "
+                                f"values, such as [{metadata.parameters[0]!r}, '{metadata.x[0]}(0)']" if metadata.parameters else
+                                f"{module.name}: sensitivities is {shown(given)}; pass a list such as ['{metadata.x[0]}(0)']")
+        names, columns, starts, sizes = [], [], [], []
+        values = {**dict(zip(metadata.inputs, inputs.constant, strict=True)), **dict(zip(metadata.parameters, p, strict=True))}
+        for one in given:
+            name = name_of(one) if not isinstance(one, str) else one
+            initial = _INITIAL.fullmatch(name) if isinstance(name, str) else None
+            start = np.zeros(n_x)
+            if initial and initial["name"].strip() in metadata.x:
+                start[metadata.x.index(initial["name"].strip())] = 1.0
+                columns.append("")
+                sizes.append(1.0)
+            elif isinstance(name, str) and name in values:
+                _check_input(module, name, inputs)
+                columns.append(name)
+                sizes.append(abs(float(values[name])) or 1.0)
+            else:
+                raise ArgumentError(_unknown(module, name))
+            if name in names:
+                raise ArgumentError(f"{module.name}: sensitivities name {name} twice; leave one out")
+            names.append(name)
+            starts.append(start)
+        return cls(tuple(names), tuple(columns), np.array(starts).reshape(len(names), n_x), np.array(sizes))
+
+    def added_to(self, request: Request, controlled: bool) -> Request:
+        """The request with the columns behind the state.
+
+        Tolerances are such that the error of the state, and of every column if they are controlled, is within what was asked for
+        in its own root mean square: they count in that of all entries.
+        """
+        part = 1.0 / np.sqrt(1.0 + len(self.columns))
+        of_columns = part * request.atol / self.sizes[:, None] if controlled else np.full(self.starts.shape, _ANY)
+        return replace(request, x0=np.concatenate([request.x0, self.starts.ravel()]), rtol=part * request.rtol,
+                       atol=np.concatenate([part * request.atol, of_columns.ravel()]), columns=self.columns)
+
+    def check(self, module: Module, request: Request, method: Any, work: bool) -> None:
+        """Raises ArgumentError where a run cannot have sensitivities."""
+        if not isinstance(method, str) or method not in COMPILED or module.backend != "c":
+            raise ArgumentError(f"{module.name}: sensitivities were asked for with method {shown(method)} on the backend "
+                                f"{module.backend}; only compiled methods integrate them: compile(backend='c') and "
+                                f"method='dop853', or another of {', '.join(COMPILED)}")
+        if request.stabilization.way == "baumgarte":
+            raise ArgumentError(f"{module.name}: sensitivities were asked for with Baumgarte's stabilization; they are those of "
+                                "the projected motion: leave stabilization out")
+        if work:
+            raise ArgumentError(f"{module.name}: sensitivities were asked for together with work=True; make two runs")
+        metadata, looked = module.metadata, request.look
+        moved = metadata.sizes.q + metadata.sizes.u
+        kept = [e.name for e, look in zip(metadata.events, () if looked is None else looked, strict=False)
+                if look and any(place < moved for place in e.reset)]
+        if metadata.constraints and kept:
+            raise ArgumentError(f"{module.name}: sensitivities were asked for, but what the constraints make of the reset of "
+                                f"{', '.join(kept)} is not differentiated; choose coordinates without constraints, or leave the "
+                                "event out: events=[...]")
+        if request.inputs.are_held or _depends_on_state(request):
+            raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "
+                                "the user, whose derivatives are not known; write the law into the system's loads as expressions "
+                                "of coordinates and speeds, or make the inputs functions of the time alone")
+
+    def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
+        """What to warn of: columns in which everything is zero all along, jumps that no event looks for."""
+        return [*self._without_effect(module, outcome), *_unseen_jumps(module, request, outcome)] if self.names else []
+
+    def _without_effect(self, module: Module, outcome: Outcome) -> list[str]:
+        n_x = module.metadata.sizes.x
+        rows = outcome.x[:, n_x:].reshape(len(outcome.x), len(self.names), n_x) if self.names else np.zeros((0, 0, n_x))
+        nothing = [name for k, name in enumerate(self.names) if len(rows) > 1 and not rows[:, k].any()]
+        return [f"{module.name}: nothing in this motion depends on {', '.join(nothing)}: the sensitivities are zero"] \
+            if nothing else []
+
+
+def _depends_on_state(request: Request) -> bool:
+    """Whether a function of inputs gives others where every entry of the state is another one."""
+    if request.inputs.function is None:
+        return False
+    t, x = request.span[0], request.x0[:request.n_state]
+    here = request.inputs.at(t, x)
+    return any(not np.array_equal(here, request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x)))) for way in (-1.0, 1.0))
+
+
+def _unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:
+    """Where the right-hand side may have jumped between two rows of the motion without an event at that time."""
+    known = module.metadata.switches
+    if not known or len(outcome.t) < 2:
+        return []
+    x = outcome.x[:, :module.metadata.sizes.x]
+    signs = np.sign(module.evaluate("switches", outcome.t, x, request.p, request.inputs.rows(outcome.t, x)))
+    for k, jump in enumerate(known):
+        for row in np.flatnonzero(signs[1:, k] * signs[:-1, k] < 0):
+            begin, end = sorted(outcome.t[row:row + 2])
+            if not any(begin <= one.t <= end for one in outcome.happened):
+                return [f"{module.name}: the right-hand side may jump where {jump.surface} passes zero ({jump.what}), as near "
+                        f"t = {end:.6g} s, without an event there: the sensitivities lack their jump; add an event, "
+                        f"system.add_event(name, {jump.surface})"]
+    return []
+
+
+def _check_input(module: Module, name: str, inputs: Inputs) -> None:
+    """Raises ArgumentError for an input that is not constant."""
+    if name in module.metadata.inputs and name in inputs.varying(module.metadata.inputs):
+        raise ArgumentError(f"{module.name}: a sensitivity by the input {name} was asked for, which varies over time here; only "
+                            "constant inputs have one. Make what it follows a parameter of the system")
+
+
+def _unknown(module: Module, name: Any) -> str:
+    metadata = module.metadata
+    if name in metadata.x:
+        return (f"{module.name}: a sensitivity by {name} was asked for, which is a state; for that by its initial value pass "
+                f"'{name}(0)'")
+    known = [*metadata.parameters, *metadata.inputs, *[f"{x}(0)" for x in metadata.x]]
+    near = difflib.get_close_matches(str(name), known, 3)
+    return (f"{module.name}: a sensitivity by {shown(name)} was asked for, which is neither a parameter, an input nor the "
+            "initial value of a state; "
+            + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known[:20])}"))

@@ -1,0 +1,120 @@
+"""Sensitivities across events against closed forms: their times move with the parameters, and so do the states after them."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError, SimulationWarning
+from symdyn.runtime.building.compiler import find_compiler
+from tests.derivatives.test_sensitivities import derivatives
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+@cache
+def ball() -> Any:
+    """A ball that bounces; the time of every bounce and what it loses depend on parameters."""
+    y, n = sd.coordinates("y n")
+    m, g, e = sd.parameters("m g e", positive=True)
+    system = sd.System("ball", gravity=[0, -g])
+    body = system.add_body("ball", mass=m)
+    system.add_joint(sd.Prismatic("fall", system.ground, body, y, axis=[0, 1]))
+    system.add_state(n, 0)
+    system.add_event("bounce", y, direction=-1, reset={y.dot: -e * y.dot, n: n + sd.t * e})
+    system.add_event("top", y.dot, direction=-1)
+    system.defaults, system.initial = {m: 1, g: 9.81, e: 0.8}, {y: 1}
+    return system.embedding().compile()
+
+
+def bounced(t: Any, g: Any, e: Any, height: Any) -> tuple[Any, Any, Any]:
+    """Height, speed and what the state n has gathered at a time."""
+    begin, speed, gathered = mp.sqrt(2 * height / g), mp.sqrt(2 * g * height), mp.mpf(0)
+    if t < begin:
+        return height - g * t**2 / 2, -g * t, gathered
+    while True:
+        speed, gathered = e * speed, gathered + begin * e
+        if t < begin + 2 * speed / g:
+            return speed * (t - begin) - g * (t - begin) ** 2 / 2, speed - g * (t - begin), gathered
+        begin += 2 * speed / g
+
+
+@pytest.mark.parametrize("method", ["dop853", "bs54", "taylor", "radau", "radau5"])
+def test_bouncing_ball(method: str) -> None:
+    times, at = np.linspace(0, 3, 32), {"g": 9.81, "e": 0.8, "y(0)": 1.0}
+    run = ball().simulate(times, rtol=1e-11, method=method, sensitivities=list(at))
+    assert len(run.events["bounce"].t) == 6
+    for k, name in enumerate(("y", "y_dot", "n")):
+        exact = derivatives(lambda *a, k=k: bounced(*a)[k], times, at)
+        assert np.abs(run.sensitivity.of(name) - exact).max() < 1e-9
+
+
+def block(event: bool = True) -> Any:
+    """A block on a spring with dry friction: the right-hand side jumps where it turns."""
+    x = sd.coordinates("x")
+    m, mu, g, k = sd.parameters("m mu g k", positive=True)
+    system = sd.System("block", gravity=[0, -g])
+    body = system.add_body("block", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, x, axis=[1, 0]))
+    system.add_joint_force(joint, -mu * m * g * sp.sign(x.dot) - k * x, name="spring and friction")
+    if event:
+        system.add_event("turn", x.dot)
+    system.defaults, system.initial = {m: 1, mu: 0.1, g: 9.81, k: 20.0}, {x: 1.0}
+    return system.embedding().compile()
+
+
+def slid(t: Any, mu: Any, k: Any, start: Any) -> Any:
+    """Half waves about places of rest on both sides in turn (mass 1 kg)."""
+    rate, center = mp.sqrt(k), mu * mp.mpf(9.81) / k
+    while t > mp.pi / rate:
+        start, center, t = 2 * center - start, -center, t - mp.pi / rate
+    return center + (start - center) * mp.cos(rate * t)
+
+
+@pytest.mark.parametrize("method", ["dop853", "bs54"])
+def test_friction_block(method: str) -> None:
+    times, at = np.linspace(0, 3, 41), {"mu": 0.1, "k": 20.0, "x(0)": 1.0}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = block().simulate(times, rtol=1e-11, method=method, sensitivities=list(at))
+    assert len(run.events["turn"].t) == 4
+    assert np.abs(run.sensitivity.of("x") - derivatives(slid, times, at)).max() < 1e-9
+
+
+def test_jump_without_an_event() -> None:
+    with pytest.warns(SimulationWarning, match=r"may jump where x_dot passes zero \(sign\(x_dot\)\).*the sensitivities lack "
+                                               r"their jump; add an event, system.add_event\(name, x_dot\)"):
+        block(event=False).simulate((0, 1), sensitivities=["mu"])
+
+
+def test_steps_go_on_as_without_sensitivities() -> None:
+    plain = ball().simulate((0, 3), rtol=1e-9)
+    run = ball().simulate((0, 3), rtol=1e-9, sensitivities=["g"], sensitivity_control=False)
+    assert list(run.events) == list(plain.events)
+    for name, rows in plain.events.items():
+        np.testing.assert_allclose(run.events[name].t, rows.t, rtol=0, atol=1e-12)
+        assert run.events[name].x.shape == rows.x.shape
+    np.testing.assert_allclose(run.x, plain.x, rtol=0, atol=1e-11)
+
+
+def test_resets_on_constraints_are_refused() -> None:
+    x, y = sd.coordinates("x y")
+    m, length, g = sd.parameters("m l g", positive=True)
+    system = sd.System("bead", gravity=[0, -g])
+    rail, bead = system.add_body("rail", mass=m), system.add_body("bead", mass=m)
+    system.add_joint(sd.Prismatic("along", system.ground, rail, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("up", rail, bead, axis=[0, 1], coordinate=y))
+    system.add_constraint(x**2 + y**2 - length**2, "circle")
+    system.add_event("hit", x, reset={x.dot: -x.dot})
+    system.defaults, system.initial = {m: 1, length: 1, g: 9.81}, {x: 0.6, y: 0.8}
+    module = system.augmented().compile()
+    with pytest.raises(ArgumentError, match="what the constraints make of the reset of hit is not differentiated; choose"):
+        module.simulate((0, 1), sensitivities=["l"])
+    assert module.simulate((0, 1), sensitivities=["l"], events=False).success
