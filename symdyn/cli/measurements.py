@@ -106,6 +106,8 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.sweep:run", "a sweep of a million short motions: rate, memory, a run that is killed and goes on", (
             _number("--count", "count", "motions (default: 1000000)"),
             _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
+    "sensitivities": Measurement(
+        "symdyn.lab.sensitivities:run", "derivatives of motions: errors, and times beside CasADi's CVODES", (_ONLY,)),
     "turbine": Measurement(
         "symdyn.lab.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
     "flexible": Measurement(

@@ -1,0 +1,107 @@
+"""Sensitivities of motions: errors, times beside CasADi's CVODES, the cost of gradients: `symdyn bench sensitivities`.
+
+All figures of one group come from one run. CVODES (Hindmarsh and others, ACM TOMS 31, 2005) gets the same right-hand side:
+symdyn's own statements as compiled C, with CasADi's derivatives of them; Adams' method with functional iteration, which is the
+quickest here; and errors of the sensitivities under control, as symdyn has them. Of each the best timing counts.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import time as clock
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+import symdyn as sd
+from symdyn.bench.toolchain import package_folder
+from symdyn.formulation.equations import Equations
+from symdyn.lab.figures import Figure, print_figures
+from symdyn.tape.node import Node
+
+NAMES = ("m1", "m3", "l1", "l2", "lc5")
+START = np.array([-np.pi / 2 + 0.2, 0.1, -0.1, 0.05, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+END, RTOL = 10.0, 1e-9
+# Its tolerances, from the loosest on, until the error is that of symdyn.
+TRIED = (1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
+
+
+def cvodes() -> Iterator[Figure]:
+    """A pendulum of five links that swings for 10 s, by five parameters, at rtol 1e-9."""
+    equations = sd.systems.n_link_pendulum(5).embedding()
+    module = equations.compile(backend="c")
+
+    def run(rtol: float, method: str = "dop853") -> Any:
+        return module.simulate(np.array([0.0, END]), START[:5], START[5:], rtol=rtol, method=method, sensitivities=NAMES)
+
+    exact = run(1e-14, "taylor").sensitivity.matrix[-1]
+    error = lambda found: float(np.abs(found - exact).max() / np.abs(exact).max())
+    ours = run(RTOL)
+    quickest = min(_seconds(lambda: run(RTOL)) for _ in range(100))
+    own = error(ours.sensitivity.matrix[-1])
+    yield "error of the sensitivities, relative", own, "", f"< {10 * RTOL:g}"
+    yield "time of the motion with sensitivities", 1e3 * quickest, "ms", ""
+    yield "steps", ours.n_steps, "", ""
+    for rtol in TRIED:
+        seconds, found = _by_cvodes(equations, module.default_parameters, rtol)
+        if error(found) <= own or rtol == TRIED[-1]:
+            yield f"CVODES at {rtol:g}: error, relative", error(found), "", ""
+            yield "CVODES: time", 1e3 * seconds, "ms", ""
+            yield "CVODES' time by symdyn's", seconds / quickest, "", ">= 10"
+            return
+
+
+def _seconds(call: Any) -> float:
+    begun = clock.perf_counter()
+    call()
+    return clock.perf_counter() - begun
+
+
+def _by_cvodes(equations: Equations, values: np.ndarray, rtol: float) -> tuple[float, np.ndarray]:
+    """Time of CasADi's CVODES with forward sensitivities, s, and the sensitivities at the end, (n_x, n)."""
+    package_folder("casadi")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # CasADi compiles in the present one
+        return _within_folder(equations, values, rtol)
+
+
+def _within_folder(equations: Equations, values: np.ndarray, rtol: float) -> tuple[float, np.ndarray]:
+    import casadi as ca
+
+    symbols = equations.symbols
+    x = ca.SX.sym("x", len(START))
+    p, by = ca.SX(values), ca.SX.sym("p", len(NAMES))
+    places = [[s.name for s in symbols.parameters].index(name) for name in NAMES]
+    for k, place in enumerate(places):
+        p[place] = by[k]
+    leaves = dict(zip([s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.parameters)],
+                      [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
+    options = {"abstol": rtol, "reltol": rtol, "max_num_steps": 10**7, "fsens_err_con": True, "linear_multistep_method": "adams",
+               "nonlinear_solver_iteration": "functional", "jit": True, "compiler": "shell",
+               "jit_options": {"flags": ["-O3", "-march=native"]}}
+    integrator = ca.integrator("motion", "cvodes", {"x": x, "p": by, "ode": _field(ca, equations, leaves)}, 0, END, options)
+    forward = integrator.forward(len(NAMES))
+    call = lambda: forward(x0=START, p=values[places], fwd_x0=np.zeros((len(START), len(NAMES))), fwd_p=np.eye(len(NAMES)))
+    found = np.array(call()["fwd_xf"])
+    return min(_seconds(call) for _ in range(10)), found
+
+
+def _field(ca: Any, equations: Equations, leaves: dict[str, Any]) -> Any:
+    """x_dot in CasADi's symbols, statement by statement as on the tape."""
+    value: dict[Node, Any] = {}
+    operations = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
+                  "neg": lambda a: -a, "sin": ca.sin, "cos": ca.cos, "guard": lambda a, *_: a}
+    tape = equations.tape("rhs")
+    get = lambda a: value[a] if isinstance(a, Node) else float(a)
+    for node in (*tape.inputs, *tape.steps):
+        value[node] = leaves[node.args[1]] if node.op == "leaf" else operations[node.op](*map(get, node.args))
+    return ca.vertcat(*map(get, tape.outputs["rhs"].entries))
+
+
+GROUPS = (cvodes,)
+
+
+def run(only: Sequence[str] | None = None) -> int:
+    """Print every figure; returns the number of those that miss their bound."""
+    return print_figures(GROUPS, only)
