@@ -25,6 +25,7 @@ _HOME = {
     "symdyn.model.external": ("External",),
     "symdyn.runtime.inputs.inputs": ("Smooth",),
     "symdyn.model.system": ("System",),
+    "symdyn.runtime.losses": ("Loss",),
     "symdyn.runtime.inputs.sampled": ("Sampled",),
     "symdyn.formulation.by_hand.embedding": ("embedding",),
     "symdyn.formulation.by_hand.augmented": ("augmented",),

@@ -24,7 +24,8 @@ from symdyn.runtime.paths import as_path
 def emit(equations: Equations, backend: str, functions: Sequence[str] | None = None,
          templates: str | os.PathLike | None = None, standalone: bool = True, integrator: bool = True,
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
-         batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = ()) -> Source:
+         batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
+         adjoint: tuple[str, ...] | None = None) -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -33,6 +34,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     batch        C only: also rhs and integrator of many states at once, a state in each SIMD lane
     method       C only: the integrator's, one of symdyn.backend.methods.METHODS; what it needs besides rhs is emitted with it
     sensitivities   what x is differentiated by in further states of rhs, see symdyn.backend.right_side.RightSide
+    adjoint      what weights of x_dot are carried back to by further functions, see RightSide
     states       how many random states the reference vectors of a standalone source begin with
 
     Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
@@ -48,7 +50,8 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
         jacobians = backend == "c" and not standalone and templates is None
-        content = content_of(equations, names, standalone, bound, RightSide(work, baumgarte, method, sensitivities), jacobians)
+        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint)
+        content = content_of(equations, names, standalone, bound, right_side, jacobians)
         return render(content, backend, templates, standalone, integrator, batch, method, states)
 
 

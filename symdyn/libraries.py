@@ -55,7 +55,8 @@ class Libraries:
         if isinstance(what, RightSide):
             names = groups.of_right_side(self.equations, what)
             return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
-                        work=what.work, baumgarte=what.baumgarte, method=what.method, sensitivities=what.sensitivities)
+                        work=what.work, baumgarte=what.baumgarte, method=what.method,
+                        sensitivities=what.sensitivities, adjoint=what.adjoint)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                     batch=what == groups.BATCH)

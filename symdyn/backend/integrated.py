@@ -12,6 +12,8 @@ from symdyn.backend.methods import Method
 # The functions that a projection calls, besides those that a method needs.
 OF_PROJECTION = ("position_correction", "velocity_correction", "violation")
 OF_EVENTS = ("events", "event_resets", "reset_directions")
+# Of a run backwards: weights in the place of ud.
+OF_ADJOINT = ("rhs_weights", "corrected_weights")
 # Of sensitivities: their part of a projection, the derivatives of events.
 OF_COLUMNS = ("corrected_columns", "event_columns", "event_reset_columns")
 # Functions of bounds, six of each leaf in the place of ud.
@@ -27,6 +29,7 @@ class Integrated:
     """A function that the integrator calls: its name there, its own, its arguments; whether it reads inputs.
 
     bounded   whether it is called for bounds, at t and x else
+    weighted  whether it is called at t and x with weights besides
     """
 
     called: str
@@ -34,10 +37,11 @@ class Integrated:
     call: str
     inputs: bool
     bounded: bool = False
+    weighted: bool = False
 
     @property
     def signature(self) -> str:
-        at = "const double *ud" if self.bounded else "double t, const double *x"
+        at = "const double *ud" if self.bounded else "double t, const double *x" + ", const double *ud" * self.weighted
         return f"int symdyn_{self.called}(const symdyn_problem *problem, {at}, double *out)"
 
 
@@ -51,6 +55,7 @@ class Shape:
     leaves     what values at events are bounded by: 0 for t, then come x and the inputs
     directed   whether there are directions in which the constraints let entries of [q; u] be reset
     columns    of sensitivities, each as long as the state, which are the last entries of x
+    carried    how many weights are carried back besides those of the state; None: there is no way back
     """
 
     sizes: Mapping[str, int]
@@ -60,6 +65,7 @@ class Shape:
     leaves: Sequence[int] = ()
     directed: bool = False
     columns: int = 0
+    carried: int | None = None
 
     @property
     def n_x(self) -> int:
@@ -91,6 +97,8 @@ def functions(method: Method, arguments_of: Mapping[str, Sequence[str]], call: C
     at = [Integrated("field" if name == "rhs" else f"{name}_at", name, call(name, "out"),
                      n_in > 0 and (name == "rhs" or "inputs" in arguments_of[name]))
           for name in names if name in arguments_of]
+    at += [Integrated(f"{name}_at", name, call(name, "out"), n_in > 0 and "inputs" in arguments_of[name], False, True)
+           for name in OF_ADJOINT if name in arguments_of]
     return at + [Integrated(f"{name}_of", name, call(name, "out"), False, True) for name in OF_BOUNDS if name in arguments_of]
 
 
@@ -108,6 +116,8 @@ def sizes(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> list[tup
         result.append(("SYMDYN_SECOND_ORDER", int(gathered["second_order"])))
     if shape.columns:
         result.append(("SYMDYN_COLUMNS", shape.columns))
+    if shape.carried is not None:
+        result.append(("SYMDYN_CARRIED", shape.carried))
     if shape.columns or method.template == "radau":
         result.append(("SYMDYN_STATE", shape.n_x // (1 + shape.columns)))
     if shape.n_rows:
@@ -137,8 +147,8 @@ def switches(method: Method, shape: Shape, gathered: Mapping[str, Any]) -> dict[
             "SYMDYN_DENSE_STAGES": tableau is not None and bool(tableau.dense_stages),
             "SYMDYN_SECOND_ORDER": bool(gathered.get("second_order")), "SYMDYN_UNROLLED": gathered.get("n_lanes") == 1,
             "SYMDYN_CROSSES": method.crosses and shape.projects, "SYMDYN_PROJECTS": shape.projects,
-            "SYMDYN_SENSITIVE": shape.columns > 0, "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0,
-            "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
+            "SYMDYN_SENSITIVE": shape.columns > 0, "SYMDYN_BACKWARD": shape.carried is not None,
+            "SYMDYN_HAS_CONSTRAINTS": shape.n_rows > 0, "SYMDYN_HAS_UNIT_GROUPS": bool(shape.unit_groups),
             "SYMDYN_HAS_INPUTS": shape.sizes["inputs"] > 0, "SYMDYN_EVENTS": bool(shape.events),
             "SYMDYN_HAS_RESETS": bool(shape.resets), "SYMDYN_KEEPS_RESETS": bool(shape.held),
             "SYMDYN_HAS_BOUNDS": bool(shape.leaves), "SYMDYN_BOUNDED_INPUTS": any(k > shape.n_x for k in shape.leaves)}

@@ -17,19 +17,22 @@ class RightSide:
     baumgarte   whether it is stabilized by Baumgarte's method, with one more parameter: its gain, 1/s
     method      of the integrator, one of symdyn.backend.methods.METHODS
     sensitivities   what the state is differentiated by along the motion, a column each: parameters, inputs, "" for initial values
+    adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
     work: bool = False
     baumgarte: bool = False
     method: str = METHOD
     sensitivities: tuple[str, ...] = ()
+    adjoint: tuple[str, ...] | None = None
 
     @property
     def label(self) -> str:
         """Plain words for messages."""
         parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte),
                  (f"the method {self.method}", self.method != METHOD),
-                 (f"sensitivities in {len(self.sensitivities)} columns", bool(self.sensitivities)))
+                 (f"sensitivities in {len(self.sensitivities)} columns", bool(self.sensitivities)),
+                 ("the way back", self.adjoint is not None))
         added = " and ".join(text for text, there in parts if there)
         return f"rhs with {added}" if added else "rhs"
 

@@ -62,7 +62,7 @@ class Content:
     otherwise     tapes by function name for where the first ones fail
     events        what the function `events` is about: see EventRecord
     event_leaves  what the function `event_bounds` takes bounds of in the group ud: 0 stands for t, then come x and the inputs
-    columns       of sensitivities, which are the last entries of z
+    columns       of sensitivities, which are the last entries of z; carried: weights that are carried back besides those of x
     jacobians     those whose tapes are derivatives along directions
     """
 
@@ -81,6 +81,7 @@ class Content:
     events: Sequence[EventRecord] = ()
     event_leaves: Sequence[int] = ()
     columns: int = 0
+    carried: int | None = None
     jacobians: Mapping[str, Columns] = field(default_factory=dict)
 
 
@@ -180,7 +181,8 @@ def _runtime(environment: jinja2.Environment, backend: str, content: Content, co
     n_rows = context["projection"]["n_rows"] if context["projection"] else 0
     shape = Shape({g: len(content.groups[g]) for g in groups}, n_rows, context["unit_groups"],
                   content.events if context["has_events"] else (), content.event_leaves if context["has_events"] else (),
-                  "reset_directions" in context["arguments_of"], content.columns)
+                  "reset_directions" in context["arguments_of"], content.columns,
+                  content.carried)
     # What is only loaded is compiled as several units; the functions of a series belong to the integrator.
     units = (backend == "c" and context["integrator"] and not context["standalone"] and context["lanes"] is None
              and method.template != "taylor")

@@ -13,12 +13,11 @@ differentiated neither once nor twice. Source: Griewank and Walther, Evaluating 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy as sp
 
 from symdyn.errors import SymdynError
 from symdyn.spatial.vectors import inner, vector
@@ -77,7 +76,7 @@ class Adjoint:
         a = list(at)
         mu = [recorder.leaf(f"(mu {k})", SEED) for k in range(len(residual))]
         weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(
-            [*motion.coordinates, *motion.speeds, *[z for z, _ in motion.states]])]
+            len(motion.rates) + len(motion.speeds) + len(motion.states))]
         with motion.accelerations_given():
             state_rates = motion.state_rates()
         solved = {value for value in at.values() if isinstance(value, Node) and value.op != "leaf"}
@@ -99,6 +98,6 @@ class Adjoint:
             return {**at, **dict(zip(mu, motion.solve_unknowns(-vector(*without)), strict=True))}
 
 
-def weight_names(states: Sequence[sp.Symbol]) -> list[str]:
-    """Names of the weights of the rates of [q; u; z]."""
-    return [f"(weight {s.name})" for s in states]
+def weight_names(n: int) -> list[str]:
+    """Names of the weights of n entries."""
+    return [f"(weight {k + 1})" for k in range(n)]

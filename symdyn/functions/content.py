@@ -63,7 +63,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
                    [[q.name for q in group] for group in equations.unit_groups], otherwise,
                    event_records(equations) if "events" in names else (),
                    _leaf_places(equations, len(groups["q"]) + len(groups["u"]) + len(groups["z"])) if BOUNDS in names else (),
-                   len(right_side.sensitivities), {name: replace(made, tape=tapes[name]) for name, made in several.items()})
+                   len(right_side.sensitivities), None if right_side.adjoint is None else len(right_side.adjoint),
+                   {name: replace(made, tape=tapes[name]) for name, made in several.items()})
 
 
 def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:

@@ -10,7 +10,7 @@ from symdyn.backend.source import CORRECTIONS
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES
-from symdyn.functions.sensitivities import functions_of
+from symdyn.functions.sensitivities import adjoints_of, functions_of
 from symdyn.functions.table import CONSISTENCY, DERIVATIVES, FUNCTIONS, STANDARD, STATICS, VARIATIONS
 from symdyn.functions.tapes import has_function
 from symdyn.shown import shown
@@ -49,6 +49,8 @@ def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...
     names = ["rhs", *(CORRECTIONS if equations.constraints else ())]
     if right_side == RightSide():  # evaluated in or after every simulation
         names += [n for n in ("watches", "switches") if has_function(equations, n)]
+    if right_side.adjoint is not None:
+        return (*names, *adjoints_of(equations))
     if right_side.sensitivities:
         names += functions_of(equations)
     return (*names, *(n for n in _OF_EVENTS if has_function(equations, n)))

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
 from symdyn.formulation.sensitivities import direction_names
 from symdyn.spatial.vectors import vector
+from symdyn.tape.differentiate import reverse
 from symdyn.tape.node import ACCELERATION, STATE
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import Output, Tape
@@ -21,6 +23,10 @@ from symdyn.tape.tape import Output, Tape
 # [q; u] of all columns after the projection of the state; of values at events, and of resets, their derivatives by the time and
 # along every column.
 CORRECTED, OF_EVENTS, OF_RESETS = COLUMNS = "corrected_columns", "event_columns", "event_reset_columns"
+
+
+# From weights of x_dot, and of the state after its projection, to those of the state before and of what there is to change.
+ADJOINTS = ADJOINT, CORRECTED_ADJOINT = "rhs_weights", "corrected_weights"
 
 
 def column_names(symbols: Symbols, sensitivities: Sequence[str]) -> list[str]:
@@ -34,6 +40,11 @@ def functions_of(equations: Equations) -> tuple[str, ...]:
     names = [CORRECTED] if equations.constraints or equations.unit_groups else []
     names += [OF_EVENTS] if "events" in equations.quantities else []
     return (*names, *([OF_RESETS] if "event_resets" in equations.quantities else ()))
+
+
+def adjoints_of(equations: Equations) -> tuple[str, ...]:
+    """The functions that a run backwards needs besides those of the run."""
+    return (ADJOINT, *([CORRECTED_ADJOINT] if equations.constraints or equations.unit_groups else ()))
 
 
 def tape_of(equations: Equations, name: str, sensitivities: Sequence[str]) -> Tape:
@@ -50,6 +61,23 @@ def tape_of(equations: Equations, name: str, sensitivities: Sequence[str]) -> Ta
     of = "events" if name == OF_EVENTS else "event_resets"
     parts = [equations.quantity(f"{of}_rate"), *[_with(equations, f"{of}_variation", column) for column in columns]]
     return _tape(equations, name, np.array(parts, dtype=object).T)
+
+
+def adjoint_tape_of(equations: Equations, name: str, by: Sequence[str]) -> Tape:
+    """The tape of an adjoint: from weights of x_dot, or of the projected state, to those of x and of what `by` names."""
+    symbols, recorder = equations.symbols, equations.recorder
+    n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
+    given = [s.name for s in (*symbols.inputs, *symbols.parameters)]
+    if name == ADJOINT:
+        found = list(equations.quantity("adjoint"))
+    else:
+        leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(symbols)]
+        moved = _with(equations, "corrected_variation", _normal(equations, {"x": leaves[:n_x], "by": leaves[n_x:]}))
+        n_qu = len(moved)
+        weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(n_x)]
+        total = sum((w * e for w, e in zip(weights, [*moved, *leaves[n_qu:n_x]], strict=True)), 0)
+        found = reverse(recorder, total, leaves)
+    return _tape(equations, name, vector(*found[:n_x], *[found[n_x + given.index(one)] for one in by]))
 
 
 def _tape(equations: Equations, name: str, values: np.ndarray) -> Tape:

@@ -48,6 +48,8 @@ def has_function(equations: Equations, name: str) -> bool:
         return bool(event_leaves(equations))
     if name in columns.COLUMNS:
         return name in columns.functions_of(equations)
+    if name in columns.ADJOINTS:
+        return name in columns.adjoints_of(equations)
     return quantity_of(name) in equations.quantities
 
 
@@ -87,7 +89,9 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
     work, baumgarte = right_side.work, right_side.baumgarte
     of_columns = right_side.sensitivities
     with_columns = ("rhs", *columns.COLUMNS) if of_columns else ()
-    tapes = {name: columns.tape_of(equations, name, of_columns) if name in with_columns else tape_as_derived(equations, name)
+    adjoint = right_side.adjoint or ()
+    tapes = {name: columns.tape_of(equations, name, of_columns) if name in with_columns else
+             columns.adjoint_tape_of(equations, name, adjoint) if name in columns.ADJOINTS else tape_as_derived(equations, name)
              for name in names}
     if work or baumgarte:
         field = equations.quantity("rhs_baumgarte" if baumgarte else "rhs")
@@ -169,13 +173,15 @@ def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
         return bound_names(event_leaves(equations))
     if "residual" in names:
         return residual_names(symbols.coordinates, symbols.speeds, symbols.states, n_c)
+    if columns.ADJOINT in names:
+        return weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
     if "outputs_sensitivity" in names:
         return direction_names(symbols)
     given = [f"{s.name}_dot" for s in symbols.speeds]
     if any(n in STATICS or n in VARIATIONS or n in DERIVATIVES for n in names):
         given += multiplier_names(n_c)
     if any(second_named(n) for n in names):
-        given += weight_names([*symbols.coordinates, *symbols.speeds, *symbols.states])
+        given += weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
         wrt = next((second[1] for n in names if (second := second_named(n)) and second[0] == "hessian_product"), ())
         given += [seed for by in wrt for group in BY[by] for seed in seeds_in(equations, group)]
     if any(n in VARIATIONS for n in names):

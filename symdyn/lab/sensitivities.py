@@ -11,9 +11,11 @@ import contextlib
 import tempfile
 import time as clock
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 import symdyn as sd
 from symdyn.bench.toolchain import package_folder
@@ -53,6 +55,12 @@ def cvodes() -> Iterator[Figure]:
             return
 
 
+def _in_turns(*calls: Any) -> list[float]:
+    """The least time of each of some calls, s."""
+    found = [[_seconds(call) for call in calls] for _ in range(60)]
+    return [min(column) for column in zip(*found, strict=True)]
+
+
 def _seconds(call: Any) -> float:
     begun = clock.perf_counter()
     call()
@@ -77,9 +85,9 @@ def _within_folder(equations: Equations, values: np.ndarray, rtol: float) -> tup
         p[place] = by[k]
     leaves = dict(zip([s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.parameters)],
                       [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
-    options = {"abstol": rtol, "reltol": rtol, "max_num_steps": 10**7, "fsens_err_con": True, "linear_multistep_method": "adams",
-               "nonlinear_solver_iteration": "functional", "jit": True, "compiler": "shell",
-               "jit_options": {"flags": ["-O3", "-march=native"]}}
+    options: Any = {"abstol": rtol, "reltol": rtol, "max_num_steps": 10**7, "fsens_err_con": True,
+                    "linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional",
+                    "jit": True, "compiler": "shell", "jit_options": {"flags": ["-O3", "-march=native"]}}
     integrator = ca.integrator("motion", "cvodes", {"x": x, "p": by, "ode": _field(ca, equations, leaves)}, 0, END, options)
     forward = integrator.forward(len(NAMES))
     call = lambda: forward(x0=START, p=values[places], fwd_x0=np.zeros((len(START), len(NAMES))), fwd_p=np.eye(len(NAMES)))
@@ -99,7 +107,36 @@ def _field(ca: Any, equations: Equations, leaves: dict[str, Any]) -> Any:
     return ca.vertcat(*map(get, tape.outputs["rhs"].entries))
 
 
-GROUPS = (cvodes,)
+def gradient() -> Iterator[Figure]:
+    """A loss of PUMA's free fall for 10 s by its parameters and its start, and one of a chain of seven links by 60 numbers."""
+    options: dict[str, Any]
+    for name, n, options in (("puma560", 46, {}), ("spatial_chain", 60, {"n": 7})):
+        module = sd.systems.get(name, **options).equations().compile(backend="c")
+        metadata = module.metadata
+        by = [*[f"{x}(0)" for x in metadata.x], *metadata.parameters][:n]
+        q = [sp.Symbol(name) for name in metadata.q]
+        loss = sd.Loss(integral=q[0] ** 2 + sp.Symbol(metadata.u[1]) ** 2, end=(q[2] - 1) ** 2)
+        motion: dict[str, Any] = {"q": np.linspace(0.1, 0.6, len(q)), "u": np.zeros(len(q)), "rtol": 1e-8}
+        found = module.gradient(loss, by, (0, END), **motion)
+        once, back = _in_turns(partial(module.simulate, np.array([0.0, END]), **motion),
+                               partial(module.gradient, loss, by, (0, END), **motion))
+        yield f"{name}: numbers that the gradient is by", len(by), "", ""
+        yield f"{name}: steps", found.n_steps, "", ""
+        yield f"{name}: time of a motion", 1e3 * once, "ms", ""
+        yield f"{name}: time of its gradient, in motions", back / once, "", "<= 6"
+        yield f"{name}: most memory kept", found.memory / 2**10, "KiB", ""
+
+
+def memory() -> Iterator[Figure]:
+    """What the gradient of a pendulum's swing keeps, over the number of steps."""
+    module = sd.systems.pendulum().embedding().compile(backend="c")
+    found = [module.gradient(sd.Loss(end=sp.Symbol("q1")), ["l"], (0, end), [0.5], max_step=0.01) for end in (100, 400, 6400)]
+    for one in found:
+        yield f"memory that a gradient of {one.n_steps} steps keeps", one.memory / 2**10, "KiB", ""
+    yield "that of the last by that of the one before, of 16 times fewer", found[2].memory / found[1].memory, "", "< 5"
+
+
+GROUPS = (cvodes, gradient, memory)
 
 
 def run(only: Sequence[str] | None = None) -> int:

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
     from symdyn.runtime.inputs.inputs import Inputs
+    from symdyn.runtime.integrating.gradient import Gradient
     from symdyn.runtime.labelled import Labelled
+    from symdyn.runtime.losses import Loss
     from symdyn.runtime.solutions.solution import Solution
     from symdyn.statics.actuation import Actuation
     from symdyn.statics.campbell import Campbell
@@ -665,6 +667,29 @@ class Module:
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
                         stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
                         extend=extend, sensitivities=sensitivities, sensitivity_control=sensitivity_control)
+
+    def gradient(self, loss: Loss, by: Names, t: Numbers | None = None, q: Values | None = None, u: Values | None = None,
+                 params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None, rtol: float = 1e-8,
+                 atol: float | Numbers | None = None, method: str | None = None, max_step: float = 0.0, first_step: float = 0.0,
+                 stabilization: str | None = None, events: bool | str | Sequence[str] = True, interpolation: str = "linear",
+                 extend: str = "error") -> Gradient:
+        """Derivatives of a loss of a motion by many numbers at once, backwards over the steps that were taken.
+
+        loss     sd.Loss: the integral of an expression or function over time, and one at the end
+        by       parameters, constant inputs, by name or symbol, and initial values, as "q1(0)"
+        method   "dop853" (default) or "bs54"; all others as for `simulate`
+
+        They are the derivatives of what these steps compute, exact to rounding at given lengths of the steps; with constraints
+        as far as the corrections are small. The cost is that of some simulations, however many numbers there are; memory grows
+        with the square root of the number of steps. Events are not gone across: pass events=False, or take sensitivities.
+        Returns a Gradient. Raises ArgumentError for what does not fit, EvaluationError where the motion stops early or the loss
+        is not finite.
+        """
+        from symdyn.runtime.integrating.gradient import gradient
+
+        return gradient(self, loss, by, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method,
+                        max_step=max_step, first_step=first_step, stabilization=stabilization, events=events,
+                        interpolation=interpolation, extend=extend)
 
     def simulate_batch(self, q: Values | None = None, u: Values | None = None,
                        params: Values | None = None, *, z: Values | None = None, t: Row | None = None,

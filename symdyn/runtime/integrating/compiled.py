@@ -46,7 +46,7 @@ class Problem(ctypes.Structure):
 _InputFunction = dict(Problem._fields_)["function"]
 
 
-class _Run:
+class Run:
     """One run of the integrator with the memory it works in."""
 
     def __init__(self, unit: CUnit, request: Request) -> None:
@@ -56,7 +56,8 @@ class _Run:
         self.guard: Any = contextlib.nullcontext()
         size = unit.function("simulation_size")
         size.restype = ctypes.c_long
-        self.memory = ctypes.create_string_buffer(size() + 64)
+        self.size = size()
+        self.memory = ctypes.create_string_buffer(self.size + 64)
         self.address = ctypes.c_void_p((ctypes.addressof(self.memory) + 63) // 64 * 64)
         self.request = request
         self.p, self.c = np.zeros(max(1, len(request.field_p))), np.zeros(max(1, unit.metadata.n_c))
@@ -151,6 +152,14 @@ class _Run:
         self.seconds += clock.perf_counter() - begun
         return status
 
+    def checkpoint(self) -> bytes:
+        """All that the run goes on from."""
+        return ctypes.string_at(self.address, self.size)
+
+    def restore(self, checkpoint: bytes) -> None:
+        """Go on from where a checkpoint of this run was made, to the same bits."""
+        ctypes.memmove(self.address, checkpoint, self.size)
+
     def report(self) -> Report:
         """What the run reports now."""
         out, states = RunReport(), np.zeros((2, self.n_x))
@@ -165,7 +174,7 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
     Raises ArgumentError where such a function returns what does not fit.
     """
     unit: Any = module.unit(replace(field or RightSide(), method=method))
-    run = _Run(unit, with_own_tolerances(request, method))
+    run = Run(unit, with_own_tolerances(request, method))
     chatter = chatter_of(module, request)
     piece = PIECE if chatter is None and request.inputs.function is None else STEPS
     short = _short_steps(module, request, method, field)
@@ -268,7 +277,12 @@ def _doubt(module: Module, request: Request, method: str, report: RunReport) -> 
             f"tolerance; use method='{DEFAULT}'")
 
 
-def _message(module: Module, run: _Run, status: int, report: Report, interrupted: bool, stopped: bool,
+def stopped_because(module: Module, run: Run, status: int, report: Report) -> str:
+    """Why a run ended before its end, with when and where."""
+    return _message(module, run, status, report, False, False, "")
+
+
+def _message(module: Module, run: Run, status: int, report: Report, interrupted: bool, stopped: bool,
              chatters: str) -> str:
     metadata, of, x, x_fail = run.unit.metadata, report.of, report.x, report.x_fail
     t, t_fail = of.t, of.t_fail
@@ -311,19 +325,19 @@ def _message(module: Module, run: _Run, status: int, report: Report, interrupted
     return describe_stop(metadata, t, x, f"the integrator does not go on (status {status})")
 
 
-def _series_reason(run: _Run, report: Report) -> str:
+def _series_reason(run: Run, report: Report) -> str:
     """Why a right-hand side that can be evaluated has no series."""
     reason = report.of.reason
     return run.unit.reason(reason) if reason else "its coefficients are not finite"
 
 
-def _dependent(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
+def _dependent(module: Module, run: Run, t: float, x: np.ndarray) -> str:
     """What to add to a message where constraints depend on each other, unlike at the start."""
     n, request = module.metadata.sizes.x, run.request
     return lost_rank(module, t, x[:n], request.p, request.x0[:n], request.span[0])
 
 
-def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
+def _inputs(module: Module, run: Run, t: float, x: np.ndarray) -> str:
     """What to add to a message where an input is not finite; a function of the user is asked once more."""
     request = run.request
     try:
@@ -332,7 +346,7 @@ def _inputs(module: Module, run: _Run, t: float, x: np.ndarray) -> str:
         return ""
 
 
-def _off(module: Module, run: _Run, report: RunReport) -> str:
+def _off(module: Module, run: Run, report: RunReport) -> str:
     """Why a projection failed."""
     rows, reason, worst = module.metadata.constraints, report.reason, report.bad_index
     if reason:

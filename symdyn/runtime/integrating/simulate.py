@@ -63,7 +63,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     """See Module.simulate."""
     metadata = module.metadata
     p = real_parameters(module, params)
-    start = _start(module, q, u, z)
+    start = start_of(module, q, u, z)
     steps, progress, work = (flag(v, f"{module.name}: {what}")
                              for v, what in ((steps, "steps"), (progress, "progress"), (work, "work")))
     method = checked_method(module, method)
@@ -101,7 +101,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
 
             check_ggl(module, start, p, span[0], stabilization, work)
         else:
-            request = replace(request, stabilization=_stabilization(module, request, method, stabilization))
+            request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))
             if asked.columns:
                 asked.check(module, request, method, work)
             if request.stabilization.way == "baumgarte":
@@ -161,7 +161,7 @@ def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) 
     return rows if end >= begin else rows[::-1]
 
 
-def _stabilization(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
+def stabilization_of(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
     """What keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
     one_step = is_compiled(method) or takes_changed_states(solver_class_of(module, method))
     chosen = choose(module, asked, one_step, str(getattr(method, "__name__", method)), request.p)
@@ -176,13 +176,14 @@ def _stabilization(module: Module, request: Request, method: Any, asked: Any) ->
 
 def _trial(module: Module, request: Request, method: Any, stabilization: Any = None) -> Outcome:
     """A run that is thrown away."""
-    done = _run(module, replace(request, stabilization=_stabilization(module, request, method, stabilization)), method)
+    done = _run(module, replace(request, stabilization=stabilization_of(module, request, method, stabilization)), method)
     if done.interrupted:
         raise KeyboardInterrupt
     return done
 
 
-def _start(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
+def start_of(module: Module, q: Any, u: Any, z: Any) -> np.ndarray:
+    """The start x = [q; u; z] as it is given; raises ArgumentError for what does not fit."""
     initial = module.metadata.initial
     parts = []
     for what, values in (("q", q), ("u", u), ("z", z)):

@@ -26,3 +26,6 @@
 #include "events.h"
 #endif
 #include "simulate.h"
+#if SYMDYN_BACKWARD
+#include "backward.h"
+#endif

@@ -1,0 +1,146 @@
+"""Losses of a motion: an integral over time and a cost at the end, as expressions or as functions that give their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn.errors import ArgumentError, EvaluationError, UnsupportedExpression
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a motion costs: the integral of `integral` over time, and `end` at its end.
+
+    Each is an expression of coordinates, speeds, extra states, inputs, parameters and sd.t; or a function of (t, x, p), with
+    x = [q; u; z] and p the parameters in the module's order, that returns its value and its derivatives by x (n_x,) and by p
+    (n_p,), of which the last may be left out where it is zero; or None.
+
+    >>> import symdyn as sd
+    >>> angle = sd.coordinates("angle")
+    >>> loss = sd.Loss(integral=angle**2, end=10 * angle.dot**2)
+
+    Raises ArgumentError where both are None.
+    """
+
+    integral: Any = None
+    end: Any = None
+
+    def __post_init__(self) -> None:
+        if self.integral is None and self.end is None:
+            raise ArgumentError("sd.Loss needs an integral, an end, or both: expressions, or functions of (t, x, p)")
+
+
+class Costs(NamedTuple):
+    """Values (n,), and derivatives by x (n, n_x) and by what a gradient is by (n, n_by); None: these are zero."""
+
+    values: np.ndarray
+    by_x: np.ndarray
+    by: np.ndarray | None
+
+
+Cost = Callable[[np.ndarray, np.ndarray, np.ndarray], Costs]
+
+
+def cost_of(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndarray) -> Cost:
+    """A function of times (n,), states (n, n_x) and inputs (n, n_in) that gives a cost and its derivatives.
+
+    by   parameters and inputs
+    Raises ArgumentError for what is neither an expression of the module's names nor a function.
+    """
+    if callable(given) and not hasattr(given, "free_symbols"):
+        return _of_function(module, what, given, by, p)
+    return _of_expression(module, what, given, by, p)
+
+
+def _of_function(module: Module, what: str, given: Callable[..., Any], by: Sequence[str], p: np.ndarray) -> Cost:
+    n_x, n_p = module.metadata.sizes.x, len(p)
+    places = [module.metadata.parameters.index(name) if name in module.metadata.parameters else -1 for name in by]
+
+    def one(t: float, x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        returned = given(t, x.copy(), p.copy())
+        try:
+            value, by_x, *rest = returned
+            by_p = np.asarray(rest[0] if rest else np.zeros(n_p), dtype=float)
+            result = float(value), np.asarray(by_x, dtype=float), np.append(by_p, 0.0)
+            if result[1].shape != (n_x,) or by_p.shape != (n_p,) or len(rest) > 1:
+                raise ValueError
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{module.name}: the function for {what} of the loss returned {shown(returned)} at t = {t:.6g}; "
+                                f"needed are its value, its derivatives by the {n_x} states and, unless they are zero, by the "
+                                f"{n_p} parameters") from None
+        return result
+
+    def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
+        rows = [one(float(tk), xk) for tk, xk in zip(t, x, strict=True)]
+        return _finite(module, what, t, Costs(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]),
+                                              np.array([r[2][places] for r in rows]).reshape(len(rows), len(by))))
+
+    return all_rows
+
+
+def _of_expression(module: Module, what: str, given: Any, by: Sequence[str], p: np.ndarray) -> Cost:
+    import sympy as sp
+
+    from symdyn.tape import node as kinds
+    from symdyn.tape.differentiate import reverse
+    from symdyn.tape.floats import evaluate_rows
+    from symdyn.tape.node import is_zero
+    from symdyn.tape.recorder import Recorder
+    from symdyn.tape.sympy_bridge import record_expression
+    from symdyn.tape.tape import Tape
+
+    metadata, recorder = module.metadata, Recorder()
+    names = {"t": kinds.TIME, **dict.fromkeys(metadata.x, kinds.STATE), **dict.fromkeys(metadata.inputs, kinds.INPUT),
+             **dict.fromkeys(metadata.parameters, kinds.PARAMETER)}
+    leaves = {name: recorder.leaf(name, kind) for name, kind in names.items()}
+    try:
+        expression = sp.sympify(given, strict=True)
+    except (sp.SympifyError, TypeError):
+        raise ArgumentError(f"{module.name}: {what} of the loss is {shown(given)}; pass an expression of coordinates, speeds, "
+                            "inputs, parameters and sd.t, or a function of (t, x, p) that returns its value and its "
+                            "derivatives") from None
+    unknown = sorted(str(s) for s in expression.free_symbols if str(s) not in leaves)
+    if unknown:
+        raise ArgumentError(f"{module.name}: {what} of the loss has {', '.join(unknown)}, which is no state, input or parameter "
+                            f"here; there are {', '.join(names)}")
+    try:
+        value = record_expression(recorder, expression, {s: leaves[str(s)] for s in expression.free_symbols})
+    except UnsupportedExpression as error:
+        raise ArgumentError(f"{module.name}: {what} of the loss: {error}; write it in coordinates and speeds, or pass a function "
+                            "of (t, x, p) that returns its value and its derivatives") from None
+    slopes = reverse(recorder, value, [leaves[name] for name in (*metadata.x, *by)])
+    if all(map(is_zero, slopes[metadata.sizes.x:])):
+        slopes = slopes[:metadata.sizes.x]
+    tape = Tape.of(recorder, values=np.array([value], dtype=object), slopes=np.array(slopes, dtype=object))
+    fixed = dict(zip(metadata.parameters, p.tolist(), strict=True))
+
+    def all_rows(t: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> Costs:
+        at = {"t": t, **dict(zip(metadata.x, x.T, strict=True)), **dict(zip(metadata.inputs, inputs.T, strict=True)), **fixed}
+        found = evaluate_rows(tape, at, len(t))
+        values, rows = found["values"].reshape(len(t)), found["slopes"].reshape(len(t), -1)
+        others = rows[:, x.shape[1]:] if len(slopes) > x.shape[1] else None
+        return _finite(module, what, t, Costs(values, rows[:, :x.shape[1]], others))
+
+    return all_rows
+
+
+def _finite(module: Module, what: str, t: np.ndarray, costs: Costs) -> Costs:
+    """Raises EvaluationError where a value or a derivative is not finite."""
+    slope = "has a derivative that is"
+    for kind, rows in (("is", costs.values[:, None]), (slope, costs.by_x), (slope, costs.by)):
+        if rows is None:
+            continue
+        bad = ~np.isfinite(rows).all(axis=1)
+        if bad.any():
+            place = int(bad.argmax())
+            wrong = rows[place][~np.isfinite(rows[place])][0]
+            raise EvaluationError(f"{module.name}: {what} of the loss {kind} {wrong:g} at t = {t[place]:.6g} s")
+    return costs
