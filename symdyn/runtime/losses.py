@@ -12,7 +12,10 @@ from symdyn.errors import ArgumentError, EvaluationError, UnsupportedExpression
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
+    from symdyn.given import Scalar
     from symdyn.runtime.module import Module
+
+    LossFunction = Callable[[float, np.ndarray, np.ndarray], tuple[float, np.ndarray] | tuple[float, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,8 @@ class Loss:
     Raises ArgumentError where both are None.
     """
 
-    integral: Any = None
-    end: Any = None
+    integral: Scalar | LossFunction | None = None
+    end: Scalar | LossFunction | None = None
 
     def __post_init__(self) -> None:
         if self.integral is None and self.end is None:

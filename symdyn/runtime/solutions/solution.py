@@ -272,6 +272,10 @@ class Solution:
         """Derivatives of the state along the motion by what `simulate` was asked for: sol.sensitivity["m1"] is (n_t, n_x).
 
         Raises ArgumentError if the simulation was not asked for sensitivities.
+
+        >>> solution = sd.systems.pendulum().compile().simulate((0, 1), sensitivities=["l"])
+        >>> solution.sensitivity["l"].shape == solution.x.shape
+        True
         """
         if self._columns is None or self._asked is None:
             raise ArgumentError(f"{self.module.name}: this motion has no sensitivities; pass simulate(..., sensitivities=[...]) "
