@@ -66,7 +66,7 @@ def diagnose(system: System, q: Any = None, params: Any = None, t: float = 0.0, 
     except ModelError as error:
         rows = len(model.loops) + len(model.constraints)
         return Diagnosis(model.name, len(model.speeds), rows, (), len(model.speeds) - rows, consistent=False, faults=error.faults,
-                         remarks=("no more can be told until this is put right",))
+                         remarks=("no more can be found out until this is put right",))
     quantities = ConstrainedTree(tree, gathered, kernel=True)
     names = {"constraints": tuple(r.name for r in gathered.rows), "holonomic": tuple(r.holonomic for r in gathered.rows)}
     equations = tree_result(quantities, "augmented", AugmentedEquations, lambda: equations, **names)
@@ -133,8 +133,8 @@ class _Examination:
         kinds: dict[str, list[str]] = {}
         for joint in model.joints:
             kinds.setdefault(joint.kind, []).append(joint.name)
-        told = "; ".join(f"{kind} {', '.join(listed)}" for kind, listed in kinds.items())
-        lines.append(f"joints of the tree ({told}) take {taken}: {speeds} speeds left")
+        types = "; ".join(f"{kind} {', '.join(listed)}" for kind, listed in kinds.items())
+        lines.append(f"joints of the tree ({types}) take {taken}: {speeds} speeds left")
         rows = list(zip(self.owners, self.names, strict=True))
         owners = {c.joint.name for c in self.gathered.closures}
         for name in self.gathered.trivial:
@@ -271,16 +271,16 @@ class _Examination:
                 self.remarks.append("the motion that is left by rank is infinitesimal: no step along it stays on the constraints")
             elif gone < self.reach - STEP and not near:
                 self.remarks.append(f"motions could be followed up to {gone:.3g} from the state only")
-        told = []
+        found = []
         for n in singular:
             J, _ = scaled.at(n.q[None])
             rows = self._lost_there(J[0], scaled.rank)
-            told.append(SingularState(dict(zip(self.states.names, map(float, n.q), strict=True)), n.size, n.distance, rows,
+            found.append(SingularState(dict(zip(self.states.names, map(float, n.q), strict=True)), n.size, n.distance, rows,
                                       n.size < LOST))
-        if any(s.lost for s in told):
+        if any(s.lost for s in found):
             self.advice.append("where rank is lost motions can branch, and multipliers of constraints that depend on each other "
                                "there are not unique; keep the motion away from there if that should not matter")
-        return replace(plain, singular=tuple(told), remarks=tuple(self.remarks))
+        return replace(plain, singular=tuple(found), remarks=tuple(self.remarks))
 
     def _lost_there(self, J: np.ndarray, rank: int) -> tuple[str, ...]:
         """Rows that take part in combinations that nearly vanish there, and do not elsewhere."""

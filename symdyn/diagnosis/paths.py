@@ -11,7 +11,7 @@ from symdyn.formulation.constraints.consistent_states import FULFILLED, Constrai
 STEP = 0.05
 # Motions that are followed, each both ways.
 MOTIONS = 6
-# Singular values below this part are told; below the second one rank counts as lost.
+# Singular values below this part are reported; below the second one rank counts as lost.
 NEAR, LOST = 1e-2, 1e-5
 ZOOMS, POINTS = 6, 17
 

@@ -1,4 +1,4 @@
-"""What is given for frames and points, taken over with all faults told at once."""
+"""What is given for frames and points, taken over with all faults reported at once."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def rotation_fault(R: sp.ImmutableMatrix) -> str:
 
 
 def _worst(R: sp.ImmutableMatrix, points: dict[str, np.ndarray]) -> str:
-    """The largest fault at some points, told with the values of the symbols there."""
+    """The largest fault at some points, with the values of the symbols there."""
     recorder = Recorder()
     leaves = {name: recorder.leaf(name, 0) for name in points}
     memory: dict[sp.Basic, Any] = {}

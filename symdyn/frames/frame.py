@@ -26,7 +26,7 @@ class Frame(Axes):
     origin     (3,) this origin from the parent's, the parent's components, m
     Coordinates are those of sd.coordinates; SymPy's dynamicsymbols are taken over as such. `path` is the frames from the
     first of the tree to this one.
-    Raises ModelError telling all faults, or NotARotation with numbers if the rotation alone is at fault; a symbolic rotation
+    Raises ModelError listing all faults, or NotARotation with numbers if the rotation alone is at fault; a symbolic rotation
     is checked at random values of its symbols (four Euler parameters: with norm 1).
     Source: lecture, chapters 1.2, 1.6 and 1.7.
 
@@ -56,7 +56,7 @@ class Frame(Axes):
     def body(self, mass: Scalar, inertia: Inertia, com: Components = (0, 0, 0)) -> Body:
         """A rigid body fixed to this frame: mass kg, inertia (3, 3) about the centre of mass, these axes, kg m^2, com (3,) m.
 
-        Raises ArgumentError, telling all faults.
+        Raises ArgumentError, listing all faults.
         """
         return Body(self, mass, inertia, com)
 

@@ -30,7 +30,7 @@ def numbers(value: Scalar | sp.MatrixBase, values: Motions | None = None, t: Tim
     t        a time in s, or an array of times (n_t,); without it sd.t may stand in values
     Returns a float for an expression, (n,) for a column, (m, n) for a matrix; with an array t the times come first. With an
     array t a number is a constant motion, with rate 0; at one instant its rate is a value of its own.
-    Raises ArgumentError, telling all faults, for missing values, values that are no finite numbers, and a bad t;
+    Raises ArgumentError, listing all faults, for missing values, values that are no finite numbers, and a bad t;
     EvaluationError where the result is not finite.
     """
     entries, shape = _entries(value)
@@ -110,7 +110,7 @@ def _sampled(name: str, function: Callable, times: np.ndarray, functions: dict[s
 
 
 def _with_rates(given: dict[str, sp.Expr], over_time: bool) -> dict[str, sp.Expr]:
-    """Adds the rates that follow from motions; at one instant a mere number tells nothing of the rate."""
+    """Adds the rates that follow from motions; at one instant a mere number says nothing of the rate."""
     table = dict(given)
     for name, motion in given.items():
         if name == time.name:

@@ -1,4 +1,4 @@
-"""Masses, inertias and vectors of a rigid body taken over, numbers or expressions, with all faults told at once."""
+"""Masses, inertias and vectors of a rigid body taken over, numbers or expressions, with all faults reported at once."""
 
 from __future__ import annotations
 

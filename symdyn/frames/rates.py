@@ -29,7 +29,7 @@ def rate(value: Any) -> Any:
 
     value   an expression, or a matrix or (nested) list of them; SymPy's dynamicsymbols are taken over as coordinates
     Returns an expression for an expression, else a sp.Matrix of the same shape; a list gives a column. Nothing is simplified.
-    Raises ModelError, telling all faults, for text, NaN, what is no expression, and for q.ddot and inputs, whose rates
+    Raises ModelError, listing all faults, for text, NaN, what is no expression, and for q.ddot and inputs, whose rates
     have no symbol.
     Source: lecture, chapter 1.7.
 

@@ -35,7 +35,7 @@ def inertia_about(I_G: Matrix, mass: Scalar, r: Components) -> Array:
     I_G    (3, 3) about G, kg m^2
     mass   kg
     r      (3,) from O to G, or from G to O, m
-    Raises ArgumentError, telling all faults, for an inertia that is not symmetric or that no body has, and wrong shapes.
+    Raises ArgumentError, listing all faults, for an inertia that is not symmetric or that no body has, and wrong shapes.
     Source: lecture, chapter 2.2.
     """
     take = Quantities("inertia_about")
@@ -106,7 +106,7 @@ def angular_momentum(inertia: Matrix, omega: Components, mass: Scalar = 0, r_G: 
     mass       kg
     r_G        (3,) from O to the centre of mass, m
     velocity   (3,) v_O, m/s
-    Raises ArgumentError, telling all faults.
+    Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
     """
     take = Quantities("angular_momentum")
@@ -120,7 +120,7 @@ def kinetic_energy(mass: Scalar, inertia: Matrix, velocity: Components, omega: C
     """T = m v_O^2 / 2 + m v_O . (omega x r_G) + omega^T I_O omega / 2, J; the same number in n- and in b-components.
 
     inertia, velocity   I_O (3, 3) and v_O (3,) of one point O of the body; r_G (3,) from there to the centre of mass
-    Raises ArgumentError, telling all faults.
+    Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
     """
     take = Quantities("kinetic_energy")
@@ -144,7 +144,7 @@ def moment_equation(inertia: Matrix, omega: Components, alpha: Components, mass:
     mass           kg
     r_G            (3,) from O to the centre of mass, m
     acceleration   (3,) a_O seen from the inertial frame, m/s^2
-    Raises ArgumentError, telling all faults.
+    Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.1.
     """
     take = Quantities("moment_equation")
@@ -158,7 +158,7 @@ def force_equation(mass: Scalar, acceleration: Components, omega: Components = (
                    r_G: Components = (0, 0, 0)) -> Array:
     """The force that the motion needs, (3,), N: F = m a_G = m (a_O + alpha x r_G + omega x (omega x r_G)).
 
-    Arguments as for `moment_equation`; O = G if r_G is left out. Raises ArgumentError, telling all faults.
+    Arguments as for `moment_equation`; O = G if r_G is left out. Raises ArgumentError, listing all faults.
     Source: lecture, chapters 2.1 and 2.2.
     """
     take = Quantities("force_equation")
@@ -175,7 +175,7 @@ def planar_moment_equation(inertia: Scalar, alpha: Scalar, mass: Scalar = 0, r_G
     inertia             I_O about z, kg m^2, a number or expression
     alpha               rad/s^2
     r_G, acceleration   (2,) from O to the centre of mass, m, and a_O seen from the inertial frame, m/s^2
-    Raises ArgumentError, telling all faults.
+    Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
     """
     take = Quantities("planar_moment_equation")
@@ -189,7 +189,7 @@ def planar_force_equation(mass: Scalar, acceleration: Components, omega: Scalar 
                           r_G: Components = (0, 0)) -> Array:
     """In the plane: F = m a_G = m (a_O + alpha [-y_G, x_G] - omega^2 r_G), (2,), N.
 
-    Arguments as for `planar_moment_equation`; omega rad/s. Raises ArgumentError, telling all faults.
+    Arguments as for `planar_moment_equation`; omega rad/s. Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
     """
     take = Quantities("planar_force_equation")
@@ -205,7 +205,7 @@ def equivalent_force_system(force: Components, r: Components, moment: Components
     force    (3,) at P, N
     r        (3,) from G to P, m
     moment   (3,) about P, N m
-    Raises ArgumentError, telling all faults.
+    Raises ArgumentError, listing all faults.
     Source: lecture, chapter 2.2.
     """
     take = Quantities("equivalent_force_system")

@@ -86,7 +86,7 @@ def _axial(skew: sp.Matrix) -> sp.ImmutableMatrix:
 
 
 def demand_frames(**given: Any) -> None:
-    """Raise ArgumentError, telling all faults, for values that are no frames or are frames of different trees."""
+    """Raise ArgumentError, listing all faults, for values that are no frames or are frames of different trees."""
     faults = [f"{what} is {shown(value)}; pass a frame" for what, value in given.items() if not isinstance(value, Axes)]
     if not faults:
         roots = {id(value.path[0]): value.path[0] for value in given.values()}

@@ -43,7 +43,7 @@ class External:
     precise      f(mp, *arguments) for an mpmath context and its numbers, which proofs and reference vectors are then made with;
                  without it these see the function in floating point
     texts        backend -> text, for backends of one's own
-    reason       what it means where the function fails or a result is not finite; there a simulation stops and tells it
+    reason       what it means where the function fails or a result is not finite; there a simulation stops and reports it
     operations   about how many operations it takes: what counts of it in reports and choices
 
     Of a Piecewise all parts are computed, so that a function must not fail where another part holds.

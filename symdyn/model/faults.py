@@ -1,4 +1,4 @@
-"""Collects the faults of a description, so that one message tells all of them."""
+"""Collects the faults of a description, so that one message lists all of them."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Shape:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What else there is to tell: kind, and what is no number."""
+        """The rest of the description: kind, and what is no number."""
         raise NotImplementedError
 
 

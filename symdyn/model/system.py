@@ -60,7 +60,7 @@ class System:
 
     `ground` is the inertial n-frame (or, after `move_ground`, the moving base). `defaults` holds a number for each
     parameter, `initial` for coordinates, speeds, states and inputs, `duration` the usual time of simulation, `units`
-    the unit of a symbol where it cannot be told from its use. Faults are collected while describing; `check()` and
+    the unit of a symbol where it cannot be inferred from its use. Faults are collected while describing; `check()` and
     every formulation raise them all in one ModelError.
 
     >>> q, = sd.coordinates("q,")
@@ -524,12 +524,12 @@ class System:
 
         q             coordinates of the state to look at, in order, or by symbol or name; what is left out takes its initial
                       value; the nearest consistent state is taken
-        params        numbers for parameters; others take their default, those without one a random number, which is told
+        params        numbers for parameters; others take their default, those without one a random number, which is reported
         t             time, s; coordinates: as for `augmented`
         reach         how far from the state singular configurations are looked for, along up to six independent motions both
                       ways: change of the fastest speed's coordinate, rad or parts of the mechanism's length
         Returns a Diagnosis, which prints as text. Raises ModelError for a description with faults; contradictory constraints
-        are told in the diagnosis.
+        are listed in the diagnosis.
 
         >>> print(sd.systems.pendulum().diagnose())
         pendulum: diagnosis of the constraints
@@ -544,7 +544,7 @@ class System:
         constraints the augmented ones in relative coordinates.
 
         tune   compile the candidates and time them, instead of predicting from their operations
-        The result's `candidates` tells what it was chosen from. Raises ModelError with every fault found.
+        The result's `candidates` lists what it was chosen from. Raises ModelError with every fault found.
 
         >>> sd.systems.pendulum().equations().formulation
         'embedding'
@@ -575,7 +575,7 @@ class System:
         Numbers read back to the last bit (angles of a frame: to rounding), with the same names; what `sd.read_urdf` made is read
         back equal. Links have their frames at their joints, as the format has it; the root link is the one body that a Fixed
         joint holds at the ground's frame, else a link "world". Joints without limits are written as continuous, dependent
-        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity (a ModelWarning tells where it is not what
+        coordinates as <mimic>, damping forces of joints as <dynamics>. Gravity (a ModelWarning says where it is not what
         `sd.read_urdf` takes), drives by inputs, outputs and shapes have no place in it. Returns the path.
 
         Raises ModelError with all faults: of the description, what a URDF has no words for, parameters without a number, and a

@@ -26,17 +26,17 @@ class Bending:
     eta: np.ndarray
 
     def of(self, part: Part) -> Bending:
-        """The displacements of a part's vertices: those of the beam's points beside them."""
+        """The displacements of a part's vertices: those of the beam's points next to them."""
         axis = int(np.ptp(self.points, axis=0).argmax())
         order = np.argsort(self.points[:, axis])
         along = self.points[order, axis]
 
-        def beside(values: np.ndarray) -> np.ndarray:
+        def nearest(values: np.ndarray) -> np.ndarray:
             columns = values[order].reshape(len(order), -1).T
             found = np.column_stack([np.interp(part.stations[:, axis], along, column) for column in columns])
             return found.reshape(len(part.stations), *values.shape[1:])
 
-        return Bending(part.stations, beside(self.shapes), beside(self.second), self.eta)
+        return Bending(part.stations, nearest(self.shapes), nearest(self.second), self.eta)
 
     def between(self, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> Bending:
         """At other times: a share w (n, 1) of the way from the times a to the times b."""

@@ -64,14 +64,14 @@ def plot(diagram: Campbell, path: Any = None, harmonics: Sequence[float] = (1, 3
         axes.grid(alpha=0.3)
     upper.secondary_xaxis("top", functions=(lambda w: w * RPM, lambda n: n / RPM)).set_xlabel("[rpm]", fontsize=8)
     beyond = [f"{diagram.names[k]} ({lowest[k]:.3g} Hz)" for k in np.argsort(lowest) if not seen[k] and np.isfinite(lowest[k])]
-    told = "\n".join(["not shown, above:", *beyond]) if beyond else None
+    note = "\n".join(["not shown, above:", *beyond]) if beyond else None
     if many:
         _name_ends(upper, diagram, [(k, look[0]) for k, look in zip(order, looks, strict=True)], highest)
-        if told:
-            upper.annotate(told.replace("\n", " ", 1).replace("\n", ", "), (0.01, 0.985), xycoords="axes fraction", fontsize=8,
+        if note:
+            upper.annotate(note.replace("\n", " ", 1).replace("\n", ", "), (0.01, 0.985), xycoords="axes fraction", fontsize=8,
                            color="0.3", va="top")
     else:
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False, title=told,
+        figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False, title=note,
                       title_fontsize=8)
     upper.set_title(f"{diagram.title}: Campbell diagram", fontsize=11)
     if path is not None:
@@ -106,7 +106,7 @@ def _by_part(names: Sequence[str]) -> list[tuple[Any, str]]:
 
 
 def _name_ends(axes: Any, diagram: Campbell, lines: Sequence[tuple[Any, Any]], highest: float) -> None:
-    """Names beside the right ends of lines, from above, apart from each other; lines that end above or early at the edge."""
+    """Names next to the right ends of lines, from above, apart from each other; lines that end above or early at the edge."""
     ends = [min(float(np.nan_to_num(diagram.frequencies[-1, k])) / highest, 1.0) for k, _ in lines]
     places: list[float] = []
     for end in ends:  # each below the one before

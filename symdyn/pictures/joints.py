@@ -1,4 +1,4 @@
-"""Who carries whom: joints of bodies, found in their motion, where a module does not tell them."""
+"""Who carries whom: joints of bodies, found in their motion, where a module does not list them."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class Part:
     """A convex piece of a shape, or a line.
 
     vertices   (n, 3); stations: (n, 3), the point of the middle line that each goes with when its body bends
-    faces      vertices of each, counter-clockwise from outside; corners: (m, 4), four of them, which tell the plane
+    faces      vertices of each, counter-clockwise from outside; corners: (m, 4), four of them, which define the plane
     hidden     (k, 4), corners of planes where pieces touch: never drawn, but they part the pieces
     edges      (k, 4): two vertices, two faces (-1: none); creases: (k,), drawn from every side, others as outlines alone
     width      of lines, in points of print; to: the body that the last vertex of a line is on, if it is another

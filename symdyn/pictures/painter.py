@@ -1,6 +1,6 @@
 """What is drawn before what: pieces that lie behind come first, and what is under water before the water.
 
-Convex pieces are told apart by the planes of their faces: if one of them has the other piece wholly on its outer side, then the
+Convex pieces are ordered by the planes of their faces: if one of them has the other piece wholly on its outer side, then the
 other hides it where the eye is on that side, too, and is hidden by it otherwise. Pieces that stick into each other are parted by
 the plane that comes nearest to it.
 """

@@ -320,15 +320,15 @@ class _Balance:
         shares = direction**2
         # Equal shares in the order of the coordinates, whatever rounding says.
         along = [k for k in np.argsort(-shares.round(6), kind="stable") if shares[k] >= SHARE]
-        told = ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in along)
+        directions = ", ".join(f"{labels[k]} ({shares[k]:.2f})" for k in along)
         if len(along) == 1 and shares[along[0]] > 1 - 1e-9:
             unit = force_unit(metadata.units.get(metadata.u[along[0]], ""))
             amount = f"{np.linalg.norm(missing) / self.scales[along[0]]:.6g} {unit}".rstrip()
         else:
             amount = f"{np.linalg.norm(missing):.6g} N (moments divided by {natural_length(place):.3g} m)"
-        which = (f"no input works along {told}" if not sought else
-                 f"{', '.join(sought)} cannot work along {told}") if metadata.inputs else \
-            f"the system has no inputs, so nothing works along {told}"
+        which = (f"no input works along {directions}" if not sought else
+                 f"{', '.join(sought)} cannot work along {directions}") if metadata.inputs else \
+            f"the system has no inputs, so nothing works along {directions}"
         raise ArgumentError(
             f"{owner}: no inputs make this motion: {which}, where {amount} {'is' if len(along) == 1 else 'are'} missing; rank "
             f"{drive.rank} of {self.Z.shape[1]} freedoms. Add an input there, such as add_joint_force(joint, sd.inputs('tau')), "

@@ -292,8 +292,8 @@ def begin(module: Module, selection: Selection, start: Any, params: Any, t: floa
         params = {**dict.fromkeys([n for n in selection.parameters if n not in passed and known[n] is None], 0.0), **params}
     place = rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
     if place.motion_rates:
-        told = ", ".join(f"{name} = {value:g}" for name, value in place.motion_rates.items())
-        raise ArgumentError(f"{module.name}: an equilibrium was requested with {told} among the inputs; at rest a motion has no "
+        rates = ", ".join(f"{name} = {value:g}" for name, value in place.motion_rates.items())
+        raise ArgumentError(f"{module.name}: an equilibrium was requested with {rates} among the inputs; at rest a motion has no "
                             "rate and no acceleration: give its value alone")
     return place
 

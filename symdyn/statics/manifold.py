@@ -279,9 +279,9 @@ class Manifold:
         """Raises ArgumentError where a motion moves what the constraints hold fast, so that there are no B and D."""
         if self._unfollowed.any():
             metadata = self.place.module.metadata
-            told = ", ".join(n for n, lost in zip(metadata.inputs, self._unfollowed, strict=True) if lost)
+            inputs = ", ".join(n for n, lost in zip(metadata.inputs, self._unfollowed, strict=True) if lost)
             raise ArgumentError(f"{self.place.module.name}: B and D are requested where the constraints do not let the mechanism "
-                                f"follow changes of {told}, to first order: the position is singular, or the constraints and "
+                                f"follow changes of {inputs}, to first order: the position is singular, or the constraints and "
                                 "what is held leave nothing to follow by; move away from there, or hold less")
 
     def output_matrices(self) -> tuple[np.ndarray, np.ndarray]:

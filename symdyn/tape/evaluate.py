@@ -1,4 +1,4 @@
-"""Evaluate a tape directly: at any precision with mpmath, which is the yardstick for rounding error, or in floats."""
+"""Evaluate a tape directly: at any precision with mpmath, which is the reference for rounding error, or in floats."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Element:
 
 
 class _Builder:
-    """What the parser tells its elements to."""
+    """What takes elements from the parser."""
 
     def __init__(self) -> None:
         self.parser: Any = None
@@ -96,8 +96,8 @@ def read_document(path: Path) -> Element:
         root = builder.parser.close()
     except DefusedXmlException:
         line = builder.parser.parser.CurrentLineNumber
-        raise ModelError([f"{path}:{line}: the file declares a document type, which is refused: entities and other files come in "
-                          "by it, and a URDF needs none; leave out <!DOCTYPE ...>"]) from None
+        raise ModelError([f"{path}:{line}: the file declares a document type, which is rejected: entities and other files come "
+                          "in by it, and a URDF needs none; leave out <!DOCTYPE ...>"]) from None
     except ParseError as error:
         raise ModelError([f"{path}:{error.position[0]}: {_no_xml(str(error), text, error.position[0])}"]) from None
     except (ValueError, LookupError) as error:

@@ -26,7 +26,7 @@ def demand_inertia(robot: Robot, order: list[UrdfJoint], moving: dict[str, str],
     movers = _movers(order, moving)
     borne: dict[str, float] = {}
     further: set[str] = set()
-    # From the leaves inwards: what has mass tells the joint that carries it, and that one the next.
+    # From the leaves inwards: what has mass passes it to the joint that carries it, and that one to the next.
     heavy: set[str] = set()
     for link in (robot.links[joint.child] for joint in reversed(order)):
         mover = movers.get(link.name)

@@ -1,4 +1,4 @@
-"""Elements to a Robot: every fault of the file is told, with its line."""
+"""Elements to a Robot: every fault of the file is reported with its line."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def read_urdf(path: str | Path, symbolic: str | Sequence[str] = (), root: str = 
     coordinate, but multiplier q + offset in terms of the other's; the drive of q then moves both. A link without <inertial> has
     no mass. Friction, limits, drives, meshes and whatever else is in the file are not looked at, nor are files it refers to.
 
-    Raises ModelError that tells every fault of the file with its line; ArgumentError for an unknown root, and for a path and
+    Raises ModelError that lists every fault of the file with its line; ArgumentError for an unknown root, and for a path and
     names that are none; MissingExtra without defusedxml. Source of the format: wiki.ros.org/urdf/XML.
 
     >>> import tempfile

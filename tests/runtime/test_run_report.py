@@ -179,7 +179,7 @@ def test_equations_by_hand_and_constraints_have_reports(tmp_path: Path) -> None:
     m, g = sd.parameters("m g")
     by_hand = sd.embedding([x], [x], [m], [-m * g], defaults={m: 1}).compile("numpy").simulate((0, 1), params={g: 9.81})
     text = by_hand.report(tmp_path / "hand.html").read_text(encoding="utf-8")
-    assert "do not tell the energy" in text
+    assert "do not define the energy" in text
     assert [row for row in rows(text, "given") if len(row) == 4][-1] == ["g", "9.81", "", "none"]
     system = sd.System("bead", gravity=[0, -9.81])
     body = system.add_body("bead", mass=1)

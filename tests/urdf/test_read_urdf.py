@@ -295,7 +295,7 @@ def test_masses_that_no_body_has(tmp_path: Path) -> None:
 BOMB = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10))
 
 
-DOCTYPE = ("the file declares a document type, which is refused: entities and other files come in by it, and a URDF needs none; "
+DOCTYPE = ("the file declares a document type, which is rejected: entities and other files come in by it, and a URDF needs none; "
            "leave out <!DOCTYPE ...>")
 
 
@@ -316,7 +316,7 @@ DOCTYPE = ("the file declares a document type, which is refused: entities and ot
     ('<?xml version="1.0" encoding="nonsense"?>\n<robot/>',
      "1: the text cannot be decoded (unknown encoding: nonsense); save it as UTF-8"),
 ])
-def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
+def test_files_that_are_rejected(tmp_path: Path, text: str, told: str) -> None:
     assert faults(tmp_path, text) == [told]
 
 

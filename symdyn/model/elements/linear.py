@@ -37,7 +37,7 @@ class LinearStiffness(Element):
     K           (6, 6): N/m, N, N m, N m/rad; a list of 6 stands for its diagonal
     force       (6,) at the reference: N, N m; point: (3,) body axes, m; reference: (6,) m, rad
     angles      "ZYX": roll, pitch, yaw of R = R_z(psi) R_y(theta) R_x(phi), along whose rates the moments act; singular at a
-                pitch of 90 degrees, where the run stops and tells so
+                pitch of 90 degrees, where the run stops and says so
                 "rotation vector": axis times angle, without singularity below half a turn, where it jumps to the opposite
                 "auto": "ZYX" for a body whose joint with the ground has these angles, also through bodies that are fixed to
                 each other, else the rotation vector; in absolute coordinates as the joints of the tree have it
@@ -116,7 +116,7 @@ class LinearStiffness(Element):
                      f"{TILT:g} degrees")
 
     def _turn(self, site: Site) -> Watch:
-        """Of a potential that is alike on both sides of half a turn the energy tells nothing."""
+        """Of a potential that is alike on both sides of half a turn the energy decides nothing."""
         a, r = site.algebra, site.rotation_vector
         return Watch(f"turn of {self.where}", a.sqrt(dot(r, r)) * 180 / a.recorder.pi(), -1.0, TURN,
                      f"{self.where}: the body has turned by {{value}} degrees; at half a turn its angles jump, and the moments "

@@ -37,7 +37,7 @@ class MooringLine(Element):
     by 2.5e-4 for the lines of a barge), so that it counts as one that does work. A line that is longer than what hangs
     and what lies on the seabed is slack: it hangs straight down, without horizontal force.
     A fairlead may be straight above or below its anchor, as that of a tension leg is: horizontal distances below 2e-9 of the
-    length count as such. The run stops, and tells why, where the fairlead is not above the seabed; a strain at the fairlead
+    length count as such. The run stops with the reason where the fairlead is not above the seabed; a strain at the fairlead
     above 5 % gives a warning.
     Source: Jonkman, NREL/TP-500-41958 (2007), quasi-static mooring lines; see symdyn.tape.catenary for the equations.
 

@@ -1,4 +1,4 @@
-"""What an element of load is told about its body, and what it answers."""
+"""What an element of load gets about its body, and what it returns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every joint has: two bodies, a frame on each, coordinates; and what it must tell: its motion."""
+"""What every joint has: two bodies, a frame on each, coordinates; and what it must define: its motion."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Joint:
         self.coordinates = self._coordinates(coordinates)
         self.speeds = self._speeds(speeds)
 
-    # -- what a joint type tells
+    # -- what a joint type defines
 
     def motion(self, algebra: Any, s: Sequence[Any], sd: Sequence[Any]) -> JointMotion:
         """R, d, S and c at coordinates s with speeds sd, on the scalars of the algebra (tape or floats)."""

@@ -54,7 +54,7 @@ def angles_rates(algebra: Any, orientation: EulerAngles, name: str, s: Sequence[
     x = turn(algebra, identity()[k], s[2]) @ np.array(list(omega), dtype=object)
     sin, cos = algebra.sin(s[1]), algebra.cos(s[1])
     along, divisor, rest = (x[i], cos, sign * sin) if k == l else (sign * x[l], sin, cos)
-    # A divisor may be negative, its square may not: what a check on the sign can tell from zero.
+    # A divisor may be negative, its square may not: what a check on the sign can distinguish from zero.
     square = algebra.divisor(divisor * divisor, LOCK, f"the {orientation.sequence} angles of joint {name} are at gimbal lock, "
                              "where no rates of theirs give its angular velocity (take another sequence, or EulerParameters)")
     a_dot = along * (divisor / square)

@@ -88,7 +88,7 @@ class Transform:
     def _dependent(self, columns: list[np.ndarray]) -> list[str]:
         shares = []
         for S in columns:
-            # Columns differ in their units; only their directions tell.
+            # Columns differ in their units; only their directions count.
             length = np.linalg.norm(S, axis=0)
             _, values, directions = np.linalg.svd(S / np.where(length > 0, length, 1))
             shares.append(np.abs(directions[-1]))
@@ -100,7 +100,7 @@ class Transform:
     # -- derivatives
 
     def _derivative(self, matrix: sp.MatrixBase, by: sp.Symbol) -> sp.ImmutableMatrix:
-        # SymPy differentiates Abs, Max and sign as functions of complex numbers unless told that there are none.
+        # SymPy differentiates Abs, Max and sign as functions of complex numbers unless it is declared that there are none.
         real = {s: sp.Symbol(s.name, real=True) for s in symbols_of(matrix) if not s.is_real}
         result = matrix.xreplace(real).diff(real.get(by, by))
         result = result.replace(sp.DiracDelta, lambda *_: sp.S.Zero)

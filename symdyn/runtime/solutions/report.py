@@ -41,12 +41,12 @@ def page(solution: Solution) -> str:
         name=module.name, version=symdyn.__version__, success=solution.success, message=solution.message,
         fallback=module.fallback, facts=run_tables.facts(solution), parameters=run_tables.parameters(solution),
         start=run_tables.start(solution), extremes=run_tables.extremes(solution), constraints=run_tables.constraints(solution),
-        watches=run_tables.watches(solution), energy=_told(energy), no_energy=_why_no_energy(solution),
+        watches=run_tables.watches(solution), energy=_energy_table(energy), no_energy=_why_no_energy(solution),
         mechanism=embedded.mechanism(solution, _times(solution)), curves=embedded.curves(solution),
         balance=None if energy is None else embedded.balance(solution, energy.rows), generated=_generated(solution))
 
 
-def _told(energy: run_tables.Energy | None) -> dict[str, Any] | None:
+def _energy_table(energy: run_tables.Energy | None) -> dict[str, Any] | None:
     if energy is None:
         return None
     resets = "".join(f", resets of {name} {run_tables.number(value)} J" for name, value in energy.resets.items())
@@ -57,7 +57,7 @@ def _told(energy: run_tables.Energy | None) -> dict[str, Any] | None:
 
 def _why_no_energy(solution: Solution) -> str:
     if "energy" not in solution.module.functions:
-        return "The equations were given by hand and do not tell the energy."
+        return "The equations were given by hand and do not define the energy."
     return "The work of the loads was not integrated along with the motion; simulate with work=True for the balance."
 
 

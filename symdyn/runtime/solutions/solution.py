@@ -202,14 +202,14 @@ class Solution:
 
     @cached_property
     def energies(self) -> np.ndarray:
-        """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not tell it.
+        """Kinetic and potential energy, (n_t, 2), J. Raises ArgumentError for equations by hand, which do not define it.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> solution.energies[0].round(6)
         array([0.    , 4.0824])
         """
         if "energy" not in self.module.functions:
-            raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not tell the energy; compute it "
+            raise ArgumentError(f"{self.module.name}: its equations were given by hand and do not define the energy; compute it "
                                 "from sol.q and sol.u, or describe the mechanism by bodies and joints")
         return self._rows("energy")
 
@@ -533,7 +533,7 @@ class Solution:
         return animate(self, path, fps, speed, view)
 
     def report(self, path: PathName) -> Path:
-        """Write one HTML file that tells all about the run: parameters, start, curves, extremes, energy, pictures, and what
+        """Write one HTML file with everything about the run: parameters, start, curves, extremes, energy, pictures, and what
         was generated. It opens without a network; returns its path.
 
         Raises ArgumentError for another ending than .html, MissingExtra without matplotlib.

@@ -1,4 +1,4 @@
-"""What a report of one run tells in tables: facts, parameters, start, extremes, energy, constraints, what loads look at."""
+"""What a report of one run shows in tables: facts, parameters, start, extremes, energy, constraints, what loads look at."""
 
 from __future__ import annotations
 
@@ -124,9 +124,9 @@ def _curves(solution: Solution) -> Iterator[tuple[str, str, str, np.ndarray]]:
             flat = rows.reshape(len(solution.t), -1)
             point = points.get(name)
             for k, values in enumerate(flat.T):
-                told = metadata.output_units.get(name, "") if point is None else point.unit
-                place = "" if flat.shape[1] == 1 else f" {'xyz'[k]}" if told else f"[{k}]"
-                yield "output", name + place, unit(told), values
+                known = metadata.output_units.get(name, "") if point is None else point.unit
+                place = "" if flat.shape[1] == 1 else f" {'xyz'[k]}" if known else f"[{k}]"
+                yield "output", name + place, unit(known), values
 
 
 def _mean(t: np.ndarray, values: np.ndarray) -> float:
