@@ -64,7 +64,7 @@ def _folder(name: str) -> Option:
 _ONLY = _names("--only", "only", "some of the groups of figures", "GROUP")
 _TIMED = _number("--repeats", "repeats", "timed runs, of which the median counts (default: 5)")
 _LEAST = _number("--repeats", "repeats", "timed runs, of which the least time is compared (default: 5)")
-_BEST = _number("--repeats", "repeats", "timings of each contestant, of which the best counts (default: 40)")
+_BEST = _number("--repeats", "repeats", "timings of each program, of which the best counts (default: 40)")
 _JSON = Option("to_json", "--json", {"metavar": "FILE", "type": path, "help": "write everything that was measured into a file"})
 _STORE = Option("file", "--store", {"metavar": "FILE", "type": path,
                                     "help": "file to store them in next to what it holds (default: the package's own)"})

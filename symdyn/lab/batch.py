@@ -1,6 +1,6 @@
 """Many states at once compared with one after the other, and compared with Pinocchio: `symdyn bench batch`.
 
-All figures of one line come from one run; the contestants take turns, and of each the best timing counts.
+All figures of one line come from one run; the programs take turns, and of each the best timing counts.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 import symdyn as sd
 from symdyn.errors import SymdynError
 from symdyn.lab.figures import Figure, print_figures
-from symdyn.lab.peers.contest import random_state
+from symdyn.lab.peers.benchmark import random_state
 from symdyn.lab.peers.description import describe
 from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
-from symdyn.lab.peers.symdyn_peer import symdyn_contestant
+from symdyn.lab.peers.symdyn_peer import symdyn_program
 from symdyn.runtime.batches.states import UNIT, tables_of
 from symdyn.runtime.building.library import Frame
 from symdyn.runtime.module import Module
@@ -56,10 +56,10 @@ def chain() -> Iterator[Figure]:
     evaluator.set_params(module.parameters())
     given = (evaluator.t, rows, evaluator.ud, evaluator.inputs, evaluator.p, evaluator.c, out)
     frame = Frame(STATES, *[a.ctypes.data for a in given], 0, 1, 0, 0, 0)
-    runs = [many(at_once), many(lambda: evaluator.call(ctypes.byref(frame))), symdyn_contestant(equations, state).run,
+    runs = [many(at_once), many(lambda: evaluator.call(ctypes.byref(frame))), symdyn_program(equations, state).run,
             many(lambda: module.rhs_batch(0.0, x, out=batch_out))]
     try:
-        runs.append(PinocchioPeer().contestant(describe(system.check()), state).run)
+        runs.append(PinocchioPeer().program(describe(system.check()), state).run)
     except SymdynError as error:
         yield f"Pinocchio is left out: {str(error).splitlines()[0]}", np.nan, "", ""
     times = best_times(runs, REPEATS)

@@ -1,4 +1,4 @@
-"""The clock of the benchmarks: interruptions do not count, and contestants take turns."""
+"""The clock of the benchmarks: interruptions do not count, and programs take turns."""
 
 from __future__ import annotations
 

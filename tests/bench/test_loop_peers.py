@@ -1,4 +1,4 @@
-"""`symdyn bench peers --models four_bar`: the contestants agree, verdicts are right, and what is missing is said."""
+"""`symdyn bench peers --models four_bar`: the programs agree, verdicts are right, and what is missing is said."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from symdyn.cli import main
-from symdyn.lab.peers.contest import fastest
-from symdyn.lab.peers.four_bar import LoopRow, four_bar_contest, moving_state
+from symdyn.lab.peers.benchmark import fastest
+from symdyn.lab.peers.four_bar import LoopRow, four_bar_benchmark, moving_state
 from symdyn.lab.peers.kane_peer import KanePeer
 from symdyn.lab.peers.kkt_peer import KktPeer
 from symdyn.lab.peers.loop_table import loop_lines, loop_record, loop_verdict
@@ -39,7 +39,7 @@ def test_linkage_is_closed_and_moves() -> None:
 @needs_c
 def test_generated_code_of_casadi_and_sympy_agrees() -> None:
     pytest.importorskip("casadi", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
-    row = four_bar_contest([KktPeer(), KanePeer()], 1)
+    row = four_bar_benchmark([KktPeer(), KanePeer()], 1)
     ways = [f"casadi {way}" for way in ("solve", "qr", "ldl", "ldl hoisted")]
     assert list(row.times) == [*SYMDYN, *ways, *KANE] and row.operations.keys() == row.times.keys()
     assert row.difference < 1e-12

@@ -1,4 +1,4 @@
-"""`symdyn bench peers`: the contestants have the same models, verdicts are right, and what is missing is said."""
+"""`symdyn bench peers`: the programs have the same models, verdicts are right, and what is missing is said."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from symdyn.bench import toolchain
 from symdyn.cli import main
 from symdyn.errors import SymdynError
 from symdyn.lab.peers import command
+from symdyn.lab.peers.benchmark import Row, benchmark, random_state
 from symdyn.lab.peers.casadi_peer import CasadiPeer
-from symdyn.lab.peers.contest import Row, contest, random_state
-from symdyn.lab.peers.contestant import Contestant, unsorted
 from symdyn.lab.peers.description import Description, describe
 from symdyn.lab.peers.models import CASES, Bound, cases, turbine_tree
-from symdyn.lab.peers.race import agree, race
+from symdyn.lab.peers.program import Program, unsorted
 from symdyn.lab.peers.table import heading, line, record, verdict
+from symdyn.lab.peers.timing import agree, timed
 from symdyn.runtime.building.compiler import find_compiler
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -113,22 +113,22 @@ def test_columns_are_aligned() -> None:
         assert cells[:titles.index(title) + len(title)].endswith(cell)
 
 
-def counting(name: str, value: float, calls: list[str]) -> Contestant:
-    """A contestant that only notes its turns."""
-    return Contestant(name, lambda n: calls.append(name), lambda: np.array([value, 1.0]))
+def counting(name: str, value: float, calls: list[str]) -> Program:
+    """A program that only notes its turns."""
+    return Program(name, lambda n: calls.append(name), lambda: np.array([value, 1.0]))
 
 
-def test_contestants_take_turns_and_must_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_take_turns_and_must_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("symdyn.timing.loops.TIMING_SECONDS", 0.0)
     calls: list[str] = []
-    contestants = [counting("a", 1.0, calls), counting("b", 1.0 + 1e-9, calls)]
-    assert 0 < agree(contestants, "mechanism") < 1e-8
+    programs = [counting("a", 1.0, calls), counting("b", 1.0 + 1e-9, calls)]
+    assert 0 < agree(programs, "mechanism") < 1e-8
     calls.clear()
-    assert set(race(contestants, 3)) == {"a", "b"}
+    assert set(timed(programs, 3)) == {"a", "b"}
     assert calls[-6:] == ["a", "b"] * 3
     with pytest.raises(SymdynError, match="mechanism: c and a do not compute the same accelerations"):
-        agree([*contestants, counting("c", 1.1, calls)], "mechanism")
-    held = [dataclasses.replace(c, multipliers=partial(np.full, 1, 1.0 + k)) for k, c in enumerate(contestants)]
+        agree([*programs, counting("c", 1.1, calls)], "mechanism")
+    held = [dataclasses.replace(c, multipliers=partial(np.full, 1, 1.0 + k)) for k, c in enumerate(programs)]
     with pytest.raises(SymdynError, match="mechanism: b and a do not compute the same multipliers"):
         agree(held, "mechanism")
 
@@ -162,7 +162,7 @@ def test_formulation_is_a_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
         asked.append(system.name)
         return system.embedding()
 
-    assert contest("turbine_tree", CASES["turbine_tree"], [], 1, make).formulation == "embedding" and asked == ["turbine_tree"]
+    assert benchmark("turbine_tree", CASES["turbine_tree"], [], 1, make).formulation == "embedding" and asked == ["turbine_tree"]
 
 
 def test_missing_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,7 +177,7 @@ def test_casadi_beside_symdyn() -> None:
     """The same accelerations, and CasADi's operations as they were published with the bounds; building takes a minute."""
     pytest.importorskip("casadi", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
     pytest.importorskip("pinocchio", reason="the peers are not installed; run: pip install 'symdyn[peers]'")
-    found = contest("n_link_pendulum(5)", CASES["n_link_pendulum(5)"], [CasadiPeer()], 1)
+    found = benchmark("n_link_pendulum(5)", CASES["n_link_pendulum(5)"], [CasadiPeer()], 1)
     assert found.casadi_operations == {"casadi baked": 328, "casadi runtime": 363, "casadi hoisted": 363}
     assert found.times.keys() == {"symdyn", *found.casadi_operations} and found.difference < 1e-12
 

@@ -3,10 +3,10 @@
     models        the mechanisms, with the bounds that symdyn is held to
     description   a mechanism as plain text that the peers read
     toolchain     headers, libraries and compilers, and what to install where they are missing
-    symdyn_peer, pinocchio_peer, casadi_peer   each one as a Contestant: n evaluations in a compiled loop
+    symdyn_peer, pinocchio_peer, casadi_peer   each one as a Program: n evaluations in a compiled loop
     kkt_peer, kane_peer   the same for a four-bar linkage
-    race          whether the contestants agree, and their times, measured side by side
-    contest, four_bar     one mechanism: counts and times
+    timing        whether the programs agree, and their times, measured side by side
+    benchmark, four_bar   one mechanism: counts and times
     table, loop_table     rows, verdicts, text
     command       all of it
 

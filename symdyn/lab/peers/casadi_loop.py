@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.lab.peers.contestant import Contestant, State, address, unsorted
+from symdyn.lab.peers.program import Program, State, address, unsorted
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler
 
@@ -81,9 +81,9 @@ def operations(casadi: Any, function: Any) -> int:
     return count
 
 
-def casadi_contestant(casadi: Any, compiler: Compiler, form: Form, state: State, p: np.ndarray, q_order: Sequence[int],
-                      u_order: Sequence[int]) -> Contestant:
-    """The C code of a form, compiled, at a state; orders as in Description. p (n_p,): must outlive the contestant."""
+def casadi_program(casadi: Any, compiler: Compiler, form: Form, state: State, p: np.ndarray, q_order: Sequence[int],
+                      u_order: Sequence[int]) -> Program:
+    """The C code of a form, compiled, at a state; orders as in Description. p (n_p,): must outlive the program."""
     functions = [form.accelerations] + ([form.prologue] if form.prologue else [])
     generator = casadi.CodeGenerator("peer")
     for function in functions:
@@ -102,5 +102,5 @@ def casadi_contestant(casadi: Any, compiler: Compiler, form: Form, state: State,
     def run(n: int) -> None:
         library.loop(ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(p), address(c), address(out))
 
-    return Contestant(form.name, run, lambda: unsorted(out[:n_u], tuple(u_order)),
+    return Program(form.name, run, lambda: unsorted(out[:n_u], tuple(u_order)),
                       (lambda: out[n_u:].copy()) if len(out) > n_u else None)

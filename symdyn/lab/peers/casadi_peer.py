@@ -7,9 +7,9 @@ from typing import Any
 
 from symdyn.bench.toolchain import build_cpp, c_compiler, include_flags, package_folder
 from symdyn.errors import SymdynError
-from symdyn.lab.peers.casadi_loop import Form, casadi_contestant, hoisted, operations
-from symdyn.lab.peers.contestant import Contestant, State, address
+from symdyn.lab.peers.casadi_loop import Form, casadi_program, hoisted, operations
 from symdyn.lab.peers.description import Description
+from symdyn.lab.peers.program import Program, State, address
 from symdyn.lab.peers.sources import SOURCES
 
 _ERROR_SIZE = 1000
@@ -52,7 +52,7 @@ class CasadiPeer:
         # What CasADi offers to make code shorter is used.
         return self.casadi.Function("accelerations", function.sx_in(), [function(*function.sx_in())], {"cse": True})
 
-    def contestant(self, form: Form, description: Description, state: State) -> Contestant:
+    def program(self, form: Form, description: Description, state: State) -> Program:
         """The C code of a form, compiled, at a state."""
-        return casadi_contestant(self.casadi, self.compiler, form, state, description.values, description.q_order,
+        return casadi_program(self.casadi, self.compiler, form, state, description.values, description.q_order,
                                  description.u_order)

@@ -12,9 +12,9 @@ from symdyn.bench.toolchain import version
 from symdyn.errors import MissingExtra, SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.lab.peers import arm
+from symdyn.lab.peers.benchmark import benchmark, fastest
 from symdyn.lab.peers.casadi_peer import CasadiPeer
-from symdyn.lab.peers.contest import contest, fastest
-from symdyn.lab.peers.four_bar import four_bar_contest
+from symdyn.lab.peers.four_bar import four_bar_benchmark
 from symdyn.lab.peers.kane_peer import KanePeer
 from symdyn.lab.peers.kkt_peer import KktPeer
 from symdyn.lab.peers.loop_table import LEGEND as LOOP_LEGEND
@@ -64,7 +64,7 @@ def run(names: Sequence[str] | None = None, repeats: int = 40, to_json: Path | N
         make_equations: Callable[[System], Equations] = fastest) -> int:
     """Measure the named mechanisms (default: all) and print a line of each; returns how many miss their bounds.
 
-    repeats          timings of each contestant, of which the best counts
+    repeats          timings of each program, of which the best counts
     to_json          file for everything that was measured
     make_equations   symdyn's equations of a System
     """
@@ -92,7 +92,7 @@ def _trees(chosen: Mapping[str, Case], repeats: int, make_equations: Callable[[S
     _noted(notes, result)
     print(heading(), flush=True)
     for name, case in chosen.items():
-        row = contest(name, case, peers, repeats, make_equations)
+        row = benchmark(name, case, peers, repeats, make_equations)
         print(line(row), flush=True)
         result["models"].append(record(row))
     print(LEGEND)
@@ -103,7 +103,7 @@ def _loop(repeats: int, make_equations: Callable[[System], Equations], result: d
     """The same for the mechanism with a closed loop."""
     peers, notes = find_loop_peers()
     _noted(notes, result)
-    row = four_bar_contest(peers, repeats, make_equations)
+    row = four_bar_benchmark(peers, repeats, make_equations)
     print("\n".join([*loop_lines(row), LOOP_LEGEND]))
     result["loops"].append(loop_record(row))
 

@@ -1,6 +1,6 @@
-"""A four-bar linkage, every contestant: exact counts of operations, and times measured side by side.
+"""A four-bar linkage, every program: exact counts of operations, and times measured side by side.
 
-Contestants compute accelerations and multipliers, but for SymPy's Kane's method, which eliminates the multipliers.
+Programs compute accelerations and multipliers, but for SymPy's Kane's method, which eliminates the multipliers.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from symdyn.formulation.equations import Equations
 from symdyn.functions.tapes import function_tape
-from symdyn.lab.peers.contest import fastest
-from symdyn.lab.peers.contestant import State
+from symdyn.lab.peers.benchmark import fastest
 from symdyn.lab.peers.description import describe
 from symdyn.lab.peers.kane_peer import KanePeer
 from symdyn.lab.peers.kkt_peer import KktPeer
 from symdyn.lab.peers.models import LOOP
 from symdyn.lab.peers.pinocchio_peer import PinocchioLoopPeer
-from symdyn.lab.peers.race import agree, race
-from symdyn.lab.peers.symdyn_peer import constrained_contestant, symdyn_contestant, with_multipliers
+from symdyn.lab.peers.program import State
+from symdyn.lab.peers.symdyn_peer import constrained_program, symdyn_program, with_multipliers
+from symdyn.lab.peers.timing import agree, timed
 from symdyn.model.system import System
 from symdyn.systems import get
 
@@ -37,8 +37,8 @@ Peer = KktPeer | KanePeer | PinocchioLoopPeer
 class LoopRow:
     """What was measured.
 
-    times        contestant -> ns of one evaluation; operations: of those that are generated code, after hoisting
-    difference   of accelerations and of multipliers, relative to their norm, the largest between contestants
+    times        program -> ns of one evaluation; operations: of those that are generated code, after hoisting
+    difference   of accelerations and of multipliers, relative to their norm, the largest between programs
     """
 
     model: str
@@ -48,7 +48,7 @@ class LoopRow:
     difference: float
 
     def fastest(self, start: str) -> str | None:
-        """The fastest contestant whose name begins so."""
+        """The fastest program whose name begins so."""
         return min((name for name in self.times if name.startswith(start)), key=lambda name: self.times[name], default=None)
 
     @property
@@ -68,25 +68,25 @@ class LoopRow:
                 for start, name in found.items() if name is not None}
 
 
-def four_bar_contest(peers: Sequence[Peer], repeats: int,
+def four_bar_benchmark(peers: Sequence[Peer], repeats: int,
                      make_equations: Callable[[System], Equations] = fastest) -> LoopRow:
     """Count and time symdyn and the peers. Raises SymdynError if they do not compute the same."""
     system = get(LOOP)
     equations = with_multipliers(make_equations(system))
     state = moving_state(equations)
-    contestants = [constrained_contestant(equations, state), symdyn_contestant(equations, state)]
-    counts = {c.name: function_tape(equations, f).operations for c, f in zip(contestants, ("rhs_lam", "rhs"), strict=True)}
+    programs = [constrained_program(equations, state), symdyn_program(equations, state)]
+    counts = {c.name: function_tape(equations, f).operations for c, f in zip(programs, ("rhs_lam", "rhs"), strict=True)}
     values = {symbol.name: float(number) for symbol, number in system.defaults.items()}
     for peer in peers:
         if isinstance(peer, PinocchioLoopPeer):
             point, ground = ([values[name], 0.0, 0.0] for name in ("l3", "d"))
-            contestants.append(peer.contestant(describe(system.check()), state, 3, point, ground))
+            programs.append(peer.program(describe(system.check()), state, 3, point, ground))
         else:
-            made, operations = peer.contestants(values, state)
-            contestants += made
+            made, operations = peer.programs(values, state)
+            programs += made
             counts |= operations
-    difference = agree(contestants, LOOP)
-    times = {who: seconds * 1e9 for who, seconds in race(contestants, repeats).items()}
+    difference = agree(programs, LOOP)
+    times = {who: seconds * 1e9 for who, seconds in timed(programs, repeats).items()}
     return LoopRow(LOOP, equations.formulation, times, counts, difference)
 
 

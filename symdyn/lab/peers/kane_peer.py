@@ -9,8 +9,8 @@ import numpy as np
 import sympy as sp
 
 from symdyn.bench.toolchain import c_compiler
-from symdyn.lab.peers.contestant import Contestant, State, address
 from symdyn.lab.peers.kane import PARAMETERS, SOLVERS, kane, operations, solution
+from symdyn.lab.peers.program import Program, State, address
 from symdyn.runtime.building import cache
 
 _CODE = """#include <math.h>
@@ -38,7 +38,7 @@ class KanePeer:
     def __init__(self) -> None:
         self.compiler = c_compiler()
 
-    def contestants(self, values: Mapping[str, float], state: State) -> tuple[list[Contestant], dict[str, int]]:
+    def programs(self, values: Mapping[str, float], state: State) -> tuple[list[Program], dict[str, int]]:
         """The C code for each of SOLVERS, compiled, at a state; and the operations of each."""
         p = np.array([values[name] for name in PARAMETERS])
         made, counts = [], {}
@@ -46,17 +46,17 @@ class KanePeer:
             steps, result = solution(*kane(solver))
             name = f"kane {solver.lower()}"
             counts[name] = operations([*steps, *((None, e) for e in result)])
-            made.append(self._contestant(name, code(steps, result), p, state))
+            made.append(self._program(name, code(steps, result), p, state))
         return made, counts
 
-    def _contestant(self, name: str, text: str, p: np.ndarray, state: State) -> Contestant:
+    def _program(self, name: str, text: str, p: np.ndarray, state: State) -> Program:
         library = cache.load(text, "kane_peer", self.compiler)
         q, u, out = state.q.copy(), state.u.copy(), np.zeros(3)
 
         def run(n: int) -> None:
             library.loop(ctypes.c_long(n), ctypes.c_long(state.fed), address(q), address(u), address(p), address(out))
 
-        return Contestant(name, run, out.copy)
+        return Program(name, run, out.copy)
 
 
 def code(steps: Sequence[tuple[sp.Symbol, sp.Expr]], result: sp.Matrix) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.toolchain import c_compiler, package_folder
-from symdyn.lab.peers.casadi_loop import Form, casadi_contestant, hoisted, operations
-from symdyn.lab.peers.contestant import Contestant, State
+from symdyn.lab.peers.casadi_loop import Form, casadi_program, hoisted, operations
+from symdyn.lab.peers.program import Program, State
 
 PARAMETERS = tuple("g m1 lc1 I1 m2 lc2 I2 m3 lc3 I3 l1 l2 l3 d".split())
 
@@ -55,9 +55,9 @@ class KktPeer:
         C_r = ca.jacobian(end, q)
         return ca.blockcat(M, C_r.T, C_r, ca.SX(2, 2)), ca.vertcat(-k, -ca.jtimes(C_r @ u, q, u))
 
-    def contestants(self, values: Mapping[str, float], state: State) -> tuple[list[Contestant], dict[str, int]]:
+    def programs(self, values: Mapping[str, float], state: State) -> tuple[list[Program], dict[str, int]]:
         """The C code of all forms, compiled, at a state; and the operations of each."""
         p = np.array([values[name] for name in PARAMETERS])
         forms = self.forms()
-        return ([casadi_contestant(self.casadi, self.compiler, form, state, p, range(3), range(3)) for form in forms],
+        return ([casadi_program(self.casadi, self.compiler, form, state, p, range(3), range(3)) for form in forms],
                 {form.name: form.operations for form in forms})

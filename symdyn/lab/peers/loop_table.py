@@ -14,7 +14,7 @@ run time; hoisted: what depends on them alone computed before. ratio: time of sy
 
 
 def loop_lines(row: LoopRow) -> list[str]:
-    """A line of each contestant, the verdict, and what symdyn's time means where the peers were published."""
+    """A line of each program, the verdict, and what symdyn's time means where the peers were published."""
     ours = row.times["symdyn with multipliers"]
     lines = [f"{row.model}, {row.formulation}: accelerations and multipliers of a closed loop",
              f"{'':26}{'ops':>6}{'us':>8}{'ratio':>8}"]

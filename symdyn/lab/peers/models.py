@@ -1,4 +1,4 @@
-"""The mechanisms that the contestants compute, and the bounds that symdyn is held to."""
+"""The mechanisms that the programs compute, and the bounds that symdyn is held to."""
 
 from __future__ import annotations
 

@@ -4,12 +4,12 @@
 
 namespace {
 
-struct Contestant {
+struct Program {
     pinocchio::Model model;
     pinocchio::Data data;
     Eigen::VectorXd torques;
 
-    explicit Contestant(pinocchio::Model made) : model(made), data(made), torques(Eigen::VectorXd::Zero(made.nv)) {}
+    explicit Program(pinocchio::Model made) : model(made), data(made), torques(Eigen::VectorXd::Zero(made.nv)) {}
 };
 
 } // namespace
@@ -19,10 +19,10 @@ extern "C" {
 // null, with a message in `error`, if the description cannot be read; what it returns lives until the process ends
 void *aba_open(const char *text, const double *parameters, long count, char *error, long size)
 {
-    Contestant *made = nullptr;
+    Program *made = nullptr;
     peers::guarded(error, size, [&] {
         const std::vector<double> numbers(parameters, parameters + count);
-        made = new Contestant(peers::build<double, pinocchio::JointCollectionDefaultTpl>(text, numbers));
+        made = new Program(peers::build<double, pinocchio::JointCollectionDefaultTpl>(text, numbers));
     });
     return made;
 }
@@ -30,7 +30,7 @@ void *aba_open(const char *text, const double *parameters, long count, char *err
 // n evaluations of the accelerations at (q, u); q[fed] of each depends on the result of the one before
 void aba_loop(void *opened, long n, long fed, double *q, const double *u, double *accelerations)
 {
-    Contestant &c = *static_cast<Contestant *>(opened);
+    Program &c = *static_cast<Program *>(opened);
     Eigen::Map<Eigen::VectorXd> at(q, c.model.nq), result(accelerations, c.model.nv);
     const Eigen::Map<const Eigen::VectorXd> speeds(u, c.model.nv);
     const double start = q[fed];

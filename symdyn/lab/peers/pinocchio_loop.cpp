@@ -12,7 +12,7 @@ namespace {
 const double TOLERANCE = 1e-10, MU = 1e-12;
 const int ITERATIONS = 10;
 
-struct Contestant {
+struct Program {
     pinocchio::Model model;
     pinocchio::Data data;
     Eigen::VectorXd torques;
@@ -20,7 +20,7 @@ struct Contestant {
     std::vector<pinocchio::RigidConstraintData> found;
     pinocchio::ProximalSettings settings{TOLERANCE, MU, ITERATIONS};
 
-    Contestant(pinocchio::Model made, int joint, const double *point, const double *ground)
+    Program(pinocchio::Model made, int joint, const double *point, const double *ground)
         : model(made), data(made), torques(Eigen::VectorXd::Zero(made.nv))
     {
         pinocchio::SE3 on_body = pinocchio::SE3::Identity(), on_ground = pinocchio::SE3::Identity();
@@ -41,10 +41,10 @@ extern "C" {
 void *loop_open(const char *text, const double *parameters, long count, long joint, const double *point, const double *ground,
                 char *error, long size)
 {
-    Contestant *made = nullptr;
+    Program *made = nullptr;
     peers::guarded(error, size, [&] {
         const std::vector<double> numbers(parameters, parameters + count);
-        made = new Contestant(peers::build<double, pinocchio::JointCollectionDefaultTpl>(text, numbers), int(joint), point, ground);
+        made = new Program(peers::build<double, pinocchio::JointCollectionDefaultTpl>(text, numbers), int(joint), point, ground);
     });
     return made;
 }
@@ -53,7 +53,7 @@ void *loop_open(const char *text, const double *parameters, long count, long joi
 // at the point, world axes
 void loop_loop(void *opened, long n, long fed, double *q, const double *u, double *accelerations, double *force)
 {
-    Contestant &c = *static_cast<Contestant *>(opened);
+    Program &c = *static_cast<Program *>(opened);
     Eigen::Map<Eigen::VectorXd> at(q, c.model.nq), result(accelerations, c.model.nv);
     const Eigen::Map<const Eigen::VectorXd> speeds(u, c.model.nv);
     const double start = q[fed];

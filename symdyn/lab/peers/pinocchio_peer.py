@@ -9,8 +9,8 @@ import numpy as np
 
 from symdyn.bench.toolchain import build_cpp, include_flags, package_folder
 from symdyn.errors import SymdynError
-from symdyn.lab.peers.contestant import Contestant, State, address, unsorted
 from symdyn.lab.peers.description import Description
+from symdyn.lab.peers.program import Program, State, address, unsorted
 from symdyn.lab.peers.sources import SOURCES
 
 _ERROR_SIZE = 1000
@@ -25,7 +25,7 @@ class PinocchioPeer:
         self.library = build_cpp("pinocchio_aba", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
         self.library.aba_open.restype = ctypes.c_void_p
 
-    def contestant(self, description: Description, state: State) -> Contestant:
+    def program(self, description: Description, state: State) -> Program:
         """The algorithm on a model in double precision, at a state."""
         message = ctypes.create_string_buffer(_ERROR_SIZE)
         values = description.values
@@ -39,7 +39,7 @@ class PinocchioPeer:
         def run(n: int) -> None:
             self.library.aba_loop(opened, ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(out))
 
-        return Contestant("pinocchio", run, lambda: unsorted(out, description.u_order))
+        return Program("pinocchio", run, lambda: unsorted(out, description.u_order))
 
 
 class PinocchioLoopPeer:
@@ -51,8 +51,8 @@ class PinocchioLoopPeer:
         self.library = build_cpp("pinocchio_loop", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
         self.library.loop_open.restype = ctypes.c_void_p
 
-    def contestant(self, description: Description, state: State, body: int, point: Sequence[float],
-                   ground: Sequence[float]) -> Contestant:
+    def program(self, description: Description, state: State, body: int, point: Sequence[float],
+                   ground: Sequence[float]) -> Program:
         """A planar mechanism whose `point` of a body, number of the joint that moves it, is held at `ground`."""
         message = ctypes.create_string_buffer(_ERROR_SIZE)
         values, places = description.values, np.array([*point, *ground], dtype=float)
@@ -69,4 +69,4 @@ class PinocchioLoopPeer:
                                    address(force))
 
         # The force on the body is -C_r^T lam.
-        return Contestant("pinocchio", run, lambda: unsorted(out, description.u_order), lambda: -force[:2])
+        return Program("pinocchio", run, lambda: unsorted(out, description.u_order), lambda: -force[:2])

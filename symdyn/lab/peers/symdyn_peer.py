@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from symdyn.formulation.equations import Equations
-from symdyn.lab.peers.contestant import Contestant, State
+from symdyn.lab.peers.program import Program, State
 from symdyn.timing.loops import compiled_loop
 
 
-def symdyn_contestant(equations: Equations, state: State) -> Contestant:
+def symdyn_program(equations: Equations, state: State) -> Program:
     """The right-hand side of equations without extra states, at their default parameters, at a state."""
     n_q = len(state.q)
     loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed)
-    return Contestant("symdyn", loop.run, lambda: loop.evaluator.out[n_q:].copy())
+    return Program("symdyn", loop.run, lambda: loop.evaluator.out[n_q:].copy())
 
 
 def with_multipliers(equations: Equations) -> Equations:
@@ -25,9 +25,9 @@ def with_multipliers(equations: Equations) -> Equations:
     return replace(equations, quantities=quantities, otherwise=None if there is None else with_multipliers(there))
 
 
-def constrained_contestant(equations: Equations, state: State) -> Contestant:
-    """As symdyn_contestant, of equations `with_multipliers`, which are computed, too."""
+def constrained_program(equations: Equations, state: State) -> Program:
+    """As symdyn_program, of equations `with_multipliers`, which are computed, too."""
     n_q, n = len(state.q), len(state.q) + len(state.u)
     loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed, "rhs_lam")
     out = loop.evaluator.out
-    return Contestant("symdyn with multipliers", loop.run, lambda: out[n_q:n].copy(), lambda: out[n:].copy())
+    return Program("symdyn with multipliers", loop.run, lambda: out[n_q:n].copy(), lambda: out[n:].copy())

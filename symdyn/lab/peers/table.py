@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from symdyn.lab.peers.contest import Row
+from symdyn.lab.peers.benchmark import Row
 from symdyn.lab.peers.models import Bound
 
 _NOTHING = "-"

@@ -13,8 +13,8 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, ModelWarning, SymdynError
 from symdyn.functions.tapes import function_tape
-from symdyn.lab.peers.contestant import State
-from symdyn.lab.peers.symdyn_peer import symdyn_contestant
+from symdyn.lab.peers.program import State
+from symdyn.lab.peers.symdyn_peer import symdyn_program
 from symdyn.lab.robots.agreement import NAMES, differences, random_states
 from symdyn.lab.robots.collection import ROBOTS, Listed, folder
 from symdyn.lab.robots.pinocchio_aba import PinocchioAba
@@ -86,7 +86,7 @@ def measure(robot: Listed, states: int = STATES, aba: PinocchioAba | None = None
     if aba is not None and there:
         counted = aba.operations(peer, q[0], u[0])
     if timed:
-        runs = [symdyn_contestant(equations, State(q[0], u[0], fed)).run]
+        runs = [symdyn_program(equations, State(q[0], u[0], fed)).run]
         if aba is not None and there:
             runs.append(aba.run(peer, q[0], u[0]))
         times = [seconds * 1e9 for seconds in best_times(runs, REPEATS)]

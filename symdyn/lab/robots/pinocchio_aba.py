@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.bench.toolchain import build_cpp, include_flags
 from symdyn.errors import SymdynError
-from symdyn.lab.peers.contestant import address
+from symdyn.lab.peers.program import address
 from symdyn.lab.peers.sources import SOURCES
 from symdyn.lab.robots.pinocchio_robot import PinocchioRobot
 

@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Contestant:
+class Program:
     """One that takes part.
 
     run             run(n): n evaluations; one coordinate of each depends on the result of the one before, so latency counts

@@ -1,4 +1,4 @@
-"""One mechanism, every contestant: exact counts of operations, and times measured side by side."""
+"""One mechanism, every program: exact counts of operations, and times measured side by side."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from symdyn.formulation.equations import Equations
 from symdyn.functions.tapes import function_tape
 from symdyn.lab.peers.casadi_peer import CasadiPeer
-from symdyn.lab.peers.contestant import State
 from symdyn.lab.peers.description import describe
 from symdyn.lab.peers.models import Bound, Case
 from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
-from symdyn.lab.peers.race import agree, race
-from symdyn.lab.peers.symdyn_peer import symdyn_contestant
+from symdyn.lab.peers.program import State
+from symdyn.lab.peers.symdyn_peer import symdyn_program
+from symdyn.lab.peers.timing import agree, timed
 from symdyn.model.system import System
 from symdyn.tape.tape import Tape
 
@@ -28,8 +28,8 @@ class Row:
 
     formulation       of symdyn's equations; operations, prologue, chain: of its right-hand side
     leanest           operations of the candidate with the fewest, of which the fastest was taken
-    times             contestant -> ns of one evaluation; casadi_operations: form -> count
-    difference        of the accelerations, relative to their norm, the largest between contestants
+    times             program -> ns of one evaluation; casadi_operations: form -> count
+    difference        of the accelerations, relative to their norm, the largest between programs
     """
 
     model: str
@@ -44,7 +44,7 @@ class Row:
     bound: Bound = field(default=Bound())
 
     def over(self, slower: str, faster: str) -> float | None:
-        """Ratio of two contestants' times; None if one was not measured."""
+        """Ratio of two programs' times; None if one was not measured."""
         if slower not in self.times or faster not in self.times:
             return None
         return self.times[slower] / self.times[faster]
@@ -68,7 +68,7 @@ def fastest(system: System) -> Equations:
     return make()
 
 
-def contest(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], repeats: int,
+def benchmark(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], repeats: int,
             make_equations: Callable[[System], Equations] = fastest) -> Row:
     """Count and time symdyn and the peers on a mechanism.
 
@@ -77,16 +77,16 @@ def contest(name: str, case: Case, peers: Sequence[CasadiPeer | PinocchioPeer], 
     system = case.make()
     equations, description = make_equations(system), describe(system.check())
     state = random_state(equations)
-    contestants, counts = [symdyn_contestant(equations, state)], {}
+    programs, counts = [symdyn_program(equations, state)], {}
     for peer in peers:
         if isinstance(peer, CasadiPeer):
             forms = peer.forms(description)
             counts = {form.name: form.operations for form in forms}
-            contestants += [peer.contestant(form, description, state) for form in forms]
+            programs += [peer.program(form, description, state) for form in forms]
         else:
-            contestants.append(peer.contestant(description, state))
-    difference = agree(contestants, name)
-    times = {who: seconds * 1e9 for who, seconds in race(contestants, repeats).items()}
+            programs.append(peer.program(description, state))
+    difference = agree(programs, name)
+    times = {who: seconds * 1e9 for who, seconds in timed(programs, repeats).items()}
     tape = function_tape(equations, "rhs")
     leanest = min([tape.operations, *[c.operations for c in equations.candidates]])
     return Row(name, equations.formulation, tape.operations, leanest, sum(tape.count_prologue().values()),

@@ -1,4 +1,4 @@
-"""Contestants side by side: that they compute the same, and their times."""
+"""Programs side by side: that they compute the same, and their times."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from symdyn.errors import SymdynError
-from symdyn.lab.peers.contestant import Contestant
+from symdyn.lab.peers.program import Program
 from symdyn.timing.loops import best_times
 
 # Accelerations may differ by rounding times the condition number of the mass matrix; a wrong model differs by far more.
 AGREEMENT = 1e-7
 
 
-def agree(contestants: Sequence[Contestant], model: str) -> float:
-    """Largest difference of the contestants' accelerations from those of the first, relative to their norm.
+def agree(programs: Sequence[Program], model: str) -> float:
+    """Largest difference of the programs' accelerations from those of the first, relative to their norm.
 
     The same of multipliers, of those that compute them. Raises SymdynError if they do not compute the same.
     """
-    for contestant in contestants:
-        contestant.run(1)
-    worst = _difference([(c.name, c.accelerations()) for c in contestants], "accelerations", model)
-    return max(worst, _difference([(c.name, c.multipliers()) for c in contestants if c.multipliers], "multipliers", model))
+    for program in programs:
+        program.run(1)
+    worst = _difference([(c.name, c.accelerations()) for c in programs], "accelerations", model)
+    return max(worst, _difference([(c.name, c.multipliers()) for c in programs if c.multipliers], "multipliers", model))
 
 
 def _difference(results: Sequence[tuple[str, np.ndarray]], what: str, model: str) -> float:
@@ -38,7 +38,7 @@ def _difference(results: Sequence[tuple[str, np.ndarray]], what: str, model: str
     return worst
 
 
-def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, float]:
-    """Seconds of one evaluation of each contestant, the best of its timings; they take turns."""
-    times = best_times([contestant.run for contestant in contestants], repeats)
-    return {contestant.name: time for contestant, time in zip(contestants, times, strict=True)}
+def timed(programs: Sequence[Program], repeats: int) -> dict[str, float]:
+    """Seconds of one evaluation of each program, the best of its timings; they take turns."""
+    times = best_times([program.run for program in programs], repeats)
+    return {program.name: time for program, time in zip(programs, times, strict=True)}
