@@ -21,6 +21,7 @@ import os
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -118,7 +119,8 @@ def run_tests(folder: Path, files: Sequence[str], limit: float, **environment: s
                               timeout=20 * limit)
     except subprocess.TimeoutExpired:
         return "endless", ""
-    return ("passed" if done.returncode in (0, 5) else "endless" if done.returncode < 0 else "failed"), done.stdout
+    ended = done.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
+    return ("passed" if done.returncode in (0, 5) else "endless" if ended else "failed"), done.stdout
 
 
 def note_functions(notes: Path) -> None:

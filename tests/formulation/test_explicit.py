@@ -103,6 +103,7 @@ def test_compiles_and_runs(rotating_track):
     (([q1], ["q1"], [m], None), ["text is never evaluated"]),
     (([q1], [q1], sp.Matrix([[1, 2], [3, 4]]), None), ["mass has the shape 2 x 2"]),
     (([q1, q2], [q1, q2], sp.Matrix([[1, 2], [3, 4]]), None), ["mass is not symmetric"]),
+    (([q1, q2], [q1, q2], sp.Matrix([[1, 2], [2, 1]]), None), ["mass has the eigenvalue -1; pass a matrix"]),
     (([q1], 3, [m], None), ["position is 3"]),
     (([q1], [q1], [m], [q1.ddot]), ["force uses q1_ddot"]),
 ])

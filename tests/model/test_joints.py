@@ -249,3 +249,11 @@ def test_coordinates_are_named_after_the_joint_unless_given() -> None:
     system.add_joint(sd.Spherical("socket", arm, ball, parent_point=[1, 0, 0]))
     names = [q.name for q in system.embedding().symbols.coordinates]
     assert names == ["q_pin", "q_socket_1", "q_socket_2", "q_socket_3"]
+
+
+def test_a_custom_joint_that_is_shifted_at_zero_is_no_identity_there() -> None:
+    s = sd.coordinates("s")
+    system = sd.System("wire")
+    for position, identity in (([s, 0, s**2], True), ([s + 1, 0, s**2], False)):
+        bead = system.add_body(f"bead_{identity}", mass=1)
+        assert sd.Custom("wire", system.ground, bead, [s], position=position, units=["m"]).identity_at_zero is identity
