@@ -24,8 +24,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.errors import CacheError, CacheWarning, CompileError
-from symdyn.runtime.building import cache as subject
-from symdyn.runtime.building import cache_folder, objects
+from symdyn.runtime.building import cache, cache_folder, objects
 from symdyn.runtime.building import compiler as compilers
 from symdyn.runtime.building.cache import SUFFIX, build, cache_dir, load
 from symdyn.runtime.building.compiler import Compiler, find_compiler
@@ -40,7 +39,7 @@ KERNEL = """\
 double sin(double); double cos(double); double sqrt(double); double pow(double, double);
 double kernel(double x) { return sin(x) + cos(x) * sqrt(x) + pow(x, 2.5); }
 """
-ROOT = str(Path(subject.__file__).parents[2])
+ROOT = str(Path(cache.__file__).parents[2])
 
 
 @pytest.fixture(autouse=True)
@@ -136,12 +135,12 @@ def test_key(fake: Callable[[str], Compiler], monkeypatch: pytest.MonkeyPatch) -
         Compiler(compiler.command, "other", "fakecc 1.1"),
         Compiler((*compiler.command, "-O1"), "other", compiler.version),
     ]
-    paths = [subject._target("a", "m", variant) for variant in variants]
-    paths += [subject._target("b", "m", compiler)]
+    paths = [cache._target("a", "m", variant) for variant in variants]
+    paths += [cache._target("b", "m", compiler)]
     monkeypatch.setattr(objects, "_cpu", lambda: "another")
-    paths += [subject._target("a", "m", compiler)]
+    paths += [cache._target("a", "m", compiler)]
     assert len({path.name for path in paths}) == 5
-    assert subject._target("a", "m", compiler) == paths[-1]
+    assert cache._target("a", "m", compiler) == paths[-1]
 
 
 def test_stem_cannot_leave_the_folder(fake: Callable[[str], Compiler], folder: Path) -> None:
@@ -238,9 +237,9 @@ def test_damaged_file_is_built_again(
     compiler = fake(f'exec {real.command[0]} {" ".join(real.command[1:])} "$@"')
     path = build(KERNEL, "m", compiler)
     path.write_bytes(damage(path.read_bytes()))
-    assert not subject.is_built(KERNEL, "m", compiler)
+    assert not cache.is_built(KERNEL, "m", compiler)
     assert value(load(KERNEL, "m", compiler)) == EXPECTED
-    assert builds(tmp_path) == 2 and subject.is_built(KERNEL, "m", compiler)
+    assert builds(tmp_path) == 2 and cache.is_built(KERNEL, "m", compiler)
 
 
 FOREIGN = """
@@ -276,7 +275,7 @@ def test_a_library_that_others_may_write_is_built_again(fake: Callable[[str], Co
 
 def test_a_folder_in_the_place_of_a_library(fake: Callable[[str], Compiler], folder: Path) -> None:
     compiler = fake('cp "$3" "$2"')
-    path = subject._target("a", "m", compiler)
+    path = cache._target("a", "m", compiler)
     path.mkdir()
     (path / "something").touch()
     with pytest.raises(CacheError) as caught:
@@ -522,3 +521,10 @@ def test_working_directory_stays(real: Compiler, tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("SYMDYN_CACHE_DIR", "relative")
     assert build(KERNEL, "m", real).is_absolute()
     assert Path.cwd() == tmp_path and names(tmp_path) == ["relative"]
+
+
+def test_a_library_that_another_process_built_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path))
+    whole = iter([False, True])  # not there at first; there when the compiler is done
+    monkeypatch.setattr(cache, "is_whole", lambda target: next(whole))
+    assert not build("int one(void);\nint one(void) { return 1; }\n", "one", find_compiler()).exists()

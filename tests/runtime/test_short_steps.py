@@ -127,7 +127,8 @@ def test_steps_that_a_motion_needs_are_not_warned_of(pushed: Any, always: list[i
         run = pushed[backend].simulate((0, span), q=[1.0], method=method, **given)
     assert run.success
     if "max_step" in options:
-        always.append(0)  # steps of a given length are not looked at
+        assert not always  # steps of a given length are not looked at
+        always.append(0)
 
 
 def test_contacts_by_stiff_springs_are_not_warned_of(always: list[int]) -> None:
