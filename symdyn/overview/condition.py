@@ -10,8 +10,8 @@ import numpy as np
 
 from symdyn.runtime.integrating.charts import INSTEAD, distances
 from symdyn.runtime.solutions.solution import Solution
+from symdyn.stress.reference import DEPENDENT, conditions
 from symdyn.stress.subject import Subject
-from symdyn.stress.yardstick import DEPENDENT, conditions
 
 STATES, BETWEEN = 1001, 101
 RTOL = 1e-9

@@ -10,9 +10,9 @@ import numpy as np
 
 from symdyn.functions.tapes import function_tape
 from symdyn.stress.first_order import HIGHER_ORDER, FirstOrder, first_order
+from symdyn.stress.reference import DIGITS, exactly_as_written, halves, largest, leaves
 from symdyn.stress.statements import Statements
 from symdyn.stress.subject import EPS, Subject
-from symdyn.stress.yardstick import DIGITS, exactly_as_written, halves, largest, leaves
 
 # For products of rounding errors, which the first order leaves out, where divisors change by less than HIGHER_ORDER.
 SAFETY = 2.0
@@ -29,7 +29,7 @@ class Coded:
 
     hi, lo    values with 32 digits as sums of two doubles (n, size), NaN where there are none
     known     (n,), whether a first-order bound holds; divisors: (n,), the largest relative error of one
-    comparable   which entries are compared together, and in what scale: see symdyn.stress.yardstick, together and weights
+    comparable   which entries are compared together, and in what scale: see symdyn.stress.reference, together and weights
     """
 
     def __init__(self, subject: Subject, statements: Sequence[Statements], rows: np.ndarray,

@@ -150,7 +150,7 @@ def divergence(subject: Subject, short: bool) -> Iterator[Row]:
 
 def condition(subject: Subject, short: bool) -> Iterator[Row]:
     """The condition of the mass matrix, or of the whole system with constraints, along the usual motion."""
-    from symdyn.stress.yardstick import conditions
+    from symdyn.stress.reference import conditions
 
     motion = path(subject, _end(subject, short))
     worst = conditions(subject, motion.sol.t, motion.sol.x)

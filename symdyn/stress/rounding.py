@@ -18,9 +18,7 @@ from symdyn.runtime.building.compiler import Compiler, find_compiler, package_pa
 from symdyn.stress.coded import SMALLEST, Coded, imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, judged, refusals, set_aside
 from symdyn.stress.record import FAIL, NotApplicable, Row
-from symdyn.stress.statements import Statements, emitted
-from symdyn.stress.subject import EPS, Subject, evaluated
-from symdyn.stress.yardstick import (
+from symdyn.stress.reference import (
     CORRECTIONS,
     conditions,
     exact,
@@ -33,6 +31,8 @@ from symdyn.stress.yardstick import (
     together,
     weights,
 )
+from symdyn.stress.statements import Statements, emitted
+from symdyn.stress.subject import EPS, Subject, evaluated
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")

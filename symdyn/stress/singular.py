@@ -17,8 +17,8 @@ from symdyn.model.joints import Prismatic, Revolute
 from symdyn.model.symbols import coordinates, parameters, time
 from symdyn.model.system import System
 from symdyn.stress.record import DEGRADE, FAIL, Row, within
+from symdyn.stress.reference import conditions
 from symdyn.stress.subject import EPS, Subject
-from symdyn.stress.yardstick import conditions
 from symdyn.systems import get
 
 RTOL = 1e-10

@@ -12,9 +12,9 @@ import numpy as np
 
 from symdyn.stress.flow import demand_motion, flow, growth_to, path, scales_of
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, Row, within
+from symdyn.stress.reference import exact
 from symdyn.stress.rounding import FEW, states
 from symdyn.stress.subject import EPS, RTOL, Subject
-from symdyn.stress.yardstick import exact
 
 # Powers of mass, length, time.
 _BASE: dict[str, tuple[int, int, int]] = {

@@ -17,10 +17,10 @@ from symdyn.stress.coded import imbalance
 from symdyn.stress.finding import Aside, Finding, first_order_row, set_aside
 from symdyn.stress.first_order import first_order
 from symdyn.stress.record import DEGRADE, FAIL, PASS
+from symdyn.stress.reference import exactly_as_written, halves, leaves
 from symdyn.stress.singular import two_points
 from symdyn.stress.statements import emitted, written_out
 from symdyn.stress.subject import EPS, Subject
-from symdyn.stress.yardstick import exactly_as_written, halves, leaves
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle

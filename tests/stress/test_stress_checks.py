@@ -13,7 +13,7 @@ import pytest
 
 import symdyn as sd
 from symdyn.runtime.building.compiler import find_compiler
-from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units, yardstick
+from symdyn.stress import attitude, chains, extremes, long_runs, motion, reference, rounding, singular, units
 from symdyn.stress.finding import Finding, judged
 from symdyn.stress.record import FAIL, PASS, NotApplicable, Row
 from symdyn.stress.run import CHECKS
@@ -101,8 +101,8 @@ def test_only_states_next_to_lost_rank_or_singular_ones_are_set_aside() -> None:
     crank = Subject("slider_crank")
     theta = math.pi / 2 + np.array([1e-9, 1e-5, 1e-2, 0.5, 0.8, 1.1, 1.4])
     x = np.column_stack([theta, -2 * theta, *np.zeros((2, 7))])  # its second branch, which meets the first where theta = pi / 2
-    assert yardstick.smoothed(crank, "lam", np.zeros(7), x).tolist() == [True, True, *[False] * 5]
-    assert not yardstick.smoothed(crank, "J", np.zeros(7), x).any()
+    assert reference.smoothed(crank, "lam", np.zeros(7), x).tolist() == [True, True, *[False] * 5]
+    assert not reference.smoothed(crank, "J", np.zeros(7), x).any()
     turning = Subject(attitude.free_body("angles"))
     x = np.zeros((2, 6))
     x[:, 1] = [math.pi / 2, math.pi / 2 - 1e-3]
