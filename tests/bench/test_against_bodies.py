@@ -105,22 +105,28 @@ def test_a_loop_by_generalized_alpha() -> None:
 
 
 def pinocchio_accelerations(tree: Tree, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """What the Python package of Pinocchio makes of the numbers that it is given as text."""
+    """What the Python package of Pinocchio makes of the description that it is given as text."""
     pin = pytest.importorskip("pinocchio")
     model = pin.Model()
-    numbers = np.array(pinocchio_aba.numbers(tree), dtype=float)
-    model.gravity.linear = numbers[:3]
-    for row in numbers[3:].reshape(-1, 27):
-        kind = pin.JointModelRZ() if row[1] else pin.JointModelPZ()
-        place = pin.SE3(row[2:11].reshape(3, 3), row[11:14])
-        joint = model.addJoint(int(row[0]), kind, place, f"joint{model.njoints}")
-        model.inertias[joint] = pin.Inertia(row[14], row[15:18], row[18:].reshape(3, 3))
+    for line in pinocchio_aba.description(tree).splitlines():
+        what, *words = line.split()
+        if what == "gravity":
+            model.gravity.linear = np.array(words, dtype=float)
+        elif what == "turned":
+            parent, kind, *numbers = words
+            row = np.array(numbers, dtype=float)
+            place = pin.SE3(row[3:12].reshape(3, 3), row[12:])
+            model.addJoint(int(parent), {"RZ": pin.JointModelRZ, "PZ": pin.JointModelPZ}[kind](), place, f"joint{model.njoints}")
+        else:
+            mass, x, y, z, xx, xy, xz, yy, yz, zz = np.array(words[1:], dtype=float)
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            model.inertias[int(words[0])] = pin.Inertia(mass, np.array([x, y, z]), inertia)
     forces = [link.force - link.stiffness * a - link.damping * b for link, a, b in zip(tree.links, q, u, strict=True)]
     return np.array(pin.aba(model, model.createData(), q, u, np.array(forces)))
 
 
 @pytest.mark.parametrize("case", ["pendulum", "tree"])
-def test_numbers_for_pinocchio(case: str, request: pytest.FixtureRequest) -> None:
+def test_description_for_pinocchio(case: str, request: pytest.FixtureRequest) -> None:
     system, equations, params, _ = request.getfixturevalue(case)
     built = tree_of(system, equations, params)
     check_accelerations(built, lambda q, u: pinocchio_accelerations(built, q, u), equations, params, "Pinocchio")

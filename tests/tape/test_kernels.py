@@ -224,6 +224,12 @@ def test_rows_of_numbers_are_nan_where_nothing_holds() -> None:
     assert np.isnan(found[0]).all() and close(found[1], good.solution()[0], 1e-11)
 
 
+def test_what_nothing_holds_is_singular_with_many_digits() -> None:
+    given = unheld()
+    with pytest.raises(ZeroDivisionError, match="singular"):
+        precisely(Saddle(given.sizes, ""), given.for_saddle)
+
+
 def test_bound_numbers_that_hold_nothing_are_told() -> None:
     given = unheld()
     tape, names = taped(Saddle(given.sizes, "nothing holds a speed"), len(given.for_saddle), PARAMETER)
