@@ -7,13 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symdyn.bench.pinocchio_casadi import ERROR_SIZE, sources
 from symdyn.bench.toolchain import build_cpp, include_flags, package_folder
 from symdyn.errors import SymdynError
 from symdyn.lab.peers.description import Description
 from symdyn.lab.peers.program import Program, State, address, unsorted
-from symdyn.lab.peers.sources import SOURCES
-
-_ERROR_SIZE = 1000
 
 
 class PinocchioPeer:
@@ -21,16 +19,16 @@ class PinocchioPeer:
 
     def __init__(self) -> None:
         package_folder("pinocchio")
-        text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_aba.cpp"))
+        text = sources("model.hpp", "pinocchio_aba.cpp")
         self.library = build_cpp("pinocchio_aba", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
         self.library.aba_open.restype = ctypes.c_void_p
 
     def program(self, description: Description, state: State) -> Program:
         """The algorithm on a model in double precision, at a state."""
-        message = ctypes.create_string_buffer(_ERROR_SIZE)
+        message = ctypes.create_string_buffer(ERROR_SIZE)
         values = description.values
         opened = ctypes.c_void_p(self.library.aba_open(description.text.encode(), address(values), ctypes.c_long(len(values)),
-                                                       message, ctypes.c_long(_ERROR_SIZE)))
+                                                       message, ctypes.c_long(ERROR_SIZE)))
         if not opened:
             raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
         q, u = state.q[list(description.q_order)], state.u[list(description.u_order)]
@@ -47,18 +45,18 @@ class PinocchioLoopPeer:
 
     def __init__(self) -> None:
         package_folder("pinocchio")
-        text = "".join((SOURCES / name).read_text(encoding="utf-8") for name in ("model.hpp", "pinocchio_loop.cpp"))
+        text = sources("model.hpp", "pinocchio_loop.cpp")
         self.library = build_cpp("pinocchio_loop", text, include_flags("pinocchio", "boost", "eigen"), ("pin", "casadi"))
         self.library.loop_open.restype = ctypes.c_void_p
 
     def program(self, description: Description, state: State, body: int, point: Sequence[float],
                    ground: Sequence[float]) -> Program:
         """A planar mechanism whose `point` of a body, number of the joint that moves it, is held at `ground`."""
-        message = ctypes.create_string_buffer(_ERROR_SIZE)
+        message = ctypes.create_string_buffer(ERROR_SIZE)
         values, places = description.values, np.array([*point, *ground], dtype=float)
         opened = ctypes.c_void_p(self.library.loop_open(
             description.text.encode(), address(values), ctypes.c_long(len(values)), ctypes.c_long(body), address(places[:3]),
-            address(places[3:]), message, ctypes.c_long(_ERROR_SIZE)))
+            address(places[3:]), message, ctypes.c_long(ERROR_SIZE)))
         if not opened:
             raise SymdynError(f"Pinocchio could not build the model: {message.value.decode()}")
         q, u = state.q[list(description.q_order)], state.u[list(description.u_order)]

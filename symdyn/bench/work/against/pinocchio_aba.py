@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from symdyn.bench.toolchain import build_cpp, include_flags, package_folder, version
+from symdyn.bench.pinocchio_casadi import Generator, options
+from symdyn.bench.toolchain import package_folder, version
 from symdyn.bench.work.against import casadi_cvodes
 from symdyn.bench.work.against.casadi_cvodes import family
 from symdyn.bench.work.against.mechanism import Tree, check_accelerations, tree_of
-from symdyn.bench.work.against.peer import Runner, Unfit, fitting
+from symdyn.bench.work.against.peer import Runner, fitting
 from symdyn.errors import SymdynError
-
-_SOURCE = Path(__file__).with_name("pinocchio_tree.cpp")
-_ERROR_SIZE = 1000
 
 
 @dataclass(frozen=True)
@@ -37,7 +33,7 @@ class Pinocchio:
 
     def available(self) -> bool | str:
         try:
-            package_folder("pinocchio"), package_folder("casadi"), _options()
+            package_folder("pinocchio"), options()
         except SymdynError as error:
             return str(error)
         return casadi_cvodes.installed()
@@ -60,37 +56,23 @@ class Pinocchio:
         return casadi_cvodes.runner(ca, {"x": x, "ode": ode}, x0, end, self.adams)
 
 
-def _options() -> list[str]:
-    """How the library is compiled, and where CasADi's is. Raises SymdynError for what is missing."""
-    folder = package_folder("casadi")
-    roots = (folder, *[p / "lib" for p in folder.parents[:4]])
-    library = next((root for root in roots if (root / "libcasadi.so").exists()), None)
-    if library is None:
-        raise SymdynError(f"the library libcasadi.so was not found next to the package {folder}; install symdyn[peers]")
-    return ["-O0", *include_flags("pinocchio", "boost", "eigen", "casadi"), "-Wl,--no-as-needed", f"-L{library}", "-lcasadi",
-            f"-Wl,-rpath,{library}"]
-
-
 def accelerations(ca: Any, tree: Tree) -> Any:
     """CasADi's function (q, u, tau) -> u_dot, link by link."""
     with fitting("Pinocchio"):
-        library = build_cpp("pinocchio_tree", _SOURCE.read_text(encoding="utf-8"), _options(), ("pin", "casadi"))
-    library.pinocchio_tree.restype = ctypes.c_char_p
-    message = ctypes.create_string_buffer(_ERROR_SIZE)
-    text = " ".join(map(repr, numbers(tree)))
-    function = library.pinocchio_tree(text.encode(), message, ctypes.c_long(_ERROR_SIZE))
-    if function is None:
-        raise Unfit(f"Pinocchio could not build it: {message.value.decode()}")
-    return ca.Function.deserialize(function.decode())
+        function = Generator().function(description(tree), driven=True)
+    q, u, tau, _ = function.sx_in()
+    return ca.Function("accelerations", [q, u, tau], [function(q, u, tau, [])])
 
 
-def numbers(tree: Tree) -> list[int | float]:
-    """What the library reads: gravity, then link by link; see its source."""
-    found: list[int | float] = tree.gravity.tolist()
-    for link in tree.links:
-        found += [link.parent + 1, int(link.turning), *link.R.ravel().tolist(), *link.p.tolist(), link.mass, *link.com.tolist(),
-                  *link.inertia.ravel().tolist()]
-    return found
+def description(tree: Tree) -> str:
+    """The tree as model.hpp reads it, every joint along or about the z axis of its own frame."""
+    lines = [("gravity", *tree.gravity)]
+    for k, link in enumerate(tree.links):
+        I = link.inertia
+        lines += [("turned", link.parent + 1, "RZ" if link.turning else "PZ", 0, 0, 1, *link.R.ravel(), *link.p),
+                  ("body", k + 1, link.mass, *link.com, I[0, 0], I[0, 1], I[0, 2], I[1, 1], I[1, 2], I[2, 2])]
+    return "\n".join(" ".join(word if isinstance(word, str) else repr(float(word)) if isinstance(word, float) else str(word)
+                              for word in line) for line in lines)
 
 
 PEERS = (Pinocchio(adams=True), Pinocchio(adams=False))

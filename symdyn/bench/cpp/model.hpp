@@ -4,6 +4,8 @@
 //   gravity X Y Z                         m/s^2, world axes
 //   joint PARENT KIND X Y Z               joints are numbered from 1 in their order, 0 is the ground; KIND is RX RY RZ
 //                                         PX PY PZ or S; X Y Z its place on the parent, parent axes, m
+//   turned PARENT KIND  X Y Z  R11 R12 R13 R21 ... R33  X Y Z    the same with the axis, which only kinds of the reader's own look
+//                                         at, and the axes on the parent
 //   body JOINT M  X Y Z  XX XY XZ YY YZ ZZ   mass, kg; centre of mass, m, and inertia about it, kg m^2, in joint axes
 
 #include <istream>
@@ -62,13 +64,21 @@ private:
     const std::vector<Scalar> &parameters_;
 };
 
-// `Joints` is one of Pinocchio's collections of joints: what the variants of Model are made of.
-template <class Scalar, template <class, int> class Joints>
-pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std::vector<Scalar> &parameters)
+// No other kinds of joints than those above.
+struct NoOthers {
+    template <class Kinds, class Axis>
+    void add(Kinds &, const Axis &) const {}
+};
+
+// `Joints` is one of Pinocchio's collections of joints: what the variants of Model are made of. `others` adds kinds that turned
+// joints may have.
+template <class Scalar, template <class, int> class Joints, class Others = NoOthers>
+pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std::vector<Scalar> &parameters,
+                                             const Others &others = Others())
 {
     using Collection = Joints<Scalar, 0>;
     using Place = pinocchio::SE3Tpl<Scalar>;
-    const std::map<std::string, typename Collection::JointModelVariant> kinds = {
+    std::map<std::string, typename Collection::JointModelVariant> kinds = {
         {"RX", typename Collection::JointModelRX()}, {"RY", typename Collection::JointModelRY()},
         {"RZ", typename Collection::JointModelRZ()}, {"PX", typename Collection::JointModelPX()},
         {"PY", typename Collection::JointModelPY()}, {"PZ", typename Collection::JointModelPZ()},
@@ -79,11 +89,17 @@ pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std:
     while (reader.next(what)) {
         if (what == "gravity") {
             model.gravity.linear() = reader.vector();
-        } else if (what == "joint") {
+        } else if (what == "joint" || what == "turned") {
             const std::size_t parent = reader.index();
-            const auto kind = kinds.find(reader.word());
-            if (kind == kinds.end()) throw std::runtime_error("unknown kind of joint");
+            const std::string name = reader.word();
             Place place = Place::Identity();
+            if (what == "turned") {
+                others.add(kinds, reader.vector());
+                for (int i = 0; i < 3; i++)
+                    for (int j = 0; j < 3; j++) place.rotation()(i, j) = reader.number();
+            }
+            const auto kind = kinds.find(name);
+            if (kind == kinds.end()) throw std::runtime_error("unknown kind of joint '" + name + "'");
             place.translation() = reader.vector();
             model.addJoint(parent, kind->second, place, "joint" + std::to_string(model.njoints));
         } else if (what == "body") {

@@ -48,33 +48,34 @@ Eigen::Matrix<SX, Eigen::Dynamic, 1> vector(const SX &column)
     return found;
 }
 
-casadi::Function accelerations(const char *text, const SX &parameters)
+casadi::Function accelerations(const char *text, const SX &parameters, bool driven)
 {
     const auto model = peers::build<SX, peers::FewJoints>(text, entries(parameters));
     pinocchio::DataTpl<SX, 0, peers::FewJoints> data(model);
     const SX q = SX::sym("q", model.nq), u = SX::sym("u", model.nv);
-    const auto torques = vector(SX::zeros(model.nv));
+    const SX tau = driven ? SX::sym("tau", model.nv) : SX::zeros(model.nv);
     // What pinocchio::aba calls by default. Calling that would compile the algorithm in world axes, too.
-    pinocchio::impl::abaLocalConvention(model, data, vector(q), vector(u), torques);
+    pinocchio::impl::abaLocalConvention(model, data, vector(q), vector(u), vector(tau));
     SX result = SX::zeros(model.nv);
     for (casadi_int i = 0; i < model.nv; i++) result(i) = data.ddq[i];
-    // Parameters that are numbers are no argument.
-    const SX p = parameters.is_constant() ? SX(0, 1) : parameters;
-    return casadi::Function("accelerations", {q, u, p}, {result}, {"q", "u", "p"}, {"u_dot"});
+    // What is a number is no argument.
+    const SX none(0, 1), forces = driven ? tau : none, p = parameters.is_constant() ? none : parameters;
+    return casadi::Function("accelerations", {q, u, forces, p}, {result}, {"q", "u", "tau", "p"}, {"u_dot"});
 }
 
 } // namespace
 
 extern "C" {
 
-// The serialized function (q, u, p) -> u_dot, or null with a message in `error`. `runtime`: parameters stay symbols.
-const char *casadi_aba(const char *text, const double *parameters, long count, int runtime, char *error, long size)
+// The serialized function (q, u, tau, p) -> u_dot, or null with a message in `error`. `runtime`: parameters stay symbols;
+// `driven`: so do forces along the speeds, else there are none.
+const char *casadi_aba(const char *text, const double *parameters, long count, int runtime, int driven, char *error, long size)
 {
     static std::string kept;
     const bool done = peers::guarded(error, size, [&] {
         const std::vector<double> numbers(parameters, parameters + count);
         const SX p = runtime ? SX::sym("p", count) : SX(casadi::DM(numbers));
-        kept = accelerations(text, p).serialize();
+        kept = accelerations(text, p, driven != 0).serialize();
     });
     return done ? kept.c_str() : nullptr;
 }
