@@ -127,19 +127,23 @@ def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
     letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
     if letters:
         return Proof(False, reason=f"the sides differ unless {shown(letters[0])} has a certain value; take it with .doit()")
-    return replace(proof, reason=proof.reason + _other_symbols(left, right))
+    return replace(proof, reason=_told(proof, left, right))
 
 
-def _other_symbols(left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
-    """Symbols of one side only, and those of one name that are not the same, in words for a refuted claim."""
+def _told(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
+    """How the sides differ, with symbols of one side only, and those of one name that are not the same, of which the one in b is
+    printed with a stroke."""
     if all(e == 0 for e in right):
-        return ""
+        return proof.reason
     sides = [{s for e in side for s in symbols_of(e)} for side in (left, right)]
     only = sorted({str(s) for s in sides[0]} ^ {str(s) for s in sides[1]})
-    told = f"; only one side holds {', '.join(only)}" if only else ""
     pairs = sorted(((one, two) for one in sides[0] - sides[1] for two in sides[1] - sides[0] if str(one) == str(two)), key=str)
-    return told + "".join(f"; {one} is not the same symbol on both sides: {described(one)} in a, {described(two)} in b"
-                          for one, two in pairs)
+    reason = proof.reason
+    if pairs and proof.difference is not None:
+        reason = f"the sides differ by {proof.difference.xreplace({two: sp.Symbol(f'{two}' + chr(39)) for _, two in pairs})}"
+    reason += f"; only one side holds {', '.join(only)}" if only else ""
+    return reason + "".join(f"; {one} is not the same symbol on both sides: {described(one)} in a, {described(two)} in b"
+                            for one, two in pairs)
 
 
 def _same_functions(entries: Sequence[sp.Expr]) -> dict[Any, Any]:

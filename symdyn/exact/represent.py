@@ -26,7 +26,7 @@ TRIED = 6
 class Letters:
     """Numbers of letters: generators of plain symbols and functions keep theirs, sines and cosines of sums get new ones.
 
-    turns      letter -> ("sin", "cos" or "tan", vector of integers over the base angles)
+    turns      letter -> ("sin", "cos" or "tan", vector of integers over the base angles; of halves where `halved` made it)
     below      letter -> what it is one over: the number of a factor of the ring, or -1 - letter
     opposite   vector -> whether its opposite is the one to write
     """
@@ -344,6 +344,24 @@ def _matches(p: Polynomial, letters: Letters) -> Iterator[tuple[tuple[int, int],
                     continue
                 letter, sign = same if b == a else opposite
                 yield (x, y), m, other_term, multiplied(rest, ((letter, 1),)), sign
+
+
+def halved(p: Polynomial, letters: Letters) -> Polynomial | None:
+    """Pairs of terms x + x cos a and x - x cos a as 2 x cos^2(a/2) and 2 x sin^2(a/2); None without such pairs."""
+    result = dict(p)
+    for m, c in p.items():
+        for letter, _ in m:
+            name, vector = letters.turns.get(letter, ("", ()))
+            rest = _less(m, letter, 1)
+            other = result.get(rest)
+            if name != "cos" or m not in result or other is None or abs(other) != abs(c):
+                continue
+            half: Any = tuple([i // 2 if i % 2 == 0 else Fraction(i, 2) for i in vector])
+            squared = letters.of("cos" if other == c else "sin", half)[0]
+            del result[m], result[rest]
+            key = multiplied(rest, ((squared, 2),))
+            result[key] = result.get(key, 0) + 2 * other
+    return None if len(result) == len(p) else {m: integer(c) for m, c in result.items() if c}
 
 
 def _partner(x: int, y: int, letters: Letters) -> Partner | None:

@@ -20,8 +20,10 @@ from symdyn.errors import SymdynError
 
 # Terms that a product may have; so many take about a gigabyte with forty generators.
 BOUND = 2_000_000
-# All products of one set of values may have so many times as many; all values together, which are kept, so many times.
-ALL, KEPT = 20, 2
+# All products of one set of values may have so many times as many.
+ALL = 20
+# Terms of all values together, which are kept: about a gigabyte.
+KEPT = 4_000_000
 # Denominators with more terms than this are not split into factors.
 FACTORED = 400
 # Trial divisions of longer numerators are left out.
@@ -110,8 +112,8 @@ class Ring:
     def _formed(self, p: Any) -> Any:
         """A polynomial that is kept."""
         self._kept += len(p)
-        if self._kept > KEPT * self.bound:
-            raise TooLarge(f"values have more than {KEPT * self.bound:,} terms together")
+        if self._kept > KEPT:
+            raise TooLarge(f"values have more than {KEPT:,} terms together")
         return p
 
     def _check(self, terms: int) -> None:

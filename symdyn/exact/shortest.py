@@ -19,7 +19,7 @@ from symdyn.errors import SymdynError, UnsupportedExpression
 from symdyn.exact.arrange import Arranger, Letter, Polynomial, Sum, Tree, total
 from symdyn.exact.ideal import Ideal
 from symdyn.exact.reduce import relations_in_letters, shortened
-from symdyn.exact.represent import Basis, Letters, better_basis, contracted, divided, fourier, plain, with_tangents
+from symdyn.exact.represent import Basis, Letters, better_basis, contracted, divided, fourier, halved, plain, with_tangents
 from symdyn.exact.ring import BOUND, TooLarge, Value
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Atom, Exact
@@ -167,7 +167,7 @@ class Writer:
         if derived is not None and operations <= len(value.num):
             return derived(math.inf)[0]
         tree = self.tree(value)
-        result = self.tree_expression(tree)
+        result = _turned_below(self.tree_expression(tree))
         if derived is not None and operations <= LONGER * total(tree)[0]:
             other, count = derived(NEAR * total(tree)[0])
             if count < sp.count_ops(result):
@@ -191,6 +191,8 @@ class Writer:
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
             found = found[:2 if least <= MIDDLE else 1]
+        else:
+            found += [p for p in (halved(p, self.letters) for p in found) if p is not None]
         return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
 
     def _over(self, p: Polynomial, value: Value) -> Polynomial:
@@ -303,6 +305,21 @@ class _Lookup(dict[int, Letter]):
         length = 1 if e.is_Symbol else len(str(e))
         self[k] = Letter(int(sp.count_ops(e)), length + multiples, self.writer.kind(k), k in self.writer.letters.below)
         return self[k]
+
+
+def _turned_below(e: sp.Expr) -> sp.Expr:
+    """-a / (b - c) as a / (c - b)."""
+    coefficient, factors = e.as_coeff_mul()
+    if not e.is_Mul or not coefficient.is_negative:
+        return e
+    for factor in sorted(factors, key=sp.default_sort_key):
+        base, exponent = factor.as_base_exp()
+        if base.is_Add and exponent.is_Integer and exponent < 0 and exponent % 2:
+            turned = sp.Pow(sp.Add(*[-term for term in base.args]), exponent)
+            other = _times(-coefficient, [turned if f is factor else f for f in factors])
+            if sp.count_ops(other) < sp.count_ops(e):
+                return other
+    return e
 
 
 def _times(coefficient: Any, parts: list[sp.Expr]) -> sp.Expr:

@@ -37,12 +37,17 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
     recorder = Recorder()
     leaves: dict[sp.Basic, Any] = {}
     symbols: dict[Node, sp.Expr] = {}
-    for k, symbol in enumerate(sorted({same.get(symbol, symbol) for symbol in found}, key=sp.default_sort_key)):
+    for k, symbol in enumerate(sorted({same.get(symbol, symbol) for symbol in found}, key=ordered)):
         leaf = recorder.leaf(f"x{k}", _kind(symbol))
         leaves[symbol], symbols[leaf] = leaf, symbol
     leaves |= {symbol: leaves[same[symbol]] for symbol in found if symbol in same}
     memory: dict[sp.Basic, Any] = {}
     return [record_expression(recorder, e, leaves, memory) for e in expressions], symbols
+
+
+def ordered(part: sp.Basic) -> tuple[Any, str]:
+    """A key to sort by that tells symbols of one name apart by what is assumed of them."""
+    return sp.default_sort_key(part), str(sorted(getattr(part, "assumptions0", {}).items()))
 
 
 def _taken(value: Any) -> Any:

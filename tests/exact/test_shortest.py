@@ -43,6 +43,22 @@ def test_operations_of_the_catalogue(name, quantity):
     assert sp.count_ops(eq.explicit(quantity)) <= MOST[name, quantity]
 
 
+@pytest.mark.parametrize(("given", "wanted"), [
+    (a * (1 - sp.cos(2 * q1)) / 2, a * sp.sin(q1) ** 2),
+    (a * (1 + sp.cos(2 * q1 + 2 * q2)) / 2 + b, a * sp.cos(q1 + q2) ** 2 + b),
+    (a * (1 + sp.cos(q1)), a * sp.cos(q1) + a),
+    (sp.sin(q1 / 2) * sp.cos(q1 / 2), sp.sin(q1) / 2),
+    (2 * a * b * sp.sin(q1) * sp.cos(q1), a * b * sp.sin(2 * q1)),
+])
+def test_half_and_double_angles_where_they_are_shorter(given, wanted):
+    assert shortest(given) == wanted
+
+
+def test_minus_signs_go_into_denominators():
+    assert [str(shortest(e)) for e in (1 / (a - b), 1 / (b - a), -c / (b - a), a / (a - b) ** 2)] == [
+        "1/(a - b)", "1/(-a + b)", "c/(a - b)", "a/(a - b)**2"]
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_every_form_is_the_same_and_none_is_shorter(form):
     eq = sd.systems.get("four_bar").augmented()
@@ -128,3 +144,10 @@ def test_a_form_that_is_too_large_names_the_alternatives(monkeypatch):
 def test_text_is_never_evaluated(text):
     with pytest.raises(sd.ArgumentError, match="exact algebra takes numbers and expressions of SymPy symbols, found"):
         shortest(text)
+
+
+def test_values_are_bounded_together(monkeypatch):
+    """Sums of many terms, each formed by short products, take memory too."""
+    monkeypatch.setattr("symdyn.exact.ring.KEPT", 50)
+    with pytest.raises(TooLarge, match="values have more than 50 terms together"):
+        shortest(sp.Add(*[a**k * b**(20 - k) for k in range(20)]))
