@@ -17,7 +17,8 @@ import sympy as sp
 
 from symdyn.analytic.minors import blocks, determinant, solve
 from symdyn.errors import SymdynError
-from symdyn.formulation.algebra import given_by_time
+from symdyn.formulation.algebra import TapeAlgebra, given_by_time
+from symdyn.formulation.trees.mass_matrix import Factors, factorize
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import ACCELERATION, SEED, Node
@@ -127,7 +128,8 @@ class Mechanics:
         """Raises SymdynError where the inverse of the mass matrix fills pages."""
         if self.coupled > CLOSED:
             raise SymdynError(f"{self.equations.name}: {what} requested; it takes the inverse of a mass matrix that couples "
-                              f"{self.coupled} speeds, which is written out for up to {CLOSED}; {instead}")
+                              f"{self.coupled} speeds, which is written out for up to {CLOSED}; {instead}, or ask for it in "
+                              "named intermediates with eq.explicit(name, intermediates=True)")
 
     def hamiltonian(self) -> Any:
         """(p - p0)^T M_tilde^-1 (p - p0) / 2 - T0 + V, in q, p and t. Raises SymdynError for quasi-velocities, and where the
@@ -143,6 +145,23 @@ class Mechanics:
             bordered[:-1, :-1], bordered[:-1, -1], bordered[-1, :-1] = rows, p[block], p[block]
             total = total - determinant(bordered) / (2 * determinant(rows))
         return total
+
+    def hamiltonian_by_steps(self) -> Any:
+        """The same for any mass matrix, by its factors L^T D L, whose entries are steps: (p - p0)^T L^-1 D^-1 L^-T (p - p0) / 2
+        - T0 + V."""
+        self.demand_plain("Hamilton's function was")
+        p0, T0 = self._split()
+        factors = self._factors()
+        y = factors.inwards(vector(*self.p) - p0)
+        return sum((a * a * d / 2 for a, d in zip(y, factors.inverse_D, strict=True)), self.V - T0)
+
+    def hamilton_speeds_by_steps(self) -> np.ndarray:
+        """q_dot in q and p, by factors of the mass matrix."""
+        return self._factors().solve(vector(*self.p) - self._split()[0])
+
+    def _factors(self) -> Factors:
+        M, algebra = self.equations.quantity("M_tilde"), TapeAlgebra(self.recorder, dict(self.equations.leaves))
+        return factorize(algebra, M, [f"the mass matrix is not positive definite at {u}" for u in self.equations.symbols.speeds])
 
     def hamilton_speeds(self) -> np.ndarray:
         """q_dot in q and p, (n_q,)."""
@@ -173,15 +192,25 @@ class Mechanics:
     def explicit_rates(self) -> np.ndarray:
         """x_dot with accelerations by Cramer's rule, (n_q + n_u + n_z,). Raises SymdynError under constraints, where loads depend
         on accelerations, and where the mass matrix couples more than CLOSED speeds."""
+        self._demand_free()
+        self.demand_closed("x_dot in explicit form was", "take eq.mass_matrix and eq.forcing, or "
+                           "evaluate module.rhs(t, x, params)")
+        return self._state_rates(solve(self.equations.quantity("M_tilde"), -self.equations.quantity("bias")))
+
+    def explicit_rates_by_steps(self) -> np.ndarray:
+        """x_dot by factors of the mass matrix. Raises SymdynError under constraints, and where loads depend on accelerations."""
+        self._demand_free()
+        return self._state_rates(self._factors().solve(-self.equations.quantity("bias")))
+
+    def _demand_free(self) -> None:
         equations = self.equations
         if equations.constraints or equations.implicit_loads:
             why = "constraints" if equations.constraints else "loads that depend on accelerations"
             raise SymdynError(f"{equations.name}: explicit accelerations were requested, but there are {why}; evaluate "
                               "module.rhs(t, x, params) instead")
-        self.demand_closed("x_dot in explicit form was", "take eq.mass_matrix and eq.forcing, or "
-                           "evaluate module.rhs(t, x, params)")
-        rates = equations.quantity("rates").ravel()
-        accelerations = solve(equations.quantity("M_tilde"), -equations.quantity("bias"))
+
+    def _state_rates(self, accelerations: np.ndarray) -> np.ndarray:
+        rates = self.equations.quantity("rates").ravel()
         return np.concatenate([rates, accelerations, vector(*self.state_rates())])
 
 
@@ -214,3 +243,16 @@ QUANTITIES: Mapping[str, Callable[[Mechanics], Any]] = {
 def recorded(equations: Equations, name: str) -> Any:
     """A quantity of QUANTITIES on the tape of the equations. Raises SymdynError where it does not exist."""
     return QUANTITIES[name](Mechanics(equations))
+
+
+# The same where the mass matrix couples more speeds, for named intermediates.
+BY_STEPS: Mapping[str, Callable[[Mechanics], Any]] = {
+    "hamiltonian": Mechanics.hamiltonian_by_steps, "hamilton_speeds": Mechanics.hamilton_speeds_by_steps,
+    "state_rates": Mechanics.explicit_rates_by_steps}
+
+
+def by_steps(equations: Equations, name: str) -> Any:
+    """A quantity of BY_STEPS where the mass matrix couples more than CLOSED speeds, else None. Raises SymdynError where it does
+    not exist."""
+    mechanics = Mechanics(equations) if name in BY_STEPS else None
+    return BY_STEPS[name](mechanics) if mechanics is not None and mechanics.coupled > CLOSED else None

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from symdyn.formulation.equations import Equations
 
 CHECKED = ("T", "V", "M_tilde", "k_tilde", "F_tilde", "C", "C_r", "F_d")
+# Energies are in J; N m is for torques.
+ENERGIES = {"N m": "J"}
 ENERGY, POWER, SECOND = (parsed(unit) or {} for unit in ("J", "W", "s"))
 
 
@@ -97,10 +99,13 @@ def check_units(equations: Equations) -> UnitReport:
             wanted = _wanted(name, index, speeds, [units.get(z) for z in s.states])
             differ = None if wanted is None else dimensions.demand(value[index], wanted)
             if differ:
-                faults.append(f"{name}{list(index) if index else ''} is in {differ[0]}, the equations take it in {differ[1]}")
+                wanted_unit = ENERGIES.get(differ[1], differ[1]) if name in ("T", "V") else differ[1]
+                faults.append(f"{name}{list(index) if index else ''} is in {differ[0]}, the equations take it in {wanted_unit}")
     told: dict[str, Any] = {}
     for name, value in quantities.items():
-        array = np.array([text(dimensions.of(e)) if isinstance(e, Node) else "" for e in value.ravel()], dtype=object)
+        words = ENERGIES if name in ("T", "V") else {}
+        found = [text(dimensions.of(e)) if isinstance(e, Node) else "" for e in value.ravel()]
+        array = np.array([words.get(unit, unit) for unit in found], dtype=object)
         told[name] = array.reshape(value.shape).tolist()
     used = {symbol: leaf for leaf, symbol in printed.items() if leaf in dimensions}
     inferred = {symbol: text(dimensions.of(leaf)) for symbol, leaf in used.items() if units.get(symbol) is None}

@@ -228,14 +228,18 @@ class Equations:
 
     def _in_intermediates(self, name: str) -> Any:
         """The quantity in named intermediates, and these."""
+        from symdyn.analytic.lagrange import by_steps
         from symdyn.analytic.units import symbol_units
         from symdyn.exact.ring import TooLarge
         from symdyn.report.named import with_intermediates
+        from symdyn.tape.tape import Output
 
         key = (name, "intermediates")
         if key not in self._printed:
+            factored = by_steps(self, name)
+            output = self.tape(name).outputs[name] if factored is None else Output.of(name, factored)
             try:
-                self._printed[key] = with_intermediates(self.tape(name).outputs[name], self.printed_leaves(), self.recorder.names,
+                self._printed[key] = with_intermediates(output, self.printed_leaves(), self.recorder.names,
                                                         self._base(), symbol_units(self))
             except (TooLarge, ZeroDivisionError) as error:
                 raise SymdynError(f"{self.name}: {name} is too large for named intermediates: {error}; print its steps with "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sympy as sp
 
@@ -17,8 +17,6 @@ QUANTITIES = ("M_tilde", "k_tilde", "F_tilde", "C", "C_r", "F_d")
 FORMS = ("polynomial", "fourier")
 # Coordinates up to which the three quantities of the equations of motion take LIMIT seconds at most, or LONGER.
 COORDINATES, LIMIT, LONGER = 6, 0.5, {"puma560": 2.0}
-# Seconds after which a form is left out.
-PATIENCE = 30.0
 HEADING = f"{'mechanism':36}{'quantity':10}{'operations':>11}{'polynomial':>12}{'Fourier':>10}{'with names':>12}{'s':>8}"
 
 
@@ -50,7 +48,7 @@ def printed(name: str) -> Iterator[Row]:
     """A row for each quantity of a mechanism of the catalogue, trees as embedding, all others as augmented equations."""
     system = get(name)
     tied = name in names(constrained=True)
-    equations = replace(system.augmented() if tied else system.embedding(), simplify_seconds=PATIENCE)
+    equations = system.augmented() if tied else system.embedding()
     for quantity in QUANTITIES:
         if quantity in equations.quantities:
             begin = clock.process_time()

@@ -35,7 +35,7 @@ def test_the_catalogue_agrees(name):
 
 def test_units_of_entries():
     report = sd.systems.get("cart_pole").embedding().check_units()
-    assert report.units["T"] == report.units["V"] == "N m"
+    assert report.units["T"] == report.units["V"] == "J"
     assert report.units["M_tilde"] == [["kg", "kg m"], ["kg m", "kg m^2"]]
     assert report.units["F_tilde"] == ["N", "N m"]
 

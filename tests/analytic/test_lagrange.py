@@ -1,5 +1,7 @@
 """Energies, momenta and Hamilton's equations agree with the equations of motion that were derived without them."""
 
+import random
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -89,6 +91,27 @@ def test_large_mass_matrices_are_not_inverted():
         _ = eq.rhs
     with pytest.raises(SymdynError, match=r"there are constraints; evaluate module\.rhs"):
         derived("four_bar").explicit("state_rates")
+
+
+def test_steps_invert_large_mass_matrices():
+    """H in q and p, and x_dot, in named intermediates: T + V at the momenta of a motion, and what the module computes."""
+    eq = sd.systems.get("n_link_pendulum", n=4).recursive()
+    draw = random.Random(2)
+    numbers = {s: draw.uniform(0.3, 1.0) for s in (*eq.symbols.coordinates, *eq.symbols.speeds, *eq.symbols.parameters)}
+    momenta = dict(zip(eq.momentum_symbols, eq.momenta.subs(numbers), strict=True))
+
+    def value(name):
+        e, steps = eq.explicit(name, intermediates=True)
+        known = numbers | momenta
+        for step in steps:
+            known[step.symbol] = step.expression.subs(known)
+        return e.subs(known)
+
+    assert float(value("hamiltonian")) == pytest.approx(float((eq.T + eq.V).subs(numbers)), rel=1e-12)
+    state = [numbers[s] for s in (*eq.symbols.coordinates, *eq.symbols.speeds)]
+    wanted = eq.compile(backend="numpy").rhs(0.0, state, [numbers[p] for p in eq.symbols.parameters])
+    assert [float(v) for v in value("state_rates")] == pytest.approx(list(wanted), rel=1e-11)
+    assert [float(v) for v in value("hamilton_speeds")] == pytest.approx(state[4:], rel=1e-11)
 
 
 def test_names_of_sympy_mechanics():
