@@ -56,7 +56,7 @@ class Libraries:
             names = groups.of_right_side(self.equations, what)
             return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                         work=what.work, baumgarte=what.baumgarte, method=what.method,
-                        sensitivities=what.sensitivities, adjoint=what.adjoint)
+                        sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                     batch=what == groups.BATCH)

@@ -17,6 +17,7 @@ class RightSide:
     baumgarte   whether it is stabilized by Baumgarte's method, with one more parameter: its gain, 1/s
     method      of the integrator, one of symdyn.backend.methods.METHODS
     sensitivities   what the state is differentiated by along the motion, a column each: parameters, inputs, "" for initial values
+    held        inputs whose derivatives along the columns are parameters: those of x_dot by them count, too
     adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
@@ -25,6 +26,7 @@ class RightSide:
     method: str = METHOD
     sensitivities: tuple[str, ...] = ()
     adjoint: tuple[str, ...] | None = None
+    held: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

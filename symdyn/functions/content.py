@@ -13,7 +13,7 @@ from symdyn.formulation.constraints.motion import BAUMGARTE
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unknowns, unproved
 from symdyn.formulation.printed.skipped import skipped
-from symdyn.functions.sensitivities import column_names
+from symdyn.functions.sensitivities import column_names, held_names
 from symdyn.functions.table import FUNCTIONS, title_of
 from symdyn.functions.tapes import columns_of, given_rates, has_function, switches, tapes_of
 from symdyn.model.symbols import GivenMotion
@@ -54,7 +54,8 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
                     *column_names(symbols, right_side.sensitivities)], "ud": given_rates(equations, names),
               "inputs": [s.name for s in symbols.inputs],
-              "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte]}
+              "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte,
+                    *held_names(right_side.sensitivities, right_side.held)]}
     outputs = output_shapes(equations) if "outputs" in names else ()
     titles = {n: title_of(n, bool(equations.constraints)) for n in names}
     return Content(equations.name, equations.formulation, tapes, titles, groups,

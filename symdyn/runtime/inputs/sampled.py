@@ -30,6 +30,8 @@ class Sampled(OverTime):
     period     between two instants, s
     offset     from the start of the simulation to the first instant, s; until then inputs have their initial values
     delay      from an instant to when its value takes effect, s: the time that computing takes; it may exceed the period
+    gradient   f(t, x) -> derivatives of the value by the state, (n_x,), or one row for each of several inputs: what
+               sensitivities of the motion need; None: not known
 
     Pass it to `simulate`: inputs={F: sd.Sampled(f, period=0.01)}, inputs={(F, M): sd.Sampled(f, 0.01)} for an f that returns two
     values, or inputs=sd.Sampled(f, 0.01) for all inputs. Steps of the integrator end at the instants. Raises ArgumentError for
@@ -44,10 +46,14 @@ class Sampled(OverTime):
     period: float
     offset: float = 0.0
     delay: float = 0.0
+    gradient: Callable[[float, np.ndarray], Any] | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise ArgumentError(f"a sampled controller takes a function of (t, x) first, found {self.function!r}")
+        if not (self.gradient is None or callable(self.gradient)):
+            raise ArgumentError(f"the gradient of a sampled controller must be a function of (t, x), or None, found "
+                                f"{self.gradient!r}")
         for what, least in (("period", "more than 0"), ("offset", "0 or more"), ("delay", "0 or more")):
             value = getattr(self, what)
             fits = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
@@ -83,17 +89,30 @@ class Sampler:
             raise ArgumentError(f"{self.what} returned {given!r} at t = {t:.6g}; {needed} {wanted}")
         return values
 
+    def columns(self, t: float, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Derivatives of the values along columns (k, n_x) of sensitivities, (n, k), by the gradient. Raises as `values`."""
+        assert self.sampled.gradient is not None
+        given = called(self.sampled.gradient, t, x.copy(), f"the gradient of {self.what}")
+        try:
+            rows = np.asarray(given, dtype=float).reshape(len(self.places), len(x))
+        except (TypeError, ValueError):
+            raise ArgumentError(f"the gradient of {self.what} returned {given!r} at t = {t:.6g}; needed are {len(x)} numbers for "
+                                "each of its inputs") from None
+        return np.asarray(rows @ columns.T)
+
 
 @dataclass(frozen=True)
 class Record:
     """Inputs as they were held: from times (n,) on, values (n, n_in) at the places of inputs that controllers set; fresh
-    (n, n_in): those that were set then; ahead: the instant at which the latest piece was to end, s."""
+    (n, n_in): those that were set then; ahead: the instant at which the latest piece was to end, s; columns (n, n_in, k): their
+    derivatives along sensitivities, k may be 0."""
 
     times: np.ndarray
     values: np.ndarray
     fresh: np.ndarray
     places: tuple[int, ...]
     ahead: float
+    columns: np.ndarray
 
     def rows(self, t: Any) -> np.ndarray:
         """The inputs at times, (..., n_in), right at the places alone; at an instant those that take effect there."""
@@ -121,9 +140,10 @@ class Replay:
     def __init__(self, record: Record) -> None:
         self.record, self.close = record, 0.0
 
-    def at(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The inputs from t on, (n_in,)."""
-        return self.record.rows(t)
+    def at(self, t: float, x: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The inputs from t on, (n_in,), and their derivatives along columns of sensitivities, (n_in, k)."""
+        place = max(int(np.searchsorted(self.record.times, t, side="right")) - 1, 0)
+        return self.record.values[place], self.record.columns[place]
 
     def after(self, t: float) -> float:
         """The next instant, s; infinite if there is none."""
@@ -138,37 +158,44 @@ class Sampling:
 
     constant   the inputs until a controller sets them, (n_in,); begin: the start of the run, s
     close      instants that are nearer are one, s
+    k          number of columns of sensitivities
     """
 
-    def __init__(self, samplers: Sequence[Sampler], constant: np.ndarray, begin: float) -> None:
+    def __init__(self, samplers: Sequence[Sampler], constant: np.ndarray, begin: float, k: int = 0) -> None:
         self.samplers, self.begin = samplers, begin
         self.held = constant.copy()
         self.counts = [0] * len(samplers)
-        self.waiting: list[tuple[float, tuple[int, ...], np.ndarray]] = []  # when, where, what takes effect
+        self.columns = np.zeros((len(constant), k))
+        self.waiting: list[tuple[float, tuple[int, ...], np.ndarray, np.ndarray]] = []  # when, where, what takes effect
         self.close = ONE_INSTANT * min(s.sampled.period for s in samplers)
         self._times: list[float] = []
         self._values: list[np.ndarray] = []
         self._fresh: list[np.ndarray] = []
+        self._columns: list[np.ndarray] = []
 
-    def at(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The inputs from t on, (n_in,), with those that are sampled at t in the state x. Raises as `Sampler.values`."""
+    def at(self, t: float, x: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The inputs from t on, (n_in,), with those that are sampled at t in the state x, and their derivatives along columns of
+        sensitivities (k, n_x), (n_in, k). Raises as `Sampler.values`."""
         fresh = np.zeros(len(self.held), dtype=bool)
         try:
             for k, sampler in enumerate(self.samplers):
                 instant = self._instant(k)
                 if instant <= t + self.close:
-                    self.waiting.append((instant + sampler.sampled.delay, sampler.places, sampler.values(t, x)))
+                    slopes = sampler.columns(t, x, columns) if len(columns) else np.zeros((len(sampler.places), 0))
+                    self.waiting.append((instant + sampler.sampled.delay, sampler.places, sampler.values(t, x), slopes))
                     self.counts[k] += 1
-            for when, places, values in self.waiting:
+            for when, places, values, slopes in self.waiting:
                 if when <= t + self.close:
                     self.held[list(places)] = values
+                    self.columns[list(places)] = slopes
                     fresh[list(places)] = True
             self.waiting = [w for w in self.waiting if w[0] > t + self.close]
         finally:  # also where a controller ends the run: its steps, which a replay repeats, end here
             self._times.append(t)
             self._values.append(self.held.copy())
             self._fresh.append(fresh)
-        return self.held.copy()
+            self._columns.append(self.columns.copy())
+        return self.held.copy(), self.columns.copy()
 
     def after(self, t: float) -> float:
         """The next instant at which a controller is asked, or a value takes effect, s."""
@@ -184,7 +211,8 @@ class Sampling:
         return Record(np.array(self._times), np.array(self._values).reshape(-1, len(self.held)),
                       np.array(self._fresh).reshape(-1, len(self.held)),
                       tuple(sorted({place for sampler in self.samplers for place in sampler.places})),
-                      self.after(self._times[-1] if self._times else self.begin))
+                      self.after(self._times[-1] if self._times else self.begin),
+                      np.array(self._columns).reshape(len(self._columns), *self.columns.shape))
 
 
 def check_span(samplers: Sequence[Sampler], span: tuple[float, float], owner: str) -> None:

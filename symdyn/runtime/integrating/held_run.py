@@ -55,6 +55,7 @@ class _Pieces:
 
     def __post_init__(self) -> None:
         self.inputs = self.request.inputs.held()  # those of the latest piece
+        self.input_columns = np.zeros((len(self.inputs.constant), 0))
         self.carried: Carried | None = None  # of events, into the next piece
         self.chatter = chatter_of(self.module, self.request)
         self.n_steps = 0
@@ -72,11 +73,13 @@ class _Pieces:
         last = end if request.times is None else float(request.times[-1])  # what is beyond is not asked for
         x = request.x0
         holding: Replay | Sampling = Replay(inputs.record) if inputs.record is not None else \
-            Sampling(inputs.samplers, inputs.constant, t)
+            Sampling(inputs.samplers, inputs.constant, t, len(request.columns))
         message, cause, interrupted, over = "", None, False, False
         try:
             while True:
-                held = holding.at(t, x[:request.n_state])
+                n = request.n_state
+                columns = x[n:n * (1 + len(request.columns))].reshape(-1, n)
+                held, self.input_columns = holding.at(t, x[:n], columns)
                 fired = self._switch(t, x, request.inputs.held(held))
                 over = any(self.module.metadata.events[k].stop for k in fired)
                 if over:
@@ -121,7 +124,7 @@ class _Pieces:
         step = request.first_step if self.one_length or not self.done else self.done[-1].next_step
         left = None if request.max_steps is None else request.max_steps - self.n_steps
         outcome = self.part(replace(request, span=(t, until), times=times, x0=x, first_step=step, max_steps=left,
-                                    inputs=self.inputs, carried=self.carried))
+                                    inputs=self.inputs, carried=self.carried, input_columns=self.input_columns))
         rows = np.ones(len(outcome.t), dtype=bool)
         if wanted is not None:
             rows = np.isin(outcome.t, wanted)
@@ -188,6 +191,9 @@ class _Pieces:
     def _reset(self, fired: list[int], t: float, x: np.ndarray) -> np.ndarray:
         """The state that the next piece begins with: after the resets of events at jumps of inputs."""
         records = self.module.metadata.events
+        if fired and self.request.columns:
+            raise EvaluationError(f"{self.module.name}: the event {records[fired[0]].name} happens because inputs jump, at an "
+                                  "instant of a controller; sensitivities do not go across that")
         if self.locator is None or self.carried is None or not any(records[k].reset for k in fired):
             return x
         self.locator.fired = fired

@@ -22,7 +22,8 @@ class Request:
     stabilization   what keeps the state on its constraints
     carried   of events, where the run goes on from the end of another one
     event_spacing   of the samples of events at the most, s; 0: as they vary
-    columns   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
+    input_columns   derivatives of inputs that are held along the columns, (n_in, n_columns)
+    columns, held   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
     """
 
     span: tuple[float, float]
@@ -41,6 +42,8 @@ class Request:
     carried: Carried | None = None
     event_spacing: float = 0.0
     columns: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+    input_columns: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def works(self) -> bool:
@@ -49,7 +52,9 @@ class Request:
 
     @property
     def field_p(self) -> np.ndarray:
-        """Parameters of the right-hand side: Baumgarte's gain is one more."""
+        """Parameters of the right-hand side: Baumgarte's gain is one more, so are derivatives of inputs that are held."""
+        if self.held:
+            return np.append(self.p, self.input_columns.T.ravel())
         return np.append(self.p, self.stabilization.gain) if self.stabilization.way == "baumgarte" else self.p
 
     def with_work(self) -> Request:

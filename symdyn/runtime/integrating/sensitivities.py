@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -71,15 +72,16 @@ class Asked:
             starts.append(start)
         return cls(tuple(names), tuple(columns), np.array(starts).reshape(len(names), n_x), np.array(sizes))
 
-    def added_to(self, request: Request, controlled: bool) -> Request:
-        """The request with the columns behind the state.
+    def added_to(self, request: Request, controlled: bool, inputs: Sequence[str]) -> Request:
+        """The request with the columns behind the state; inputs: names.
 
         Tolerances are such that the error of the state, and of every column if they are controlled, is within what was asked for
         in its own root mean square: they count in that of all entries.
         """
         part = 1.0 / np.sqrt(1.0 + len(self.columns))
         of_columns = part * request.atol / self.sizes[:, None] if controlled else np.full(self.starts.shape, _ANY)
-        return replace(request, x0=np.concatenate([request.x0, self.starts.ravel()]), rtol=part * request.rtol,
+        names = [name for k, name in enumerate(inputs) if k in request.inputs.places] if request.inputs.are_held else []
+        return replace(request, held=tuple(names), x0=np.concatenate([request.x0, self.starts.ravel()]), rtol=part * request.rtol,
                        atol=np.concatenate([part * request.atol, of_columns.ravel()]), columns=self.columns)
 
     def check(self, module: Module, request: Request, method: Any, work: bool) -> None:
@@ -101,7 +103,10 @@ class Asked:
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but what the constraints make of the reset of "
                                 f"{', '.join(kept)} is not differentiated; choose coordinates without constraints, or leave the "
                                 "event out: events=[...]")
-        if request.inputs.are_held or _depends_on_state(request):
+        if any(one.sampled.gradient is None for one in request.inputs.samplers):
+            raise ArgumentError(f"{module.name}: sensitivities were asked for, but the derivatives of a sampled controller by "
+                                "the state are not known; pass sd.Sampled(function, period, gradient=...), a function of (t, x)")
+        if _depends_on_state(request):
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "
                                 "the user, whose derivatives are not known; write the law into the system's loads as expressions "
                                 "of coordinates and speeds, or make the inputs functions of the time alone")

@@ -106,7 +106,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                 asked.check(module, request, method, work)
             if request.stabilization.way == "baumgarte":
                 request = replace(request, x0=Projector(module, p)(span[0], start))
-        whole = request.with_work() if work else asked.added_to(request, controlled) if asked.columns else request
+        whole = request.with_work() if work else request
+        if asked.columns:
+            whole = asked.added_to(request, controlled, metadata.inputs)
         begun = clock.perf_counter()
         outcome = _run(module, whole, method, bar)
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
@@ -138,7 +140,8 @@ def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outc
         from symdyn.runtime.integrating.dae_run import run_ggl
 
         return run_ggl(module, request, bar)
-    field = RightSide(work=request.works, baumgarte=request.stabilization.way == "baumgarte", sensitivities=request.columns)
+    field = RightSide(work=request.works, baumgarte=request.stabilization.way == "baumgarte", sensitivities=request.columns,
+                      held=request.held)
     run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
     return run(module, request, method, bar, field)
 
