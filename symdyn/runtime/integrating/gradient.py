@@ -120,8 +120,8 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
     if not asked.names:
         raise ArgumentError(f"{module.name}: a gradient by nothing was asked for; name parameters, inputs or initial values")
     if request.inputs.are_held:
-        raise ArgumentError(f"{module.name}: a gradient was asked for, but the way back does not go across the instants of sampled "
-                            "controllers; take simulate(..., sensitivities=[...]), which does")
+        raise ArgumentError(f"{module.name}: a gradient was asked for, but the way back does not go across the instants of "
+                            "sampled controllers; take simulate(..., sensitivities=[...]), which does")
     check_compiled(module, request, method)
     if request.look is not None and request.look.any():
         names = [e.name for e, look in zip(module.metadata.events, request.look, strict=True) if look]
