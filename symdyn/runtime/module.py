@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from symdyn.statics.equilibria import Equilibria
     from symdyn.statics.equilibrium import Equilibrium
     from symdyn.statics.linearize import Linearization
+    from symdyn.statics.periodic import PeriodicMotion
     from symdyn.statics.stability import Stability
 
     # A number; a table over time, as a pair of times and values or as Table; a function of (t, x); a controller whose values are
@@ -839,6 +840,32 @@ class Module:
         from symdyn.statics.stability import stability
 
         return stability(self, at, params, t, inputs, free, fixed, hold, period, start)
+
+    def periodic(self, period: float, q: Values | None = None, u: Values | None = None, params: Values | None = None, *,
+                 z: Values | None = None, t: float = 0.0, inputs: Values | None = None,
+                 advance: Numbers | None = None, rtol: float = 1e-10, method: str = "dop853") -> PeriodicMotion:
+        """A periodic motion near a start, by shooting with exact sensitivities.
+
+        period    s: where the time appears in the equations that of the motion, else a guess, found with the start
+        q, u, z   near the motion, as for `simulate`; t: the time there; inputs: constants
+        advance   what coordinates gain in a period, by name or symbol: 2 pi for a wheel that turns once
+        rtol, method   of the integration, a compiled method
+
+        On constraints and across events, such as the impacts of a walker, whose resets are given; see
+        symdyn.statics.periodic.PeriodicMotion for the multipliers, and `follow`, over a parameter. Raises NoEquilibrium where
+        none is found, with what is left, ArgumentError for what does not fit.
+
+        >>> q = sd.coordinates("q")
+        >>> system = sd.System("van_der_pol")
+        >>> body = system.add_body("body", mass=1)
+        >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+        >>> system.add_joint_force(slide, (1 - q**2) * q.dot - q)
+        >>> system.embedding().compile().periodic(6.0, [2.0], [0.0])
+        <PeriodicMotion of van_der_pol: period 6.66328686 s, multipliers of size 1, 0.0008597>
+        """
+        from symdyn.statics.periodic import periodic
+
+        return periodic(self, period, q, u, params, z=z, t=t, inputs=inputs, advance=advance, rtol=rtol, method=method)
 
     def campbell(self, speed: Key, values: Times, free: Names | None = None, fixed: Numbers | None = None,
                  start: Start | None = None, params: Values | None = None, t: float = 0.0, inputs: Values | None = None,

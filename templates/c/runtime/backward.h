@@ -32,7 +32,8 @@ static inline void symdyn_add(double factor, const double *restrict v, double *r
         for (int i = 0; i < SYMDYN_NX; i++) to[i] += factor * v[i];
 }
 
-// Times and states of the stages of n steps, from what was kept of them. A: coefficients of the stages, row by row, c: their times.
+// Times and states of the stages of n steps, from what was kept of them. A: coefficients of the stages, row by row, c: their
+// times.
 SYMDYN_EXPORT void SYMDYN_NAME(simulation_stages)(long n, const double *A, const double *c, const double *t, const double *h,
     const double *x, const double *slopes, double *times, double *states) {
     for (long step = 0; step < n; step++)
@@ -46,11 +47,12 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_stages)(long n, const double *A, const
 }
 
 // Carry the weights of the state at the end of n steps back to their start, in place: weights[SYMDYN_NX], then those of
-// parameters and inputs, to which is added. ends: the states at the ends of the steps, where they were projected; b: weights of the
-// stages; of_x, of_others: what the weights of x and the others at each stage gain by time; null: nothing. Returns 0 or a reason.
+// parameters and inputs, to which is added. ends: the states at the ends of the steps, where they were projected; b: weights of
+// the stages; of_x, of_others: what the weights of x and the others at each stage gain by time; null: nothing. Returns 0 or a
+// reason.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_back)(const symdyn_problem *problem, long n, const double *A, const double *b,
-    const double *h, const double *ends, const double *times, const double *states, const double *of_x,
-    const double *of_others, double *weights) {
+    const double *h, const double *ends, const double *times, const double *states, const double *of_x, const double *of_others,
+    double *weights) {
     enum { WIDTH = SYMDYN_NX + SYMDYN_CARRIED };
     for (long step = n - 1; step >= 0; step--) {
         double gained[SYMDYN_STAGES][SYMDYN_NX], out[WIDTH], along[SYMDYN_NX];
@@ -75,7 +77,8 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_back)(const symdyn_problem *problem, lo
             if (of_x)
                 for (int i = 0; i < SYMDYN_NX; i++) out[i] += h[step] * b[j] * of_x[stage * SYMDYN_NX + i];
             if (of_others)
-                for (int i = 0; i < SYMDYN_CARRIED; i++) out[SYMDYN_NX + i] += h[step] * b[j] * of_others[stage * SYMDYN_CARRIED + i];
+                for (int i = 0; i < SYMDYN_CARRIED; i++)
+                    out[SYMDYN_NX + i] += h[step] * b[j] * of_others[stage * SYMDYN_CARRIED + i];
             for (int i = 0; i < SYMDYN_NX; i++) gained[j][i] = out[i];
             for (int i = SYMDYN_NX; i < WIDTH; i++) weights[i] += out[i];
         }

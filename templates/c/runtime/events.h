@@ -262,8 +262,8 @@ static void symdyn_event_note(symdyn_run *run, int k, double t, const double *be
 }
 
 #if SYMDYN_SENSITIVE
-// The right-hand side just before (way -1) or just after (way 1) an event at (t, x), where signs and conditions have the values of
-// that side: extrapolated from two states on the way, a millionth of the time in which the state changes away. Returns 0 or a
+// The right-hand side just before (way -1) or just after (way 1) an event at (t, x), where signs and conditions have the values
+// of that side: extrapolated from two states on the way, a millionth of the time in which the state changes away. Returns 0 or a
 // failure.
 static int symdyn_slope_beside(symdyn_run *run, double t, const double *x, double way, double *slope) {
     double y[SYMDYN_NX], far[SYMDYN_NX];

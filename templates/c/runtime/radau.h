@@ -113,7 +113,8 @@ static int symdyn_prepare(symdyn_run *run, double h) {
     }
     for (int k = 0; k < SYMDYN_ROOTS; k++) {
         for (int i = 0; i < SYMDYN_STATE; i++)
-            for (int j = 0; j < SYMDYN_STATE; j++) run->method.re[k][j * SYMDYN_STATE + i] = -run->method.jacobian[i * SYMDYN_STATE + j];
+            for (int j = 0; j < SYMDYN_STATE; j++)
+                run->method.re[k][j * SYMDYN_STATE + i] = -run->method.jacobian[i * SYMDYN_STATE + j];
         for (int i = 0; i < SYMDYN_STATE * SYMDYN_STATE; i++) run->method.im[k][i] = 0.0;
         for (int i = 0; i < SYMDYN_STATE; i++) {
             run->method.re[k][i * (SYMDYN_STATE + 1)] += symdyn_roots[k][0] / h;

@@ -1,0 +1,130 @@
+"""Periodic motions by shooting against published digits and closed forms, and their multipliers."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import ArgumentError, NoEquilibrium
+from symdyn.runtime.building.compiler import find_compiler
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+
+
+@cache
+def oscillator() -> Any:
+    """Van der Pol's equation q'' - mu (1 - q^2) q' + k q = a cos w t."""
+    q = sd.coordinates("q")
+    m, mu, k = sd.parameters("m mu k", positive=True)
+    system = sd.System("van_der_pol")
+    body = system.add_body("body", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+    system.add_joint_force(joint, mu * (1 - q**2) * q.dot - k * q, name="force")
+    system.defaults = {m: 1, mu: 1, k: 1}
+    return system.embedding().compile()
+
+
+def test_van_der_pol_against_published_digits() -> None:
+    """The period for mu = 1 is 6.6632868593231 (Andersen and Geer 1982); for mu = 1 the other multiplier 0.000859695."""
+    orbit = oscillator().periodic(6.0, [2.0], [0.0], rtol=1e-13)
+    assert orbit.period == pytest.approx(6.6632868593231, abs=2e-12)
+    assert orbit.multipliers[0] == pytest.approx(1, abs=1e-9) and orbit.stable
+    # The logarithm of the product is the integral of the divergence mu (1 - q^2) over a period.
+    run = orbit.simulate(2001)
+    divergence = np.trapezoid(1 - run.q[:, 0] ** 2, run.t) if hasattr(np, "trapezoid") else np.trapz(1 - run.q[:, 0] ** 2, run.t)
+    assert np.log(np.prod(orbit.multipliers).real) == pytest.approx(divergence, rel=1e-6)
+    assert repr(orbit) == "<PeriodicMotion of van_der_pol: period 6.66328686 s, multipliers of size 1, 0.0008597>"
+    assert run.x[-1] == pytest.approx(run.x[0], abs=1e-9)
+
+
+def test_followed_over_a_parameter() -> None:
+    """Periods for mu = 2 and 5: 7.62987447939 and 11.6122306677 (Urabe 1960 has 7.6299, 11.612)."""
+    found = oscillator().periodic(6.0, [2.0], [0.0]).follow("mu", [1.5, 2, 3, 5])
+    assert [round(one.period, 4) for one in (found[1], found[3])] == [7.6299, 11.6122]
+    assert all(one.stable for one in found) and found[3].params[list(oscillator().metadata.parameters).index("mu")] == 5
+    with pytest.raises(ArgumentError, match="followed over 'nu', which is no parameter; there are"):
+        found[0].follow("nu", [1])
+
+
+def test_forced_oscillator_against_its_closed_form() -> None:
+    """The time appears: the period is given, and the multipliers are exp(s T) with the eigenvalues s."""
+    q = sd.coordinates("q")
+    m, c, k, w = sd.parameters("m c k w", positive=True)
+    system = sd.System("forced")
+    body = system.add_body("body", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+    system.add_joint_force(joint, sp.cos(w * sd.t) - k * q - c * q.dot, name="force")
+    system.defaults = {m: 1, c: 0.3, k: 4, w: 3}
+    orbit = system.embedding().compile().periodic(2 * np.pi / 3, [0.0], [0.0], rtol=1e-12)
+    response = 1 / (4 - 9 + 0.9j)
+    assert orbit.x == pytest.approx([response.real, (3j * response).real], abs=1e-9) and not orbit.free_period
+    eigenvalues = np.roots([1, 0.3, 4])
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(np.sort_complex(np.exp(eigenvalues * 2 * np.pi / 3)), abs=1e-9)
+
+
+def test_pendulum_that_turns() -> None:
+    """The angle gains a turn; the period is an elliptic integral. Motions of other energies are near: both multipliers are 1."""
+    pendulum = sd.systems.pendulum().embedding().compile()
+    orbit = pendulum.periodic(1.0, [0.0], [8.0], advance={"q1": 2 * np.pi}, rtol=1e-12)
+    speed = orbit.simulate().u[:, 0]
+    top = float(np.abs(speed).max())
+    period = float(4 / top * mp.ellipk(4 * 9.81 / top**2))
+    assert orbit.period == pytest.approx(period, rel=1e-9)
+    assert orbit.multipliers == pytest.approx(1, abs=1e-4) and np.prod(orbit.multipliers) == pytest.approx(1, abs=1e-9)
+
+
+def wheel() -> Any:
+    """A rimless wheel down a slope: an inverted pendulum whose foot changes (McGeer 1990)."""
+    q = sd.coordinates("q")
+    m, g, l, slope, half = sd.parameters("m g l slope half", positive=True)
+    system = sd.System("wheel", gravity=[-g, 0])
+    hub = system.add_body("hub", mass=m, com=[l, 0])
+    system.add_joint(sd.Revolute("foot", system.ground, hub, coordinate=q))
+    system.add_event("step", q - slope - half, direction=1, reset={q: slope - half, q.dot: sp.cos(2 * half) * q.dot})
+    system.defaults = {m: 1, g: 9.81, l: 1, slope: 0.08, half: 0.4}
+    return system.embedding().compile()
+
+
+def test_rimless_wheel() -> None:
+    """Across the impact: the square v of the speed then becomes c (v + d), c = cos^2(2 half): v = c d/(1 - c), multiplier c."""
+    orbit = wheel().periodic(0.8, [0.0], [1.2], rtol=1e-12)
+    c, d = np.cos(0.8) ** 2, 4 * 9.81 * np.sin(0.4) * np.sin(0.08)
+    assert np.sort(orbit.multipliers.real) == pytest.approx([c, 1], abs=1e-8)
+    energy = orbit.x[1] ** 2 / 2 + 9.81 * np.cos(orbit.x[0])
+    assert 2 * (energy - 9.81 * np.cos(0.08 - 0.4)) == pytest.approx(c * d / (1 - c), rel=1e-9)
+
+
+def test_on_constraints() -> None:
+    """A four-bar linkage that turns without loads: two multipliers are left, whose product is 1."""
+    linkage = sd.systems.four_bar().augmented().compile()
+    q, u = linkage.consistent(u={"q1_dot": 5.0}, params={"g": 0})
+    run = linkage.simulate((0, 10), q, u, {"g": 0}, rtol=1e-10)
+    turned = run.q[:, 0] - run.q[0, 0]
+    back = np.flatnonzero(np.abs(turned) > 2 * np.pi)
+    sign = np.sign(turned[back[0]])
+    moves = {name: float(2 * np.pi * sign * round((run.q[back[0], k] - run.q[0, k]) / (2 * np.pi * sign)))
+             for k, name in enumerate(linkage.metadata.q)}
+    orbit = linkage.periodic(float(run.t[back[0]]), run.q[0], run.u[0], {"g": 0}, advance=moves)
+    assert len(orbit.multipliers) == 2 and np.prod(orbit.multipliers) == pytest.approx(1, abs=1e-6)
+
+
+def test_what_is_not_found() -> None:
+    with pytest.raises(NoEquilibrium, match=r"no periodic motion found near the start with the period 2 s: after .* is off by"):
+        q = sd.coordinates("q")
+        m = sd.parameters("m", positive=True)
+        system = sd.System("pushed")
+        body = system.add_body("body", mass=m)
+        joint = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+        system.add_joint_force(joint, 1, name="push")
+        system.defaults = {m: 1}
+        system.embedding().compile().periodic(2.0, [1.0], [0.0])
+    with pytest.raises(ArgumentError, match="the period must be a positive number of seconds, found -1"):
+        oscillator().periodic(-1)
+    with pytest.raises(ArgumentError, match="advance"):
+        oscillator().periodic(6, advance={"nothing": 1})
