@@ -15,6 +15,8 @@ from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
 from symdyn.pipeline import emit
 from symdyn.runtime.building.compiler import find_compiler
+from symdyn.tape import Recorder
+from symdyn.tape.node import COORDINATE
 from symdyn.tape.tape import unsigned
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -76,6 +78,18 @@ def test_stretches_hand_on_what_is_needed_and_no_more() -> None:
 
 
 @needs_c
+def test_functions_are_divided_between_sections_where_parts_are_long_enough() -> None:
+    recorder = Recorder()
+    node, body = recorder.leaf("x", COORDINATE), []
+    for name in ("first", "second"):
+        with recorder.section(name):
+            for _ in range(6):
+                node = recorder.sin(node)
+                body.append(node)
+    stretches, _, _ = divide(body, [node], 8)
+    assert [[each.section for each in stretch] for stretch, _ in stretches] == [["first"] * 6, ["second"] * 6]
+
+
 def test_a_long_function_is_divided_where_the_dialect_says() -> None:
     equations = sd.systems.get("spatial_chain", n=24).recursive()
     made = emit(equations, "c", ("rhs",), standalone=False)
