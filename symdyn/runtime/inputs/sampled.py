@@ -46,7 +46,7 @@ class Sampled(OverTime):
     period: float
     offset: float = 0.0
     delay: float = 0.0
-    gradient: Callable[[float, np.ndarray], Any] | None = None
+    gradient: Callable[[float, np.ndarray], Row | Sequence[Row]] | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.function):
