@@ -16,7 +16,7 @@ from math import prod
 import numpy as np
 
 from symdyn.tape.node import SEED, Node
-from symdyn.tape.tape import Tape, reachable
+from symdyn.tape.tape import Tape, count_of, reachable
 
 # What vectors of directions are combined by; what selects between them does not depend on the direction.
 LINEAR = frozenset({"leaf", "neg", "add", "sub", "mul", "div", "select"})
@@ -69,10 +69,15 @@ class Columns:
         one_by_one = self.one_by_one()
         return one_by_one >= max(LEAST, GAIN * self.together()) and all(map(_linear, self._moving()))
 
-    def together(self) -> int:
+    def together(self, lanes: int = LANES) -> int:
         """Steps on vectors that are executed for all columns."""
-        return sum(-(-len(group.seeds) // LANES) * sum(_counted(n) for n in reachable(self.entries(k)))
+        return sum(-(-len(group.seeds) // lanes) * sum(_counted(n) for n in reachable(self.entries(k)))
                    for k, group in enumerate(self.groups))
+
+    def operations(self, lanes: int) -> int:
+        """Operations that are executed with so many lanes: what all columns share, and the steps on vectors."""
+        shared = count_of(n for n in self.tape.running if not n.mask & SEED)
+        return sum(shared.values()) + self.together(lanes)
 
     def one_by_one(self) -> int:
         """Steps that all columns need if each is computed by itself: those that depend on its direction."""
