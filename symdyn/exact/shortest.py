@@ -33,9 +33,8 @@ FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters"
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
 _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
-# nested, in the two shortest representations, of more than MIDDLE terms in the shortest one, and of more than LONG terms only one
-# is made.
-WORSE, SHORT, MIDDLE, LONG = 1.5, 25, 60, 150
+# nested, in the two shortest representations, and of more than LONG terms in one.
+WORSE, SHORT, LONG = 1.5, 25, 150
 # Terms that all entries together may have to be arranged, which takes less than ten seconds.
 TERMS = 20_000
 # Letters that a multiple of an angle counts as: mechanisms are read in the angles they are described by.
@@ -190,7 +189,7 @@ class Writer:
         least = min(map(len, found))
         found = sorted([p for p in found if len(p) <= WORSE * least + 4], key=len)
         if least > SHORT:
-            found = found[:2 if least <= MIDDLE else 1]
+            found = found[:2]
         else:
             found += [p for p in (halved(p, self.letters) for p in found) if p is not None]
         return min((a.signed(tree) for p in found for tree in self._arranged(p)), key=total)
