@@ -11,12 +11,15 @@ import sympy as sp
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.lab import kane_forms
+from symdyn.report.limit import TimeUp, within
 from symdyn.systems import get, names
 
 QUANTITIES = ("M_tilde", "k_tilde", "F_tilde", "C", "C_r", "F_d")
 FORMS = ("polynomial", "fourier")
 # Coordinates up to which the three quantities of the equations of motion take LIMIT seconds at most, or LONGER.
 COORDINATES, LIMIT, LONGER = 6, 0.5, {"puma560": 2.0}
+# Seconds after which another form is left out of the table.
+PATIENCE = 30.0
 HEADING = f"{'mechanism':36}{'quantity':10}{'operations':>11}{'polynomial':>12}{'Fourier':>10}{'with names':>12}{'s':>8}"
 
 
@@ -54,8 +57,15 @@ def printed(name: str) -> Iterator[Row]:
             begin = clock.process_time()
             operations = _operations(equations, quantity, "shortest")
             seconds = clock.process_time() - begin
-            yield Row(name, quantity, operations, tuple(_operations(equations, quantity, form) for form in FORMS),
+            yield Row(name, quantity, operations, tuple(_other(equations, quantity, form) for form in FORMS),
                       _with_names(equations, quantity), seconds)
+
+
+def _other(equations: Equations, quantity: str, form: str) -> int | None:
+    try:
+        return within(PATIENCE, lambda: _operations(equations, quantity, form))
+    except TimeUp:
+        return None
 
 
 def _operations(equations: Equations, quantity: str, form: str) -> int | None:
