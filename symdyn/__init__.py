@@ -38,6 +38,7 @@ _HOME = {
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
+    "symdyn.estimation": ("Experiment", "Fit", "fit"),
     "symdyn.runtime.inputs.tables": ("Table",),
     "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",
                       "EnsembleStopped", "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock",

@@ -91,6 +91,9 @@ from symdyn.errors import (
 from symdyn.errors import (
     ZeroAxis as ZeroAxis,
 )
+from symdyn.estimation import Experiment as Experiment
+from symdyn.estimation import Fit as Fit
+from symdyn.estimation import fit as fit
 from symdyn.exact.prove import prove as prove
 from symdyn.flexible.beam import Beam as Beam
 from symdyn.flexible.shape import Shape as Shape

@@ -1,0 +1,139 @@
+"""What a fit found, how sure it is, and what the data leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from symdyn.given import PathName
+    from symdyn.runtime.module import Module
+    from symdyn.runtime.solutions.solution import Solution
+
+# Singular values of the scaled derivatives below this part of the largest say that a combination is not determined: the
+# sensitivities are accurate to about this.
+UNDETERMINED = 1e-7
+# Shares of unknowns in such a combination that are written.
+_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """What is fitted: a parameter, or an initial value "q1(0)" of one experiment of `of`."""
+
+    name: str
+    experiment: int | None
+    guess: float
+    of: int = 1
+
+    @property
+    def label(self) -> str:
+        """Its name; of an initial value with the number of the experiment, where there are several."""
+        return self.name if self.experiment is None or self.of == 1 else f"{self.name} of experiment {self.experiment + 1}"
+
+    @property
+    def asked(self) -> str:
+        """What `simulate` is asked for."""
+        return self.name
+
+    @property
+    def state(self) -> str:
+        """The state whose initial value it is."""
+        return self.name.removesuffix("(0)")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted values and how well the data determine them.
+
+    values       label -> value: parameters by name, initial values as "q1(0)", of several experiments "q1(0) of experiment 2"
+    covariance   (n, n), in the order of values; NaN where the data do not determine something
+    noise        standard deviation of what was measured, in units of the noise that was given, or its estimate
+    undetermined   combinations of unknowns, relative to their guesses, that the data do not determine: text, from the singular
+                 vectors of the derivatives
+    motions      of the experiments with these values; residuals: (experiment, what was measured) -> measured - model, (n_t, ...)
+    success, message   whether the iteration ended at a minimum, and why it ended; n_runs: motions an experiment that it took
+    """
+
+    module: Module
+    values: Mapping[str, float]
+    covariance: np.ndarray
+    noise: float
+    undetermined: tuple[str, ...]
+    motions: tuple[Solution, ...]
+    residuals: Mapping[tuple[int, str], np.ndarray]
+    success: bool
+    message: str
+    n_runs: int
+    degrees: int
+    known_noise: bool
+
+    @classmethod
+    def of(cls, module: Module, unknowns: Sequence[Unknown], found: Any, scale: np.ndarray, known: bool,
+           motions: Sequence[Solution], residuals: Mapping[tuple[int, str], np.ndarray], runs: int) -> Fit:
+        """From the solution of the least squares."""
+        labels = [u.label for u in unknowns]
+        scaled = found.jac * scale
+        _, sizes, vectors = np.linalg.svd(scaled, full_matrices=False)
+        open_ones = sizes <= UNDETERMINED * sizes[0] if sizes[0] > 0 else np.ones(len(sizes), dtype=bool)
+        degrees = len(found.fun) - len(unknowns)
+        estimate = float(np.sqrt(2 * found.cost / degrees)) if degrees > 0 else np.nan
+        if open_ones.any():
+            covariance = np.full((len(unknowns), len(unknowns)), np.nan)
+        else:
+            half = (vectors.T / sizes) * scale[:, None]
+            covariance = half @ half.T * (1.0 if known else estimate**2)
+        return cls(module, dict(zip(labels, map(float, found.x), strict=True)), covariance, estimate,
+                   tuple(_combination(v, labels) for v in vectors[open_ones]), tuple(motions), dict(residuals),
+                   bool(found.status > 0), str(found.message), runs, degrees, known)
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviation of every value; NaN where the data do not determine something."""
+        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlation of the values, (n, n)."""
+        sizes = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(sizes, sizes)
+
+    def confidence(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Interval of every value in which it lies with this probability, as far as the motion is linear in it there."""
+        half = 0.5 + level / 2
+        factor = float(norm.ppf(half) if self.known_noise or self.degrees < 1 else student.ppf(half, self.degrees))
+        return {name: (value - factor * self.deviations[name], value + factor * self.deviations[name])
+                for name, value in self.values.items()}
+
+    def plot(self, path: PathName | None = None) -> Figure:
+        """Measured values, motion, and residuals over time; written to a file if a path is given."""
+        from symdyn.pictures.fits import plot
+
+        return plot(self, path)
+
+    def __str__(self) -> str:
+        deviations = self.deviations
+        lines = [f"fit of {self.module.name}: {self.degrees + len(self.values)} residuals, noise {self.noise:.4g}, "
+                 f"{self.n_runs} runs; {self.message}"]
+        width = max(map(len, self.values))
+        lines += [f"  {name:<{width}}  {value: .8g} +- {deviations[name]:.2g}" for name, value in self.values.items()]
+        lines += [f"  not determined by the data: {text}" for text in self.undetermined]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def _combination(vector: np.ndarray, labels: Sequence[str]) -> str:
+    """A direction in unknowns relative to their scale, as text: the largest share is 1."""
+    vector = vector / vector[np.argmax(np.abs(vector))]
+    shares = [(share, name) for share, name in zip(vector, labels, strict=True) if abs(share) > _SHARE]
+    return " ".join(f"{'-' if share < 0 else '+' if k else ''}{' ' if k else ''}{abs(share):.3g} {name}"
+                    for k, (share, name) in enumerate(shares))
