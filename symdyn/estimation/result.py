@@ -60,6 +60,13 @@ class Fit:
                  vectors of the derivatives
     motions      of the experiments with these values; residuals: (experiment, what was measured) -> measured - model, (n_t, ...)
     success, message   whether the iteration ended at a minimum, and why it ended; n_runs: motions an experiment that it took
+    degrees      of freedom: residuals less unknowns; known_noise: whether the noise was given
+
+    >>> module = sd.systems.pendulum().compile()
+    >>> truth = module.simulate(np.linspace(0, 2, 50), q=[0.5], params={"l": 1.3})
+    >>> found = sd.fit(module, sd.Experiment(truth.t, {"q1": truth.q[:, 0]}), ["l"], ["q1"], start={"l": 1.2})
+    >>> {name: round(value, 6) for name, value in found.values.items()}
+    {'l': 1.3, 'q1(0)': 0.5}
     """
 
     module: Module
