@@ -24,9 +24,11 @@ from symdyn.exact.represent import plain
 from symdyn.exact.shortest import Writer, not_negative, written
 from symdyn.exact.taken import recorded
 from symdyn.exact.walk import Exact
+from symdyn.model.symbols import symbols_of, time
 from symdyn.report.limit import TimeUp, within
 from symdyn.shown import shown
-from symdyn.tape.node import Node, is_zero
+from symdyn.tape.jumps import description, jumps
+from symdyn.tape.node import SPEED, Node, is_zero
 from symdyn.tape.sympy_bridge import number
 
 if TYPE_CHECKING:
@@ -156,6 +158,11 @@ class _Search:
             raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested with coordinates that are held, "
                               "but its speeds are quasi-velocities; leave speeds='body' out, or use module.equilibria(fixed=...)")
         rows = [e for e, q in zip(r, m.q, strict=True) if q not in fixed] if m.plain else list(r)
+        rubbing = [j for j in jumps(m.recorder, rows) if isinstance(j.surface, Node) and j.surface.mask & SPEED]
+        if rubbing:
+            what = description(rubbing[0], self.equations.printed_leaves())["what"]
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but {what} jumps where a speed "
+                              "passes zero: dry friction holds a whole range of positions; leave it out")
         entries = [e for e in m.at([*rows, *C, *z_dot], state.put()) if not is_zero(e)]
         multipliers = {leaf: sp.Symbol(f"lambda{k + 1}") for k, leaf in enumerate(state.multipliers)}
         self.coordinates = [symbol for q, symbol in zip(m.q, s.coordinates, strict=True)
@@ -165,6 +172,10 @@ class _Search:
         # In their shortest form sums of angles stand as such, so that they become base angles.
         found = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
         self.entries = [e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)}) for e in found]
+        if any(time in symbols_of(e) for e in self.entries):
+            raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but the time stands in its "
+                              "equations, so that a state of rest at one time is none at another; use module.periodic, or "
+                              "module.equilibria(t=...)")
         nodes, symbols = recorded(self.entries)
         self.leaves = {symbol: leaf for leaf, symbol in symbols.items()}
         self.unknown_leaves = {leaf for leaf, symbol in symbols.items() if symbol in self.unknown}
@@ -299,7 +310,8 @@ class _Search:
         """Factors that hold unknowns, each once; those in parameters are taken not to be zero."""
         if e not in self._split:
             own = []
-            for f, _ in sp.factor_list(e)[1]:
+            # What was eliminated linearly leaves divisors in parameters, which are taken not to be zero.
+            for f, _ in sp.factor_list(sp.fraction(sp.together(e))[0])[1]:
                 if f.free_symbols & self._names:
                     own.append(f)
                 else:

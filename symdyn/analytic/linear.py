@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import mpmath
 import numpy as np
 import sympy as sp
 
@@ -44,6 +45,11 @@ if TYPE_CHECKING:
 # Terms that a product may have in an entry, seconds in which a matrix is written; digits of the numbers by which dependent speeds
 # are chosen.
 BOUND, SECONDS, DIGITS = 200_000, 10.0, 30
+# Operations with kinks or jumps; slopes on both sides that differ by more than this, of their size, make one.
+_ROUGH = {"abs", "sign", "min", "max", "select", "floor", "ceil"}
+KINK = 1e-6
+# Numbers below this are zero where decimal numbers were inserted.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,7 +120,11 @@ class Linearized:
     def conditions(self) -> tuple[sp.Eq, ...]:
         """Equations that must hold."""
         if "conditions" not in self._written:
-            found = [e for e in self.write(self.nodes["conditions"]) if e != 0]
+            found = [e for e in self.write(self.nodes["conditions"]) if e != 0 and not _is_rounding(e)]
+            never = [e for e in found if e.is_number]
+            if never:
+                raise SymdynError(f"{self.name}: the state is no equilibrium: {shown(never[0])} would have to be zero; "
+                                  "take one of eq.equilibria() or module.equilibria()")
             self._written["conditions"] = tuple(sp.Eq(e, 0, evaluate=False) for e in dict.fromkeys(found))
         return self._written["conditions"]
 
@@ -175,19 +185,33 @@ class Linearized:
 
     def __str__(self) -> str:
         lines = [f"{self.name}: linear equations in {', '.join(map(str, self.coordinates))}"]
-        for name in ("M", "C", "K", *(["F_in"] if self.inputs else [])):
-            lines.append(f"  {name} = {self._matrix(name).tolist()}")
+        if self.states:  # coupled with the coordinates: the matrices of second order are not all
+            names = ["A", *["B"] * bool(self.inputs)]
+            lines.append(f"  x'_dot = A x'{' + B in' if self.inputs else ''} of x' = [eta; eta_dot; "
+                         f"{'; '.join(map(str, self.states))}]")
+        else:
+            names = ["M", "C", "K", *["F_in"] * bool(self.inputs)]
+        lines += [f"  {name} = {self._shown(name).tolist()}" for name in names]
         lines += [f"  where {e.lhs} = 0" for e in self.conditions]
         return "\n".join(lines)
 
     def __repr__(self) -> str:
         return str(self)
 
+    def _shown(self, name: str) -> sp.Matrix:
+        return self._matrix(name) if name in self.nodes else getattr(self, name)
+
     def _repr_latex_(self) -> str:
-        accents = (("M", r"\ddot{\eta}"), ("C", r"\dot{\eta}"), ("K", r"\eta"))
-        left = " + ".join(f"{sp.latex(self._matrix(name))} {eta}" for name, eta in accents)
-        right = f"{sp.latex(self.F_in)} {sp.latex(sp.Matrix(self.inputs))}'" if self.inputs else "0"
-        rows = [f"{left} &= {right}", *[rf"{sp.latex(e.lhs)} &= 0 && \text{{condition}}" for e in self.conditions]]
+        inputs = sp.latex(sp.Matrix(self.inputs)) if self.inputs else ""
+        if self.states:
+            state = r"\begin{bmatrix} \eta \\ \dot{\eta} \\ " + r" \\ ".join(map(sp.latex, self.states)) + r" \end{bmatrix}"
+            right = f"{sp.latex(self.A)} {state}" + (f" + {sp.latex(self.B)} {inputs}'" if inputs else "")
+            rows = [rf"\frac{{d}}{{dt}} {state} &= {right}"]
+        else:
+            accents = (("M", r"\ddot{\eta}"), ("C", r"\dot{\eta}"), ("K", r"\eta"))
+            left = " + ".join(f"{sp.latex(self._matrix(name))} {eta}" for name, eta in accents)
+            rows = [f"{left} &= " + (f"{sp.latex(self.F_in)} {inputs}'" if inputs else "0")]
+        rows += [rf"{sp.latex(e.lhs)} &= 0 && \text{{condition}}" for e in self.conditions]
         return "$\\displaystyle \\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}$"
 
 
@@ -214,6 +238,11 @@ class _Values:
             leaves[s] = self.recorder.leaf(s.name, PARAMETER)
             self.symbols.setdefault(leaves[s], s)
         return record_expression(self.recorder, e, leaves, {})
+
+
+def _is_rounding(e: sp.Expr) -> bool:
+    """Whether a number with decimals is zero but for their rounding."""
+    return bool(e.is_number) and bool(e.has(sp.Float)) and abs(complex(e)) < ROUNDING
 
 
 def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hold: Any = ()) -> Linearized:
@@ -309,6 +338,7 @@ class _Linearization:
     def result(self) -> Linearized:
         m, equations = self.m, self.equations
         r, C, z_dot = m.statics()
+        self._demand_smooth([*r, *C, *z_dot])
         lam = self.state.multipliers
         free = [k for k in range(len(m.u)) if k not in self.held]
         Z, conditions = self._unconstrained(free) if not lam else self._constrained(r, C, lam, free)
@@ -379,6 +409,37 @@ class _Linearization:
                               "the multipliers are not unique; leave out those that others imply (system.diagnose() names them), "
                               "or use module.linearize(at)")
         return sorted(chosen)
+
+    def _demand_smooth(self, entries: Sequence[Any]) -> None:
+        """Raises SymdynError where the equations have a kink or jump at the state: their changes on both sides differ.
+
+        Decided by differences with many digits, with numbers for the parameters, along each coordinate, speed, state and input.
+        """
+        m, name = self.m, self.equations.name
+        rough = [n for n in reachable(entries) if n.op in _ROUGH and n.mask & ~PARAMETER]
+        if not rough:
+            return
+        varied = [*m.q, *m.u, *m.z, *m.inputs]
+        away = [m.recorder.leaf(f"(away {k})", ACCELERATION) for k in range(len(varied))]
+        around = {leaf: m.recorder.add(self.values.get(leaf, 0), a) for leaf, a in zip(varied, away, strict=True)}
+        lam = dict.fromkeys(self.state.multipliers, 0)
+        tape = Tape.of(m.recorder, r=m.at(entries, {**self.values, **lam, **around}))
+        drawn = drawn_state(random.Random(3), [leaf for leaf in tape.inputs if leaf not in away], 0.2, self.symbols)
+        numbers = {leaf.args[1]: value for leaf, value in drawn.items()}
+
+        def at(k: int, step: Any) -> np.ndarray:
+            moved = {a.args[1]: step if k == j else 0 for j, a in enumerate(away)}
+            return evaluate(tape, {**numbers, **moved}, DIGITS)["r"]
+
+        steps = [sign * mpmath.mpf(10) ** -digits for digits in (10, 12) for sign in (1, -1)]  # a jump has no slope
+        middle = at(-1, 0)
+        symbols = self.equations.printed_leaves()
+        for k, leaf in enumerate(varied):
+            slopes = zip(*[(at(k, step) - middle) / step for step in steps], strict=True)
+            if any(not max(s) - min(s) <= KINK * (1 + max(map(abs, s))) for s in slopes):
+                raise SymdynError(f"{name}: the equations have a kink or a jump at this state, where {symbols.get(leaf, leaf)} "
+                                  f"passes its value (in {', '.join(sorted({n.op for n in rough}))}), so that there are no "
+                                  "linear ones; take another state, or a smooth law such as tanh(x/eps) in place of sign(x)")
 
     def _demand_rest(self) -> None:
         """Raises SymdynError where coordinates move at zero speeds."""

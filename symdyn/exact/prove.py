@@ -364,7 +364,10 @@ def _different(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], doubtful: S
                 continue
             values = reached
         tried = values
-        found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
+        try:
+            found = evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)
+        except TypeError:  # complex numbers have no order: a comparison is not defined at this state
+            continue
         rows = [(place, x, y) for place, (x, y) in enumerate(zip(found["left"], found["right"]))
                 if all(getattr(v, "imag", 0) == 0 and v == v for v in (x, y))]
         largest = max((abs(x) + abs(y) for _, x, y in rows), default=0)

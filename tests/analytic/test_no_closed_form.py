@@ -1,0 +1,100 @@
+"""What has no equilibria in closed form or no linear equations is said, and what looks like it but has them is found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.errors import SymdynError
+
+m, g, k, c, d, length, outer, rest, amplitude, rate = sd.parameters("m g k c d l M R A Omega", positive=True)
+x, theta, s, zeta = sd.coordinates("x theta s zeta")
+
+
+def slider(force: Any) -> Any:
+    system = sd.System("slider", planar=True)
+    body = system.add_body("body", mass=m)
+    system.add_joint(sd.Prismatic("rail", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_joint_force("rail", force)
+    return system.embedding()
+
+
+def test_the_time_in_the_equations_leaves_no_state_of_rest() -> None:
+    for equations in (slider(-k * x + amplitude * sp.cos(rate * sd.t)), shaken()):
+        with pytest.raises(SymdynError, match="the time stands in its equations, so that a state of rest at one time is none"):
+            equations.equilibria()
+
+
+def shaken() -> Any:
+    system = sd.System("shaken", gravity=[0, -g])
+    system.move_ground([amplitude * sp.sin(rate * sd.t), 0])
+    bob = system.add_body("bob", mass=m, com=[0, -length])
+    system.add_joint(sd.Revolute("hinge", system.ground, bob, coordinate=theta))
+    return system.embedding()
+
+
+def test_dry_friction_has_no_points_of_rest() -> None:
+    with pytest.raises(SymdynError, match=r"sign\(x_dot\) jumps where a speed passes zero: dry friction holds a whole range"):
+        slider(-k * x - d * sp.sign(x.dot)).equilibria()
+
+
+@pytest.mark.parametrize(("force", "what"), [
+    (-k * x - d * sp.sign(x.dot), "where x_dot passes its value (in sign)"),
+    (-k * sp.Abs(x), "where x passes its value (in abs)"),
+    (sp.Piecewise((-k * x, x > 0), (-c * x, True)), "where x passes its value (in select)"),
+    (sp.Max(0, -k * x), "where x passes its value (in max)")])
+def test_kinks_and_jumps_at_the_state_have_no_linear_equations(force: Any, what: str) -> None:
+    with pytest.raises(SymdynError) as found:
+        slider(force).linearized()
+    assert "the equations have a kink or a jump at this state, " in str(found.value) and what in str(found.value)
+
+
+def test_the_same_functions_are_linearized_where_they_are_smooth() -> None:
+    assert sp.zeros(1) == slider(-k * x - d * sp.Abs(x.dot) * x.dot).linearized().C  # drag at rest
+    assert sp.Matrix([[k * length]]) == slider(-k * x * sp.Abs(length + x)).linearized().K
+    piecewise = slider(sp.Piecewise((-k * x, x > 0), (-c * x, True)))
+    assert sp.Matrix([[k]]) == piecewise.linearized(about={x: 1}).K and sp.Matrix([[c]]) == piecewise.linearized(about={x: -1}).K
+
+
+def test_divisors_of_what_was_eliminated() -> None:
+    """A bar that swings, with a slider on a spring along it."""
+    system = sd.System("bar", gravity=[0, -g])
+    bar, bob = system.add_body("bar", mass=outer, com=[0, -length]), system.add_body("bob", mass=m)
+    system.add_joint(sd.Revolute("hinge", system.ground, bar, coordinate=theta))
+    system.add_joint(sd.Prismatic("rail", bar, bob, axis=[0, -1], coordinate=s))
+    system.add_joint_force("rail", -k * (s - rest))
+    equations = system.embedding()
+    found = equations.equilibria()
+    assert len(found) == 4 and all(point.proved for point in found)
+    potential = equations.V + k * (s - rest) ** 2 / 2
+    for point in found:
+        values = {q: e.subs({outer: 0.1, m: 2, g: 9.81, k: 30, length: 0.4, rest: 0.2}) for q, e in point.values.items()}
+        numbers = {outer: 0.1, m: 2, g: 9.81, k: 30, length: 0.4, rest: 0.2}
+        for q in (theta, s):
+            assert abs(sp.N(potential.diff(q).subs(numbers).subs(values))) < 1e-10
+
+
+def test_extra_states_are_shown_with_what_they_couple() -> None:
+    system = sd.System("servo", planar=True)
+    body = system.add_body("body", mass=m)
+    system.add_joint(sd.Prismatic("rail", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_state(zeta, x - c * zeta)
+    system.add_joint_force("rail", -k * x - d * zeta)
+    linear = system.embedding().linearized()
+    assert "x'_dot = A x' of x' = [eta; eta_dot; zeta]\n  A = [[0, 1, 0], [-k/m, 0, -d/m], [1, 0, -c]]" in str(linear)
+    assert r"\zeta" in linear._repr_latex_() and r"\frac{d}{m}" in linear._repr_latex_()
+
+
+def test_a_state_that_is_none_of_equilibrium() -> None:
+    with pytest.raises(SymdynError, match="the state is no equilibrium: -1 would have to be zero"):
+        print(slider(1 - k * x).linearized())
+    nearly = slider(0.3 - 3 * x).linearized(about={x: 0.1})
+    assert nearly.conditions == () and sp.Matrix([[3]]) == nearly.K
+
+
+def test_claims_at_states_where_what_is_compared_is_not_real() -> None:
+    symbol = sp.Symbol("x")
+    assert not sd.prove(sp.Max(sp.log(symbol), symbol), symbol).refuted
