@@ -144,6 +144,14 @@ class _Case:
                      (*self.angles, *(angles or {}).items()), (*self.conditions, *real))
 
 
+def _within(point: EquilibriumPoint, other: EquilibriumPoint) -> bool:
+    """Whether a point is one of those of another, in which more coordinates are free."""
+    if not set(point.free) < set(other.free) or other.conditions:
+        return False
+    here = {q: value for q, value in point.values.items() if q in other.free}
+    return all(sp.sympify(point.values.get(q, q), strict=True) == value.subs(here) for q, value in other.values.items())
+
+
 class _Search:
     def __init__(self, state: State) -> None:
         self.state, self.equations = state, state.equations
@@ -261,7 +269,8 @@ class _Search:
             if point is not None:
                 points.setdefault((tuple(point.values.items()), point.conditions), point)
         assumed = tuple(e for e in self.assumed if not e.is_nonzero and not e.is_number)
-        return EquilibriumPoints(self.equations.name, tuple(points.values()), assumed, () if points else tuple(self.needed))
+        found = [p for p in points.values() if not any(q is not p and _within(p, q) for q in points.values())]
+        return EquilibriumPoints(self.equations.name, tuple(found), assumed, () if points else tuple(self.needed))
 
     @property
     def _names(self) -> set[sp.Symbol]:

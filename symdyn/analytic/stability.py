@@ -27,7 +27,7 @@ LARGEST = 6
 Polynomial = tuple[Any, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stability:
     """Conditions on the parameters that decide stability by the linear equations.
 
@@ -46,12 +46,18 @@ class Stability:
         told = [f"{self.kind} stability where"] + [f"  {c.lhs} > 0" for c in self.conditions]
         if not self.conditions:
             told = [f"{self.kind} stability for all values of the parameters"]
+        never = [c.lhs for c in self.conditions if c.lhs.is_nonpositive]
+        if never:
+            told = [f"no {self.kind} stability for any values of the parameters: {never[0]} would have to be positive"]
         if self.kind == "undecided":
             told = ["stability is not decided by the linear equations: all roots are s = 0"]
         elif self.zero_roots:
             told.append(f"  besides {self.zero_roots} root{'s' * (self.zero_roots > 1)} s = 0")
         told += [f"  if the state is an equilibrium: {c.lhs} = {c.rhs}" for c in self.equilibrium]
         return "\n".join(told)
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -95,6 +95,28 @@ def test_a_state_that_is_none_of_equilibrium() -> None:
     assert nearly.conditions == () and sp.Matrix([[3]]) == nearly.K
 
 
+def test_points_of_a_set_are_not_listed_besides_it() -> None:
+    y = sd.coordinates("y")
+    system = sd.System("skate", planar=True)
+    blade = system.add_body("blade", mass=m, inertia=d)
+    system.add_joint(sd.Planar("plane", system.ground, blade, [x, y, theta]))
+    system.add_constraint(y.dot * sp.cos(theta) - x.dot * sp.sin(theta))
+    [found] = system.augmented().equilibria()
+    assert set(found.free) == {x, y, theta} and list(found.values.values()) == [0]
+
+
+def test_conditions_that_never_hold() -> None:
+    system = sd.System("two", planar=True)
+    second = sd.coordinates("y")
+    for name, q in (("one", x), ("other", second)):
+        body = system.add_body(name, mass=m)
+        system.add_joint(sd.Prismatic(f"rail_{name}", system.ground, body, axis=[1, 0], coordinate=q))
+        system.add_joint_force(f"rail_{name}", -k * q - (d * q.dot if name == "one" else 0))
+    stability = system.embedding().linearized().characteristic().routh_hurwitz()
+    assert str(stability) == repr(stability) == ("no asymptotic stability for any values of the parameters: 0 would have to be "
+                                                 "positive")
+
+
 def test_claims_at_states_where_what_is_compared_is_not_real() -> None:
     symbol = sp.Symbol("x")
     assert not sd.prove(sp.Max(sp.log(symbol), symbol), symbol).refuted
