@@ -16,6 +16,7 @@ from symdyn.emission import emit, write_source
 from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
+from symdyn.functions.table import BATCH
 from symdyn.functions.tapes import all_columns_of
 from symdyn.runtime.building.library import Unit
 from symdyn.runtime.building.texts import Texts
@@ -59,7 +60,7 @@ class Libraries:
                         sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
-                    batch=what == groups.BATCH)
+                    batch=what == BATCH)
 
     def __call__(self, what: str | RightSide) -> Unit:
         """The library for a right-hand side, or that holds a function."""

@@ -11,14 +11,12 @@ from symdyn.errors import SymdynError
 from symdyn.formulation.equations import Equations
 from symdyn.formulation.event_bounds import BOUNDS, RANGES
 from symdyn.functions.sensitivities import adjoints_of, functions_of
-from symdyn.functions.table import CONSISTENCY, DERIVATIVES, FUNCTIONS, STANDARD, STATICS, VARIATIONS
+from symdyn.functions.table import BATCH, CONSISTENCY, FUNCTIONS, STANDARD, STATICS
 from symdyn.functions.tapes import has_function
 from symdyn.shown import shown
 
 # What constraints add to the standard functions; with the corrections the integrator keeps a motion on its manifold.
 OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
-# Many states of a right-hand side at once.
-BATCH = "rhs_batch"
 _OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
 
 
@@ -63,8 +61,3 @@ def with_function(equations: Equations, name: str) -> tuple[str, ...]:
     if name in STATICS:
         return (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
     return CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)
-
-
-def seldom_called(name: str) -> bool:
-    """Whether a function is called so seldom that compiling it quickly counts for more than running it quickly."""
-    return name in STATICS or name in VARIATIONS or name in DERIVATIVES

@@ -121,6 +121,15 @@ CONSISTENCY = ("C", "C_r", "C_t", "C_dot", "C_scale", "N", "mass_matrix")
 STANDARD = ("rhs", "mass_matrix", "k_tilde", "F_tilde", "J", "energy", "inverse_dynamics", "outputs")
 
 
+# The library of many states of a right-hand side at once.
+BATCH = "rhs_batch"
+
+
+def seldom_called(name: str) -> bool:
+    """Whether a function is called so seldom that compiling it quickly counts for more than running it quickly."""
+    return name in STATICS or name in VARIATIONS or name in DERIVATIVES
+
+
 def quantity_of(name: str) -> str:
     """The quantity behind a function; any quantity is a function under its own name, too."""
     return ALL[name].quantity if name in ALL else name

@@ -7,7 +7,7 @@ from typing import Any
 
 from symdyn.backend.metadata import Metadata
 from symdyn.backend.right_side import RightSide, key_of
-from symdyn.functions import groups
+from symdyn.functions.table import BATCH, seldom_called
 from symdyn.runtime.building.compiler import plain, require_compiler
 from symdyn.runtime.building.library import Unit, loaded
 
@@ -38,7 +38,7 @@ class Texts:
         """The library that has it. Raises KeyError where no text does, and what compiling raises."""
         text, metadata = self._made[self._key(what)]
         compiler = require_compiler() if self.backend == "c" else None
-        if compiler is not None and isinstance(what, str) and groups.seldom_called(what):
+        if compiler is not None and isinstance(what, str) and seldom_called(what):
             compiler = plain(compiler)
         return loaded(text, metadata, compiler)
 
@@ -50,5 +50,5 @@ class Texts:
         """Of the text with a function; other right-hand sides than the plain one have a "rhs" of their own."""
         plain_side = key_of(RightSide())
         with_it = (key for key, (_, metadata) in self._made.items()
-                   if what in metadata.shapes and (key == plain_side or not key.startswith("{")) and key != groups.BATCH)
+                   if what in metadata.shapes and (key == plain_side or not key.startswith("{")) and key != BATCH)
         return next(with_it, key_of(what)) if isinstance(what, str) else key_of(what)
