@@ -548,14 +548,20 @@ from symdyn.errors import SimulationInterrupted
 from tests.mechanisms import driven_oscillator
 module = driven_oscillator().embedding().compile(backend="c")
 module.simulate((0, 1))
+started = threading.Event()
+def inputs(t, x):
+    started.set()
+    return 0.1, 0.2
 def press(k):
-    time.sleep(0.01 + 0.0007 * k)
+    started.wait()  # before the run Ctrl-C ends the program, as everywhere
+    time.sleep(0.005 + 0.0007 * k)
     os.kill(os.getpid(), signal.SIGINT)
 for k in range(30):
+    started.clear()
     thread = threading.Thread(target=press, args=(k,))
     thread.start()
     try:
-        module.simulate((0, 1e9), inputs=lambda t, x: (0.1, 0.2), max_step=1e-3)
+        module.simulate((0, 1e9), inputs=inputs, max_step=1e-3)
     except SimulationInterrupted:
         thread.join()
         print(k)
