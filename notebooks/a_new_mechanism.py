@@ -69,7 +69,7 @@ crane.add_output("container", sd.position(container, [0, -b]))
 
 # %% [markdown]
 # Numbers: a trolley of 500 kg, a hook of 100 kg on 6 m of rope, a container of 1 t. Units are known where a symbol's use
-# tells them; the others are added.
+# lists them; the others are added.
 
 # %%
 crane.defaults = {g: 9.81, m_t: 500.0, m_h: 100.0, m_c: 1000.0, I_c: 400.0, b: 1.5,
@@ -200,7 +200,7 @@ assert swings[6.0] < 0.01 * min(swings[4.0], swings[8.0])
 # %% [markdown]
 # ## 7. When the description is wrong
 #
-# All faults are told at once, each with what was found and what to do about it. This description has three: a mass
+# All faults are reported at once, each with what was found and what to do about it. This description has three: a mass
 # that is text, a body that hangs on nothing, and a load that depends on a coordinate which no joint moves.
 
 # %%

@@ -53,7 +53,7 @@ assert embedded.F_c.equals(newton)
 # %% [markdown]
 # ## 2. The pendulum with a multiplier
 #
-# $C = x^2 + y^2 - l^2$. Differentiated twice, it tells that $\mathbf C_r \ddot{\mathbf r} = F^d$ with
+# $C = x^2 + y^2 - l^2$. Differentiated twice, it shows that $\mathbf C_r \ddot{\mathbf r} = F^d$ with
 # $F^d = -(\mathbf C_r \dot{\mathbf r})_{\mathbf r}\, \dot{\mathbf r}$.
 
 # %%

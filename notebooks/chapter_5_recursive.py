@@ -12,7 +12,7 @@
 # # Forces and accelerations from link to link
 #
 # The lecture's chapter 5 next to its slides: bodies that slide on each other, an arm of two links by Newton and Euler, and the
-# same in spatial vectors. The notebook `recursive_formulation` tells how the recursion is used; this one tells what the slides'
+# same in spatial vectors. The notebook `recursive_formulation` shows how the recursion is used; this one shows what the slides'
 # errors do, and ends with every formula of the chapter.
 
 # %%

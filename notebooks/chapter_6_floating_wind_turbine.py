@@ -627,8 +627,8 @@ lifted = crane.equilibrium(fixed=held)
 upright = crane.equilibrium(free=["z", "theta", "phi", "alpha", "beta", "m_x"], fixed={**held, "phi": 0.0})
 for title, module, state in (("before lifting", ashore, before), ("lifted", crane, lifted),
                              ("lifted, with ballast", crane, upright)):
-    told = module.outputs(0, state.x, params=state.params)
-    print(f"{title:22} draft {told['draft']:.3f} m, heel {told['heel_deg']:6.3f} degrees")
+    values = module.outputs(0, state.x, params=state.params)
+    print(f"{title:22} draft {values['draft']:.3f} m, heel {values['heel_deg']:6.3f} degrees")
 print(f"ballast moved: {upright['m_x'] / 1000:.1f} t; by moments 2 m_x y_b = m_c |y_t|: "
       f"{-upright['m_c'] * upright['y_t'] / (2 * upright['y_b']) / 1000:.1f} t")
 

@@ -103,7 +103,7 @@ show_all(track.without_multipliers([y]))
 # %% [markdown]
 # ## 2. What keeps a motion on its constraints
 #
-# The solver is told $\ddot C = 0$ only. So $\dot C$ keeps what rounding and the errors of the steps make of it, and $C$ drifts
+# The solver knows $\ddot C = 0$ only. So $\dot C$ keeps what rounding and the errors of the steps make of it, and $C$ drifts
 # away. There are three ways:
 #
 # - nothing at all (`stabilization="none"`);
@@ -177,7 +177,7 @@ linkage.initial = {q1: 1.0, q2: -0.5, q3: -2.2}
 
 # %% [markdown]
 # The start values are only about right: nobody has solved the loop yet. `diagnose` looks for the nearest state that fulfils
-# it and tells what the constraints do there and around.
+# it and says what the constraints do there and around.
 
 # %%
 print(linkage.diagnose())
@@ -387,7 +387,7 @@ print(bricard.diagnose(reach=0.5))
 # %% [markdown]
 # Nothing has to be left out. The accelerations are unique; they come without the dependent row. The multipliers are not
 # unique, since a moment that one constraint carries may as well be carried by others. Those of least norm are given, and
-# `sol.unique` tells at every time which ones the motion determines.
+# `sol.unique` reports at every time which ones the motion determines.
 
 # %%
 folding = bricard.augmented().compile().simulate((0, 10), rtol=1e-10)
@@ -454,7 +454,7 @@ assert difference < 1e-5
 
 # %% [markdown]
 # The motion goes straight on, as inertia has it. A mechanism that comes to rest exactly there could go on either way, and
-# multipliers are not unique. `diagnose` tells beforehand where such positions are.
+# multipliers are not unique. `diagnose` reports beforehand where such positions are.
 
 # %% [markdown]
 # ## 9. What to read next

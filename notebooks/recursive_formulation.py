@@ -82,7 +82,7 @@ show(r"\mathbf X_2^*", two.X_star)
 assert two.X_star == two.X.T
 
 # %% [markdown]
-# The motion subspace $\mathbf S_i$ tells how the joint moves its link: both turn about $z$. An observer on the link sees it
+# The motion subspace $\mathbf S_i$ says how the joint moves its link: both turn about $z$. An observer on the link sees it
 # stand still, so its apparent rate of change $\mathring{\mathbf S}_i$ is zero.
 
 # %%

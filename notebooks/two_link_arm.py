@@ -118,7 +118,7 @@ assert verification.passed
 # %% [markdown]
 # ## 4. Compiled module
 #
-# C if there is a compiler, otherwise NumPy; both have the same interface. The report tells how many operations each function
+# C if there is a compiler, otherwise NumPy; both have the same interface. The report says how many operations each function
 # takes, and what was left out because this mechanism does not need it.
 
 # %%

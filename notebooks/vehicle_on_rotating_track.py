@@ -38,7 +38,7 @@ import symdyn as sd
 #
 # The vehicle is a particle of mass $m$. The track falls at the angle $\theta$ below the horizontal; $\theta$ is constant.
 # The generalized coordinate $q_1$ is the distance travelled down the track from the point $O_0 = (x_0, y_0)$. This one
-# number tells where the vehicle is, so the constraint is met for every $q_1$:
+# number says where the vehicle is, so the constraint is met for every $q_1$:
 #
 # $$\mathbf r(q_1) = \mathbf r_{O_0} + q_1 \begin{bmatrix} \cos\theta \\ -\sin\theta \end{bmatrix}$$
 
@@ -327,7 +327,7 @@ axes.legend()
 plt.show()
 
 # %% [markdown]
-# Without inertia the path is the parabola of a thrown stone, as the vanishing reaction of section 2 told. It agrees
+# Without inertia the path is the parabola of a thrown stone, as the vanishing reaction of section 2 showed. It agrees
 # to the tolerance of the integrator.
 
 # %%

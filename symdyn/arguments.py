@@ -98,11 +98,11 @@ def over_time(value: Any) -> bool:
 
 def _of_one_time(name: str, value: Any, names: Sequence[str]) -> str:
     """What to say of an input over time where its number at one time belongs."""
-    told = (f"{name} is {shown(value, 60)}, over time; functions, splines and tables are for simulate, simulate_batch and "
-            "consistent. Here pass its number at this time")
+    fault = (f"{name} is {shown(value, 60)}, over time; functions, splines and tables are for simulate, simulate_batch and "
+             "consistent. Here pass its number at this time")
     if f"{name}_dot" not in names:
-        return f"{told}, inputs={{{name}: 0.1}}"
-    return f"{told}, and those of its rate and acceleration, inputs={{{name}: 0.1, {name}.dot: 0.2, {name}.ddot: 0}}"
+        return f"{fault}, inputs={{{name}: 0.1}}"
+    return f"{fault}, and those of its rate and acceleration, inputs={{{name}: 0.1, {name}.dot: 0.2, {name}.ddot: 0}}"
 
 
 def _finite(array: np.ndarray, names: Sequence[str], what: str, owner: str) -> None:

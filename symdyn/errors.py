@@ -1,4 +1,4 @@
-"""Errors that symdyn raises; each message tells what was asked, what was found, what to do."""
+"""Errors that symdyn raises; each message says what was asked, what was found, what to do."""
 
 from __future__ import annotations
 
@@ -53,15 +53,15 @@ class ArgumentError(SymdynError, ValueError):
 
 
 class EvaluationError(SymdynError, ArithmeticError):
-    """The equations cannot be evaluated at a state; the message tells which value and where."""
+    """The equations cannot be evaluated at a state; the message says which value and where."""
 
 
 class EvaluationWarning(UserWarning):
-    """Some of many states cannot be evaluated; their results are NaN, and the message tells which, and why."""
+    """Some of many states cannot be evaluated; their results are NaN, and the message says which, and why."""
 
 
 class SimulationWarning(UserWarning):
-    """A simulation stopped early; the solution up to there is kept, and its message tells when, where and why."""
+    """A simulation stopped early; the solution up to there is kept, and its message says when, where and why."""
 
 
 class SimulationInterrupted(KeyboardInterrupt):
@@ -85,7 +85,7 @@ class GimbalLock(RotationError):
 
 
 class NotARotation(RotationError):
-    """A matrix is not orthogonal with determinant 1; the message tells how far it is from that."""
+    """A matrix is not orthogonal with determinant 1; the message says how far it is from that."""
 
 
 class ZeroAxis(RotationError):
@@ -119,11 +119,11 @@ class UnknownCase(SymdynError, KeyError):
 
 
 class MissingExtra(SymdynError, ImportError):
-    """Something optional is not installed; the message tells how to get it."""
+    """Something optional is not installed; the message says how to get it."""
 
 
 class NoEquilibrium(SymdynError, ArithmeticError):
-    """No state of rest was found; the message tells what is left, in numbers."""
+    """No state of rest was found; the message says what is left, in numbers."""
 
 
 class EquilibriumNotUnique(NoEquilibrium):

@@ -12,7 +12,7 @@ from symdyn.shown import shown
 def wrong_option(name: str, function: Callable[..., Any], options: Mapping[str, Any]) -> str:
     """Of the first option that a function does not take, or not of this kind, what is wrong; empty if all are right.
 
-    name   of the function, as it is told
+    name   of the function, as messages name it
     """
     known = inspect.signature(function).parameters
     if any(p.kind is p.VAR_KEYWORD for p in known.values()):

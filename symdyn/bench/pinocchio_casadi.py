@@ -12,7 +12,7 @@ import numpy as np
 from symdyn.bench.toolchain import build_cpp, include_flags, package_folder
 from symdyn.errors import SymdynError
 
-# Sources in C++; model.hpp tells what a description is.
+# Sources in C++; model.hpp documents the format of a description.
 SOURCES = Path(__file__).parent / "cpp"
 ERROR_SIZE = 1000
 

@@ -24,7 +24,7 @@ def work(arguments: argparse.Namespace) -> int:
     options = options_of(arguments)
 
     def find(name: str) -> Subject:
-        """Raises ArgumentError, so that what is wrong with several names, and besides, is told at once."""
+        """Raises ArgumentError, so that what is wrong with several names, and besides, is reported at once."""
         try:
             return find_subject(name, options, arguments.end)
         except Stop as stop:

@@ -61,7 +61,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(names: Sequence[str]) -> list[Case]:
-    """The cases of files, names and sections; what there is not is told before anything is compared."""
+    """The cases of files, names and sections; what there is not is reported before anything is compared."""
     from symdyn.cli.userfile import cases_from_file
     from symdyn.comparison.run import find
 

@@ -1,4 +1,4 @@
-"""`symdyn diagnose`: tells what the constraints of a mechanism do."""
+"""`symdyn diagnose`: reports what the constraints of a mechanism do."""
 
 from __future__ import annotations
 

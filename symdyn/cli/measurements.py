@@ -15,18 +15,18 @@ from symdyn.cli.values import path
 @dataclass(frozen=True)
 class Option:
     """An option of a word: the parameter of the function that takes it, its flag ("" for what stands without one), what argparse
-    is told besides."""
+    is reported besides."""
 
     parameter: str
     flag: str
-    told: dict[str, Any]
+    settings: dict[str, Any]
 
     def add(self, parser: argparse.ArgumentParser) -> None:
         """Add it to a parser."""
         if self.flag:
-            parser.add_argument(self.flag, dest=self.parameter, **self.told)
+            parser.add_argument(self.flag, dest=self.parameter, **self.settings)
         else:
-            parser.add_argument(self.parameter, **self.told)
+            parser.add_argument(self.parameter, **self.settings)
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def title_of(name: str, options: Mapping[str, Any]) -> str:
 
 @contextlib.contextmanager
 def _refused() -> Iterator[None]:
-    """A name or an option that there is not becomes a Stop, which tells what the command line takes besides."""
+    """A name or an option that there is not becomes a Stop, which says what the command line takes besides."""
     from symdyn.bench.work.cases import Unknown
 
     try:

@@ -41,9 +41,9 @@ def make_parser() -> argparse.ArgumentParser:
     command("list", list_systems, "list the systems of the catalogue", system=False)
 
     def formulation(sub: argparse.ArgumentParser, default: str | None = "auto") -> argparse.ArgumentParser:
-        told = default or "embedding, of closed loops and constraints augmented"
+        default_text = default or "embedding, of closed loops and constraints augmented"
         sub.add_argument("--formulation", choices=("auto", "embedding", "recursive", "augmented"), default=default,
-                         help=f"auto takes the one with the fastest right-hand side (default: {told})")
+                         help=f"auto takes the one with the fastest right-hand side (default: {default_text})")
         return coordinates(sub)
 
     def coordinates(sub: argparse.ArgumentParser) -> argparse.ArgumentParser:
@@ -55,7 +55,7 @@ def make_parser() -> argparse.ArgumentParser:
                                     "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
-    _add_sweep(command("sweep", sweep, "simulate many samples of parameters and initial states, as a TOML file tells",
+    _add_sweep(command("sweep", sweep, "simulate many samples of parameters and initial states, as a TOML file describes",
                        system=False))
     proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
                     "identities at random states")
@@ -189,11 +189,11 @@ def _add_bench(commands: Any) -> None:
         work.add_argument(flag, metavar="NAME", nargs="+", help=what)
     for flag, metavar, what in (("--rtol", "TOLERANCE", "tolerances, relative and absolute (default: 1e-3 to 1e-15)"),
                                 ("--steps", "STEP", "s, for gauss, whose steps have one length, besides the tolerances"),
-                                ("--at", "TIME", "s, times besides the end at which errors are told; runs that end there are "
+                                ("--at", "TIME", "s, times besides the end at which errors are reported; runs that end there are "
                                  "timed alone")):
         work.add_argument(flag, metavar=metavar, nargs="+", type=float, help=what)
     work.add_argument("--per-decade", metavar="N", type=int, default=1, help="tolerances to a decade (default: 1); with more "
-                      "the least time below an error is told more sharply")
+                      "the least time below an error is reported more sharply")
     work.add_argument("--end", metavar="TIME", type=float, help="s (default: the system's duration)")
     work.add_argument("--repeats", metavar="N", type=int, default=5, help="timed runs, of which the least time is compared "
                       "(default: 5)")

@@ -1,4 +1,4 @@
-"""`symdyn report`: tells what is generated and whether it is right; with --full everything about a mechanism, as a page."""
+"""`symdyn report`: reports what is generated and whether it is right; with --full everything about a mechanism, as a page."""
 
 from __future__ import annotations
 

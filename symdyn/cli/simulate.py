@@ -46,7 +46,7 @@ def simulate(arguments: argparse.Namespace) -> int:
     except SimulationInterrupted as stop:
         solution, code = stop.solution, INTERRUPTED  # type: ignore[assignment]
     except NotConsistent as error:
-        raise Stop(f"{error.found}; begin with the nearest consistent state by --consistent, which tells what it changes (--keep "
+        raise Stop(f"{error.found}; begin with the nearest consistent state by --consistent, which says what it changes (--keep "
                    "NAME leaves some as they are)") from None
     except EvaluationError as error:
         raise Stop(f"{error}{users_line(Path(arguments.system), error.__cause__)}", FAILED) from None

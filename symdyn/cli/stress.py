@@ -22,7 +22,7 @@ def stress(arguments: argparse.Namespace) -> int:
     """Run the checks, print rows as they come, save the report, also of what was finished before an interrupt; a row that failed
     is a failure."""
     from symdyn.bench.work.resume import check_writable
-    from symdyn.stress.record import HEAD, Interrupted, told
+    from symdyn.stress.record import HEAD, Interrupted, described
     from symdyn.stress.run import CHECKS
     from symdyn.stress.run import stress as run
 
@@ -44,18 +44,18 @@ def stress(arguments: argparse.Namespace) -> int:
         if not shown:
             print(HEAD)
         shown.append(row)
-        print(told(row), flush=True)
+        print(described(row), flush=True)
 
     try:
         report = run(systems, arguments.short, arguments.checks, arguments.progress, arguments.jobs or os.cpu_count() or 1, show)
     except Interrupted as stop:
-        _told_and_saved(stop.report, folder)
+        _print_and_save(stop.report, folder)
         return complain(str(stop), INTERRUPTED)
-    _told_and_saved(report, folder)
+    _print_and_save(report, folder)
     return 0 if report.passed else FAILED
 
 
-def _told_and_saved(report: StressReport, folder: Path) -> None:
+def _print_and_save(report: StressReport, folder: Path) -> None:
     """What comes after the rows."""
     for text in report.left_out:
         print(f"left out: {text}")

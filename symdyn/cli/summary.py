@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
-# States beyond these are not told.
+# States beyond these are not reported.
 SHOWN = 12
 
 
@@ -43,11 +43,11 @@ def _constraints(solution: Solution) -> str:
     import numpy as np
 
     off = float(np.nanmax(np.abs(solution.constraint_violation), initial=0.0))
-    told = f"constraints are kept to {off:.2g} of the mechanism's length"
+    detail = f"constraints are kept to {off:.2g} of the mechanism's length"
     made = solution.corrections
     if not made.n_steps:
-        return told
-    return f"{told}; projections changed {made.n_steps} steps, q by up to {made.position:.2g}, u by up to {made.speed:.2g}"
+        return detail
+    return f"{detail}; projections changed {made.n_steps} steps, q by up to {made.position:.2g}, u by up to {made.speed:.2g}"
 
 
 def _energy(solution: Solution) -> str:

@@ -1,4 +1,4 @@
-"""`symdyn sweep`: many motions, as a TOML file tells."""
+"""`symdyn sweep`: many motions, as a TOML file describes."""
 
 from __future__ import annotations
 

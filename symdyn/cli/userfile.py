@@ -23,7 +23,7 @@ def from_file(path: Path, options: Mapping[str, Any]) -> System:
 
 
 def maker(path: Path) -> Callable[..., System]:
-    """system() of a user's file, which is run once; what it raises, now or when it is called, is told as the user's fault."""
+    """system() of a user's file, which is run once; what it raises, now or when it is called, is reported as the user's fault."""
     function = _run(path, lambda module: getattr(module, "system", None))
     if not callable(function):
         raise Stop(f"{path} defines no function system(); add one that returns a symdyn System")
@@ -33,7 +33,7 @@ def maker(path: Path) -> Callable[..., System]:
         from symdyn.model.system import System
 
         check_options(f"system() of {path}", function, options)
-        with _told(path):
+        with _fault_of_the_user(path):
             result = function(**options)
         if not isinstance(result, System):
             raise Stop(f"system() of {path} returned {result!r}; it must return a symdyn System")
@@ -63,14 +63,14 @@ def _run(path: Path, take: Callable[[Any], Any]) -> Any:
         raise Stop(f"{path} is not a Python file; its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    with _told(path):
+    with _fault_of_the_user(path):
         spec.loader.exec_module(module)
         return take(module)
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Whatever a user's program raises becomes a Stop, which tells it as its own."""
+def _fault_of_the_user(path: Path) -> Iterator[None]:
+    """Whatever a user's program raises becomes a Stop, which reports it as its own."""
     try:
         yield
     except Stop:

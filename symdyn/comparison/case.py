@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
 
-from symdyn.comparison.check import INDEX, as_tuple, guarded, is_count, is_index, mapping, members, text, told
+from symdyn.comparison.check import INDEX, as_tuple, described, guarded, is_count, is_index, mapping, members, text
 from symdyn.comparison.conventions import Convention
 from symdyn.comparison.proofs import Proof
 from symdyn.comparison.values import take
@@ -64,11 +64,11 @@ class Erratum:
         """What is missing; what: which erratum it is."""
         faults = text(self.why, f"`why` of {what}") + text(self.slip, f"`slip` of {what}", empty=True)
         if not isinstance(self.proof, Proof):
-            faults.append(f"`proof` of {what} is {told(self.proof)}; pass one of symdyn.proofs")
+            faults.append(f"`proof` of {what} is {described(self.proof)}; pass one of symdyn.proofs")
         if self.entries is None:
             return faults
         if not isinstance(self.entries, tuple) or not all(map(is_index, self.entries)):
-            faults.append(f"`entries` of {what} is {told(self.entries)}; pass a list of index {INDEX}{_meant(self.entries)}")
+            faults.append(f"`entries` of {what} is {described(self.entries)}; pass a list of index {INDEX}{_meant(self.entries)}")
         elif not self.entries:
             faults.append(f"`entries` of {what} is empty; name entries, or leave it out for all that differ")
         return faults
@@ -96,7 +96,7 @@ class Remark:
         """Everything of a wrong type."""
         faults = text(self.why, "`why` of a remark") + _line(self.line, "the line of a remark")
         if not isinstance(self.also, tuple) or not all(map(is_count, self.also)):
-            faults.append(f"`also` of a remark is {told(self.also)}; pass numbers of lines, [3, 7]")
+            faults.append(f"`also` of a remark is {described(self.also)}; pass numbers of lines, [3, 7]")
         return faults
 
 
@@ -147,7 +147,7 @@ class Formula:
         """Everything of a wrong type; what: how the messages call the formula."""
         faults = _slide(self.slide, f"the slide of {what}") + _line(self.line, f"the line of {what}")
         if not isinstance(self.also, tuple) or not all(map(is_count, self.also)):
-            faults.append(f"`also` of {what} is {told(self.also)}; pass numbers of lines, [3, 7]")
+            faults.append(f"`also` of {what} is {described(self.also)}; pass numbers of lines, [3, 7]")
         if self.latex is not None:
             faults += text(self.latex, f"`latex` of {what}")
         for name in ("renamed", "where"):
@@ -157,7 +157,7 @@ class Formula:
         faults += [f"{what}: {fault}" for convention in _those(self.conventions, Convention) for fault in convention.faults()]
         faults += [fault for erratum in _those(self.errata, Erratum) for fault in erratum.faults(f"an erratum of {what}")]
         if self.decimals is not None and not is_count(self.decimals):
-            faults.append(f"`decimals` of {what} is {told(self.decimals)}; pass a whole number from 0 on")
+            faults.append(f"`decimals` of {what} is {described(self.decimals)}; pass a whole number from 0 on")
         return faults + self._unreadable(what)
 
     def _unreadable(self, what: str) -> list[str]:
@@ -167,8 +167,8 @@ class Formula:
             return [f"{what} is unreadable as a whole ({given!r:.60}), and something is printed; pass {{index: reason}} for "
                     "single entries, or printed=None"] if both else []
         if not isinstance(given, Mapping):
-            return [f"`unreadable` of {what} is {told(given)}; pass a sentence, or {{index: sentence}}"]
-        faults = [f"`unreadable` of {what} has the index {told(key)}; pass {INDEX}" for key in given if not is_index(key)]
+            return [f"`unreadable` of {what} is {described(given)}; pass a sentence, or {{index: sentence}}"]
+        faults = [f"`unreadable` of {what} has the index {described(key)}; pass {INDEX}" for key in given if not is_index(key)]
         printed = take(self.printed, what, []) if given and not faults and self.printed is not None else None
         if printed is not None:
             places = printed.indices()
@@ -318,11 +318,11 @@ def _as_slide(value: Any) -> Any:
 def _slide(value: Any, what: str) -> list[str]:
     if value is None or isinstance(value, Slide):
         return value.faults(what) if value is not None else []
-    return [f"{what} is {told(value)}; pass symdyn.Slide(section, title, line), or the section as text"]
+    return [f"{what} is {described(value)}; pass symdyn.Slide(section, title, line), or the section as text"]
 
 
 def _line(value: Any, what: str) -> list[str]:
-    return [] if value is None or is_count(value) else [f"{what} is {told(value)}; pass a whole number from 0 on"]
+    return [] if value is None or is_count(value) else [f"{what} is {described(value)}; pass a whole number from 0 on"]
 
 
 def _meant(entries: Any) -> str:

@@ -11,7 +11,7 @@ from symdyn.errors import CaseError
 INDEX = "tuples such as (0,) of a vector, (0, 1) of a matrix, counted from 0"
 
 
-def told(value: Any) -> str:
+def described(value: Any) -> str:
     """A value and its type, for messages."""
     return f"{value!r:.80} of type {type(value).__name__}"
 
@@ -41,23 +41,23 @@ def text(value: Any, what: str, empty: bool = False) -> list[str]:
         return []
     if isinstance(value, str):
         return [f"{what} is empty; write it out"]
-    return [f"{what} is {told(value)}; pass text"]
+    return [f"{what} is {described(value)}; pass text"]
 
 
 def mapping(value: Any, what: str, example: str) -> list[str]:
     """The fault of what should be a dict."""
-    return [] if isinstance(value, Mapping) else [f"{what} is {told(value)}; pass a dict: {example}"]
+    return [] if isinstance(value, Mapping) else [f"{what} is {described(value)}; pass a dict: {example}"]
 
 
 def members(value: Any, what: str, kind: type, example: str) -> list[str]:
     """The faults of what should be objects of one type; value as it comes from as_tuple()."""
     if not isinstance(value, tuple):
-        return [f"{what} is {told(value)}; pass a list: [{example}, ...]"]
-    return [f"{what}[{k}] is {told(one)}; pass {example}" for k, one in enumerate(value) if not isinstance(one, kind)]
+        return [f"{what} is {described(value)}; pass a list: [{example}, ...]"]
+    return [f"{what}[{k}] is {described(one)}; pass {example}" for k, one in enumerate(value) if not isinstance(one, kind)]
 
 
 def guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
-    """The same function; whatever it raises becomes a CaseError that tells where."""
+    """The same function; whatever it raises becomes a CaseError that says where."""
     def call(*arguments: Any) -> Any:
         try:
             return function(*arguments)

@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from symdyn.comparison.check import as_tuple, is_count, text, told
+from symdyn.comparison.check import as_tuple, described, is_count, text
 from symdyn.comparison.equality import decide
 from symdyn.errors import CaseError, ModelError
 from symdyn.model.symbols import as_expression
@@ -38,7 +38,7 @@ class Convention:
         else:
             faults += text(self.sentence, f"the sentence of {name}")
         if not callable(self.to_slide):
-            faults.append(f"`to_slide` of {name} is {told(self.to_slide)}; pass a function of what is derived")
+            faults.append(f"`to_slide` of {name} is {described(self.to_slide)}; pass a function of what is derived")
         return faults
 
 

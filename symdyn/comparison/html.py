@@ -32,12 +32,12 @@ def comparison_html(comparison: Comparison) -> str:
     rows = []
     for f in comparison.formulas:
         notes = dict.fromkeys([*(e.note for e in f.entries if e.note), *(str(e.evidence) for e in f.errata)])
-        told = "<br>".join(f'<span style="color:{STYLE[v]}">{words}</span>' for v, words in worded(f.entries))
+        parts = "<br>".join(f'<span style="color:{STYLE[v]}">{words}</span>' for v, words in worded(f.entries))
         printed = f"${formula_latex(f.printed, marked(f), 'red')}$" if f.printed is not None else ""
         derived = f"${formula_latex(f.derived)}$" if f.derived is not None else ""
         line = f"<br>line {f.slide.line}" if f.slide.line is not None else ""
         rows.append(f'<tr><td style="text-align:left">{escape(f.name)}{line}</td><td>{printed}</td><td>{derived}</td>'
-                    f'<td style="text-align:left">{told}{"".join(f"<br><small>{escape(n)}</small>" for n in notes)}</td></tr>')
+                    f'<td style="text-align:left">{parts}{"".join(f"<br><small>{escape(n)}</small>" for n in notes)}</td></tr>')
     title = escape(f"{comparison.name}: {comparison.title}" if comparison.title else comparison.name)
     return (f"<table><caption>{title}</caption><thead><tr><th>formula</th><th>printed</th><th>derived</th><th>verdict</th></tr>"
             f"</thead><tbody>{''.join(rows)}</tbody></table>")

@@ -95,7 +95,7 @@ class Proof:
             return self.measure(formula, where, moving)
         except SymdynError as error:
             raise CaseError([f"the proof {self.sentence!r}: {error}"]) from None
-        except Exception as error:  # whatever a user's residual raises is told as its own
+        except Exception as error:  # whatever a user's residual raises is reported as its own
             raise CaseError([f"the proof {self.sentence!r} ended with {type(error).__name__}: {error}"]) from error
 
     def measure(self, formula: Any, where: Mapping[str, sp.Expr], moving: set[str]) -> list[Residual]:

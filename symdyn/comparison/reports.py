@@ -115,13 +115,13 @@ def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
     ways = list(dict.fromkeys(e.how for e in formula.entries if e.how))
     return {"name": formula.name, "slide": str(formula.slide), "also": ", ".join(map(str, formula.also)), "wide": wide,
             "verdict": formula.verdict.name.lower(),
-            "told": "; ".join(words if len(formula.entries) > 1 else words.removeprefix("1 ")
-                              for _, words in worded(formula.entries)),
+            "summary": "; ".join(words if len(formula.entries) > 1 else words.removeprefix("1 ")
+                                 for _, words in worded(formula.entries)),
             "printed": pages.lines(room, formula.printed, marked(formula), name) if formula.printed is not None
             else [pages.typeset(name)] if name else [],
             "derived": pages.lines(room, formula.derived) if formula.derived is not None else [],
             "where": [pages.typeset(line) for line in where_lines(formula, room)], "notes": notes,
-            "ways": ", ".join([*ways, "on the states told"] if formula.where and ways else ways),
+            "ways": ", ".join([*ways, "on the states stated"] if formula.where and ways else ways),
             "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
 
 
@@ -168,7 +168,7 @@ def _rounding(residual: float) -> str:
 
 
 def _tex(text: str) -> str:
-    """Plain text for LaTeX; titles in Korean are told to be so, since few installations have its letters."""
+    """Plain text for LaTeX; titles in Korean are described as such, since few installations have its letters."""
     text = re.sub(r"[\u1100-\ud7ff]+(?:[ (&]+[\u1100-\ud7ff]+)*", "(Korean)", str(text))
     special = {"\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
                "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", "ω": r"$\omega$", "λ": r"$\lambda$"}

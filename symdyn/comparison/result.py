@@ -62,10 +62,10 @@ class Comparison:
         lines = [head]
         for f in self.formulas:
             line = f"{f.slide.line:>6}  " if f.slide.line is not None else ""
-            lines.append(f"  {f.name:{width}}  {line}{_told(f.entries)}{', on the states told' if f.where else ''}")
+            lines.append(f"  {f.name:{width}}  {line}{_counted(f.entries)}{', on the states stated' if f.where else ''}")
             lines += [f"    {text}" for text in _remarks(f)]
         lines += [f"  {'' if r.line is None else f'line {r.line}: '}{r.why}" for r in self.remarks]
-        lines.append(f"  {_entries(self.counts)}: {_told(e for f in self.formulas for e in f.entries)}")
+        lines.append(f"  {_entries(self.counts)}: {_counted(e for f in self.formulas for e in f.entries)}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -197,5 +197,5 @@ def _certainty(entry: EntryResult) -> str:
     return CERTAINTIES[1 if entry.proved else 2] if entry.verdict in (Verdict.EQUAL, Verdict.CONVENTION) else ""
 
 
-def _told(entries: Iterable[EntryResult]) -> str:
+def _counted(entries: Iterable[EntryResult]) -> str:
     return "; ".join(words for _, words in worded(entries))

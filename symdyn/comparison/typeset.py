@@ -207,7 +207,7 @@ def mathml(latex: str) -> str:
     return _OPERATOR.sub("<mo>", _ENTITY.sub(_character, str(convert(latex))))
 
 
-# What a browser knows of brackets without being told, and characters by number: half of a page.
+# What a browser knows of brackets by itself, and characters by number: half of a page.
 _OPERATOR = re.compile(r'<mo stretchy="true" fence="true" form="(?:prefix|postfix)">')
 _ENTITY = re.compile(r"&#x([0-9A-F]+);")
 

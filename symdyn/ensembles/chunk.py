@@ -29,7 +29,7 @@ NUMBERS = 2**21
 
 
 class MemberFailed(SymdynError):
-    """A motion has no outcome; the message tells why."""
+    """A motion has no outcome; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _on_vectors(setting: Setting, values: np.ndarray, rows: np.ndarray, done: Do
         try:
             batch = module.simulate_batch(groups["q"], groups["u"], groups["parameters"], z=groups["z"], t=times,
                                           inputs=groups["inputs"], **setting.options)
-        except SymdynError as error:  # of all of them: each tells it for itself
+        except SymdynError as error:  # of all of them: each reports it for itself
             _raise_others(error)
             _one_by_one(setting, values, part, done)
             continue

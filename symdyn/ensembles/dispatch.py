@@ -17,7 +17,7 @@ AHEAD = 3
 
 
 class ExecutorFailed(SymdynError):
-    """An executor died, or cannot do a chunk; the message tells which and why."""
+    """An executor died, or cannot do a chunk; the message says which and why."""
 
 
 def run_chunks(todo: Iterator[Chunk], make: Callable[[], Executor], again: bool,
@@ -81,7 +81,7 @@ def _is_shut(error: Exception) -> bool:
 
 
 def _workers(executor: Any) -> int:
-    """How many tasks an executor does at a time, as far as it tells."""
+    """How many tasks an executor does at a time, as far as it reports this."""
     workers = getattr(executor, "_max_workers", None)
     if isinstance(workers, int):
         return max(1, workers)

@@ -66,7 +66,7 @@ class Measure:
         return np.asarray(REDUCTIONS[self.kind](t, values))
 
     def record(self) -> str:
-        """What tells it from others."""
+        """What distinguishes it from others."""
         function = self.function
         return f"{self.kind} {self.name}" if function is None else (
             f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}")

@@ -248,7 +248,7 @@ def _tried(setting: Setting, samples: Samples) -> Setting:
 
 
 def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...]:
-    """The shape of an outcome where no motion tells it; of a function a number."""
+    """The shape of an outcome where no motion shows it; of a function a number."""
     own = dict(module.metadata.outputs).get(measure.name, ())
     return (len(setting.times), *own) if measure.kind == "trace" else own
 

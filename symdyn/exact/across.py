@@ -40,9 +40,9 @@ def prove_equal(first: Equations, second: Any, bound: int = BOUND) -> Proofs:
                               ("constraints", first.constraints, second.constraints)):
         names = [[str(getattr(s, "name", s)) for s in group] for group in (own, others)]
         if names[0] != names[1]:
-            told = ["; ".join(group) or "none" for group in names]
+            lists = ["; ".join(group) or "none" for group in names]
             raise ArgumentError(f"equations are compared in the same {what}, in the same order; the {first.formulation} ones "
-                                f"have {told[0]}, the {second.formulation} ones {told[1]}")
+                                f"have {lists[0]}, the {second.formulation} ones {lists[1]}")
     taken = _Taken(first, second)
     symbols = first.printed_leaves()
     units = [[first.leaves[p] for p in group] for group in first.unit_groups]

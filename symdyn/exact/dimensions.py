@@ -38,7 +38,7 @@ _SAME = {"add", "sub", "min", "max"}
 _COMPARED = {"lt", "le", "gt", "ge", "eq", "ne", "atan2"}
 _TRUTH = {"and", "or", "not", "sign"}
 # Steps of a term that is written out in a message.
-TOLD = 60
+LISTED = 60
 
 
 def parsed(unit: str | None) -> Dimension | None:
@@ -216,12 +216,12 @@ def _scaled(a: Dimension, factor: Fraction) -> Dimension:
 def written(mismatch: Mismatch, symbols: Mapping[Node, sp.Basic]) -> str:
     """A mismatch in words, with the expressions where they are short."""
     node = mismatch.node
-    told = []
+    parts = []
     for a, unit in zip(mismatch.sides, mismatch.units, strict=True):
-        short = len(reachable([a])) <= TOLD
-        told.append(f"{shown(expand(Output.of('e', a), symbols)) if short else 'a long expression'} in {unit}")
+        short = len(reachable([a])) <= LISTED
+        parts.append(f"{shown(expand(Output.of('e', a), symbols)) if short else 'a long expression'} in {unit}")
     where = f"{node.section}: " if node.section else ""
-    return f"{where}{mismatch.what} {' and '.join(told)}"
+    return f"{where}{mismatch.what} {' and '.join(parts)}"
 
 
 def units_of_expressions(expressions: Iterable[sp.Expr], units: Mapping[sp.Basic, Dimension | None]) -> list[Dimension | None]:

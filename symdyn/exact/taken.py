@@ -46,7 +46,7 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
 
 
 def ordered(part: sp.Basic) -> tuple[Any, str]:
-    """A key to sort by that tells symbols of one name apart by what is assumed of them."""
+    """A key to sort by that distinguishes symbols of one name by what is assumed of them."""
     return sp.default_sort_key(part), str(sorted(getattr(part, "assumptions0", {}).items()))
 
 

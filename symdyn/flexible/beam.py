@@ -102,7 +102,7 @@ class Beam:
         return [basis.shape(vector, AXES[self.axis][:2], self._scale, f"mode {k}") for k, vector in enumerate(vectors.T, start=1)]
 
     def _shapes(self, shapes: Any, end: float | None, faults: list[str]) -> list[Shape]:
-        """The shapes that were given, their faults told with their place."""
+        """The shapes that were given, their faults reported with their place."""
         if not isinstance(shapes, (list, tuple)) or not shapes or any(not isinstance(s, Shape) for s in shapes):
             faults.append(f"shapes is {shown(shapes, 60)}; pass a list of sd.Shape, or how many modes to take")
             return []

@@ -31,7 +31,7 @@ class Shape:
     name           what the mode is called
 
     The sum of two shapes is one shape: Shape("x", ...) + Shape("y", ...) deflects in both directions, as the modes of
-    twisted blades do. Faults are told by the Beam that gets the shape.
+    twisted blades do. Faults are reported by the Beam that gets the shape.
 
     >>> sd.Shape("x", [1, 0.2], powers=[2, 3]).along("x")
     True

@@ -45,7 +45,7 @@ class TapeAlgebra:
         return other
 
     def divisor(self, value: Any, least: Any, reason: str) -> Any:
-        """A value to divide by; where it is not above `least` when the code runs, that stops and tells the reason."""
+        """A value to divide by; where it is not above `least` when the code runs, that stops and says the reason."""
         return self.recorder.guard(value, value - least, reason)
 
     def expression(self, e: Any) -> Any:

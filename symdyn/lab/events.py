@@ -165,7 +165,7 @@ def measure(modules: dict[str, Any], methods: Sequence[str], seeds: Sequence[int
             total = {kind: Count() for kind in KINDS}
             for seed in seeds:
                 drawn = draw(seed, rtol)
-                with warnings.catch_warnings(record=True) as told:
+                with warnings.catch_warnings(record=True) as caught:
                     warnings.simplefilter("always", SimulationWarning)
                     run = module.simulate((0, SPAN), params=drawn.params, method=method, rtol=rtol)
                 for name, rows in run.events.items():
@@ -174,7 +174,7 @@ def measure(modules: dict[str, Any], methods: Sequence[str], seeds: Sequence[int
                     # The error of a swing within the span is at most some hundred tolerances; the slope at a zero is sqrt(2 d).
                     near = 200 * rtol / np.sqrt(2 * drawn.params["e"]) * 10 if kind == "swinging" else NEAR * SPAN
                     one = count(rows.t, drawn.zeros[of], near)
-                    total[kind].add(one, bool(told))
+                    total[kind].add(one, bool(caught))
             for kind, of in total.items():
                 yield method, rtol, kind, of
 

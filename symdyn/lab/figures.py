@@ -33,7 +33,7 @@ def print_figures(groups: Sequence[Group], only: Sequence[str] | None = None, wi
         for name, value, unit, wanted in group():
             bad = missed(value, wanted)
             count += bad
-            digits = ".0f" if float(value).is_integer() and abs(value) < 1e9 else ".4g"  # counts are told in full
+            digits = ".0f" if float(value).is_integer() and abs(value) < 1e9 else ".4g"  # counts are reported in full
             print(f"{name:{width}} {value:10{digits}} {unit:3} {wanted:10}{'MISSED' if bad else ''}".rstrip(), flush=True)
     return count
 

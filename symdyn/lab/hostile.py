@@ -148,8 +148,8 @@ def _calls() -> tuple[Call, ...]:
     return tuple(calls())
 
 
-def run(case: Case, told: bool = False) -> Result:
-    """Do a case here, and judge it. told: with the traceback of what fails."""
+def run(case: Case, detailed: bool = False) -> Result:
+    """Do a case here, and judge it. detailed: with the traceback of what fails."""
     number, name, what = case.number, case.call.name, case.what
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -158,7 +158,7 @@ def run(case: Case, told: bool = False) -> Result:
         except SymdynError as error:
             return Result(number, name, what, f"{type(error).__name__}: {str(error)[:200]}", *_of_message(error))
         except BaseException as error:  # whatever it is, it is the outcome
-            detail = traceback.format_exc() if told else _place(error)
+            detail = traceback.format_exc() if detailed else _place(error)
             return Result(number, name, what, f"{type(error).__name__}: {_text(error)[:200]}", "traceback", detail)
     foreign = [w for w in said if not issubclass(w.category, OWN)]
     if foreign:
@@ -223,7 +223,7 @@ def not_finite(result: Any, depth: int = 4) -> str:
 # -- a process that may crash
 
 
-def _serve(inbox: Connection, seed: int, names: Sequence[str], told: bool, folder: str) -> None:
+def _serve(inbox: Connection, seed: int, names: Sequence[str], detailed: bool, folder: str) -> None:
     """Do the cases whose numbers come in, in a folder of its own."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
@@ -237,20 +237,21 @@ def _serve(inbox: Connection, seed: int, names: Sequence[str], told: bool, folde
         stack.enter_context(contextlib.redirect_stdout(nowhere))
         stack.enter_context(contextlib.redirect_stderr(nowhere))
         while (number := inbox.recv()) is not None:
-            inbox.send(run(draw(number, seed, names), told))
+            inbox.send(run(draw(number, seed, names), detailed))
 
 
 class Worker:
     """The process of the calls; another one takes its place when it ends."""
 
-    def __init__(self, seed: int, names: Sequence[str], told: bool, folder: str) -> None:
-        self.seed, self.names, self.told, self.folder = seed, tuple(names), told, folder
+    def __init__(self, seed: int, names: Sequence[str], detailed: bool, folder: str) -> None:
+        self.seed, self.names, self.detailed, self.folder = seed, tuple(names), detailed, folder
         self._begin()
 
     def _begin(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.end, other = context.Pipe()
-        self.process = context.Process(target=_serve, args=(other, self.seed, self.names, self.told, self.folder), daemon=True)
+        self.process = context.Process(
+            target=_serve, args=(other, self.seed, self.names, self.detailed, self.folder), daemon=True)
         self.process.start()
         other.close()
 
@@ -277,10 +278,10 @@ class Worker:
         self.process.kill()
 
 
-def results(numbers: Sequence[int], seed: int, names: Sequence[str] = (), told: bool = False) -> Iterator[Result]:
+def results(numbers: Sequence[int], seed: int, names: Sequence[str] = (), detailed: bool = False) -> Iterator[Result]:
     """Of all cases, in their order; names: of the calls, none: all. What is written goes to a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="symdyn-hostile-", ignore_cleanup_errors=True) as folder:
-        worker = Worker(seed, names, told, folder)
+        worker = Worker(seed, names, detailed, folder)
         try:
             for number in numbers:
                 yield worker.do(number)

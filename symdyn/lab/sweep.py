@@ -70,8 +70,8 @@ def run(count: int = 1_000_000, seed: int | None = None) -> int:
         killed.send_signal(signal.SIGKILL)
         killed.wait()
         kept = len(list((folder / "killed" / "chunks").glob("0*.npz")))
-        told, _ = start(folder, count, "killed", "--resume").communicate()
+        output, _ = start(folder, count, "killed", "--resume").communicate()
         same = (folder / "killed" / "ensemble.npz").read_bytes() == (folder / f"whole{count}" / "ensemble.npz").read_bytes()
-        print(f"killed after {moment:.1f} s with {kept} chunks done; gone on: {told.splitlines()[0]}")
+        print(f"killed after {moment:.1f} s with {kept} chunks done; gone on: {output.splitlines()[0]}")
         print("the file is the same, to the byte" if same else "THE FILE DIFFERS")
     return 0 if same else 1

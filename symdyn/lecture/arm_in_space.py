@@ -24,7 +24,7 @@ SEAT_1 = sp.Matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 class Letters:
     """Symbols for the components of the vectors and matrices that slides print, and what each stands for.
 
-    A name such as "b2_omega_b2_b1" or "b1_v_O1_dot" tells, as the slide does, the axes, the letter, the indices and a dot.
+    A name such as "b2_omega_b2_b1" or "b1_v_O1_dot" says, as the slide does, the axes, the letter, the indices and a dot.
     """
 
     def __init__(self) -> None:

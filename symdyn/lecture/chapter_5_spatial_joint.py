@@ -21,7 +21,7 @@ STAR = "The velocity product of a force is v x* I v; the star is missing."
 
 
 class LinkAlone(Letters):
-    """Link 2 cut free in O_2 and moving anyhow: the recursion tells what it needs there.
+    """Link 2 cut free in O_2 and moving anyhow: the recursion shows what it needs there.
 
     In O_3 link 3 acts on it with -f_O3 and -m_O3. The frame b2 has its origin in O_2, bG2 at G_2 is turned against it by
     gamma, b3 at O_3 by beta.

@@ -15,8 +15,8 @@ from symdyn.stress.subject import Subject
 
 STATES, BETWEEN = 1001, 101
 RTOL = 1e-9
-# A condition from which on accelerations lose the digits that usual tolerances need; rad from gimbal lock that are told as near;
-# so many peaks are told.
+# A condition from which on accelerations lose the digits that usual tolerances need; rad from gimbal lock that count as near;
+# so many peaks are reported.
 NEAR, NEAR_LOCK, PEAKS = 1e6, 0.1, 5
 # Parts of the weakest direction that are named, relative to its largest.
 _NAMED = 0.3
@@ -38,14 +38,14 @@ class Along:
     solution   at STATES times; t (n_t,): these and those of closer looks at the worst places
     curves     label -> (n_t,); the last is of what accelerations come from
     places     the worst of it, further peaks, passes of gimbal lock
-    told       warnings of the run, and why it stopped early
+    warnings   warnings of the run, and why it stopped early
     """
 
     solution: Solution
     t: np.ndarray
     curves: dict[str, np.ndarray]
     places: tuple[Place, ...]
-    told: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @property
     def near(self) -> bool:
@@ -56,13 +56,13 @@ class Along:
 def along(subject: Subject) -> Along:
     """The usual motion of a mechanism for its duration, with the conditions at STATES times and closer at the worst places."""
     sol = subject.run(np.linspace(0.0, subject.duration, STATES), rtol=RTOL)
-    told = (*sol.told, *([] if sol.success else [sol.message]))  # type: ignore[attr-defined]
+    warnings = (*sol.warned, *([] if sol.success else [sol.message]))  # type: ignore[attr-defined]
     if not len(sol.t):
-        return Along(sol, sol.t, {}, (), told)
+        return Along(sol, sol.t, {}, (), warnings)
     t, x = _closer(subject, sol.t, sol.x)
     curves = _curves(subject, t, x)
     places = [*(_peaks(subject, t, x, list(curves.values())[-1]) if curves else ()), *_locks(subject, t, x)]
-    return Along(sol, t, curves, tuple(sorted(places, key=lambda p: p.t)), told)
+    return Along(sol, t, curves, tuple(sorted(places, key=lambda p: p.t)), warnings)
 
 
 def _curves(subject: Subject, t: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
@@ -106,11 +106,11 @@ def _highest(values: np.ndarray, least: float) -> list[int]:
 def _peaks(subject: Subject, t: np.ndarray, x: np.ndarray, values: np.ndarray) -> list[Place]:
     """The worst place, and the highest of the other peaks that are near a singularity."""
     high = np.where(np.isnan(values), np.inf, values)
-    return [Place(float(t[k]), _told(subject, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
+    return [Place(float(t[k]), _sentence(subject, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
             for i, k in enumerate(_highest(values, NEAR))]
 
 
-def _told(subject: Subject, t: float, x: np.ndarray, value: float, first: bool) -> str:
+def _sentence(subject: Subject, t: float, x: np.ndarray, value: float, first: bool) -> str:
     head = f"{'largest condition' if first else 'condition'} {value:.3g}"
     if not math.isfinite(value):
         return f"{head}: the accelerations are not determined"

@@ -35,7 +35,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity: its lines, or the note that tells why there are none.
+    """A quantity: its lines, or the note that says why there are none.
 
     steps   how many lines are steps on the way to it; shown: the first line after these that is only shown if asked for
     """

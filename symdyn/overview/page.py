@@ -38,15 +38,15 @@ if TYPE_CHECKING:
     from symdyn.report.text import Report
 
 BUDGET = 20.0
-# What parts warn of is told in them, so many of each.
+# What parts warn of is reported in them, so many of each.
 WARNINGS, MOST = (SimulationWarning, EvaluationWarning, ModelWarning), 3
 STILL = ("The motion stands still, so that there is one state only to look at; set system.initial to a start from which it "
          "moves, such as {q: 0.5, q.dot: 1}.")
-Told = Callable[[str], None]
+Log = Callable[[str], None]
 
 
 def full_report(system: System | Equations, path: PathName, budget: float = BUDGET, formulation: str = "auto",
-                coordinates: str = "relative", tune: bool = False, verify: bool = True, told: Told = lambda text: None) -> Path:
+                coordinates: str = "relative", tune: bool = False, verify: bool = True, log: Log = lambda text: None) -> Path:
     """Write everything about a mechanism into one HTML file that works offline; returns its path.
 
     system        a System, equations such as those of sd.embedding, or a name that sd.bench takes
@@ -54,7 +54,7 @@ def full_report(system: System | Equations, path: PathName, budget: float = BUDG
     formulation   "auto", "embedding", "recursive" or "augmented"; coordinates of the augmented one, and tune, as in
                   System.equations; of equations that are given these do not count
     verify        whether to prove the equations by identities
-    told          called with what is going on
+    log          called with one line at each stage
     Raises ArgumentError for an ending other than .html, a path that cannot be written, a budget that is no positive number and
     anything that is no mechanism; ModelError for one that has faults.
 
@@ -66,11 +66,11 @@ def full_report(system: System | Equations, path: PathName, budget: float = BUDG
     target = _target(path)
     if isinstance(budget, bool) or not isinstance(budget, (int, float)) or not 0 < budget < math.inf:
         raise ArgumentError(f"the budget {shown(budget)} must be a positive number of seconds")
-    told("equations")
+    log("equations")
     equations = _equations(system, formulation, coordinates, tune)
     given = isinstance(system, Equations)
     name = "" if given else "absolute" if coordinates == "absolute" else equations.formulation
-    text = page(equations, system, name, budget, verify, told)
+    text = page(equations, system, name, budget, verify, log)
     return write_text(target, text, "the report")
 
 
@@ -111,7 +111,7 @@ class Part:
     seconds: float = 0.0
 
 
-def page(equations: Equations, system: Any, formulation: str, budget: float, verify: bool, told: Told) -> str:
+def page(equations: Equations, system: Any, formulation: str, budget: float, verify: bool, log: Log) -> str:
     """The text of the page.
 
     system        what sd.bench takes; formulation: the equations' as it names them, empty where it takes equations
@@ -121,11 +121,11 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
         "equations": ("Equations of motion", lambda part: _show_equations(part, equations)),
         "generated": ("What is generated", lambda part: _show_generated(part, equations)),
         "condition": ("Condition along the motion", lambda part: _show_condition(part, subject)),
-        "work": ("Work against error", lambda part: _show_work(part, system, formulation, budget, told)),
+        "work": ("Work against error", lambda part: _show_work(part, system, formulation, budget, log)),
         "stress": ("Stability under stress", lambda part: _show_stress(part, subject))}
     if verify:
         makers["proof"] = ("Proof by identities", lambda part: part.shown.update(result=equations.verify()))
-    parts = {key: _made(title, make, told) for key, (title, make) in makers.items()}
+    parts = {key: _made(title, make, log) for key, (title, make) in makers.items()}
     environment = page_environment()
     environment.filters["number"] = number
     return environment.get_template("report/full.html.jinja").render(
@@ -133,10 +133,10 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
         budget=f"{budget:g}")
 
 
-def _made(title: str, make: Callable[[Part], None], told: Told) -> Part:
-    """A part; whatever goes wrong in making it is told in it."""
+def _made(title: str, make: Callable[[Part], None], log: Log) -> Part:
+    """A part; whatever goes wrong in making it is reported in it."""
     part, begun = Part(title), clock.perf_counter()
-    told(title[0].lower() + title[1:])
+    log(title[0].lower() + title[1:])
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -148,7 +148,7 @@ def _made(title: str, make: Callable[[Part], None], told: Told) -> Part:
         last = traceback.extract_tb(error.__traceback__)[-1]
         part.failed = f"{type(error).__name__} in {Path(last.filename).name}:{last.lineno}: {error}"
     if part.failed:
-        told(f"{title[0].lower() + title[1:]}: not made: {part.failed}")
+        log(f"{title[0].lower() + title[1:]}: not made: {part.failed}")
     part.seconds = clock.perf_counter() - begun
     return part
 
@@ -194,8 +194,8 @@ def _range(label: str, values: Any) -> dict[str, str]:
             "lost": str(len(values) - len(finite)) if len(values) > len(finite) else ""}
 
 
-def _show_work(part: Part, system: Any, formulation: str, budget: float, told: Told) -> None:
-    benchmarks = full_work.measure(system, formulation, budget, told)
+def _show_work(part: Part, system: Any, formulation: str, budget: float, log: Log) -> None:
+    benchmarks = full_work.measure(system, formulation, budget, log)
     part.notes += dict.fromkeys(f"{note[0].upper()}{note[1:]}." for benchmark in benchmarks for note in benchmark.notes)
     part.shown = full_work.shown(benchmarks)
     if part.shown["note"]:

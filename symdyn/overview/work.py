@@ -25,7 +25,7 @@ WITHOUT_COMPILER, OTHERS_WITHOUT = (("DOP853", "RK45"), ("Radau", "LSODA")), ("D
 _AGAIN = 0.5
 
 
-def measure(subject: Any, formulation: str, budget: float, told: Callable[[str], None]) -> list[Benchmark]:
+def measure(subject: Any, formulation: str, budget: float, log: Callable[[str], None]) -> list[Benchmark]:
     """A formulation with every method, and all formulations with one method, while the budget, s, lasts.
 
     subject       what sd.bench takes
@@ -54,7 +54,7 @@ def measure(subject: Any, formulation: str, budget: float, told: Callable[[str],
         if not seconds:
             missing.append(label)
             continue
-        told(f"work against error: {label}, {seconds:.0f} s left")
+        log(f"work against error: {label}, {seconds:.0f} s left")
         new = run(own, methods, seconds)
         missing += [f"some runs of {label}"] if new.unfinished else []
         first = new if first is None else merged(first, new)
@@ -67,7 +67,7 @@ def measure(subject: Any, formulation: str, budget: float, told: Callable[[str],
     second: Benchmark | None = None
     seconds = left(first)
     if formulation and seconds:
-        told(f"work against error: formulations, {seconds:.0f} s left")
+        log(f"work against error: formulations, {seconds:.0f} s left")
         second = run(None, OTHERS if compiled else OTHERS_WITHOUT, seconds)
         missing += ["some runs of other formulations"] if second.unfinished else []
     elif formulation:

@@ -41,8 +41,8 @@ class Typeset:
         """One display: the lines, then the legend."""
         lines = list(self.lines)
         if self.legend:
-            told = [rf"{short} = {full}" for short, full in self.legend]
-            rows = [r",\enspace ".join(told[k:k + 4]) for k in range(0, len(told), 4)]
+            parts = [rf"{short} = {full}" for short, full in self.legend]
+            rows = [r",\enspace ".join(parts[k:k + 4]) for k in range(0, len(parts), 4)]
             lines += [r"&\text{with } " * (k == 0) + "&" * (k > 0) + row for k, row in enumerate(rows)]
         if len(lines) == 1:
             return lines[0].replace("&", "", 1)

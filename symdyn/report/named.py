@@ -144,7 +144,7 @@ def _of_derivation(output: Output, symbols: Mapping[Node, sp.Expr], labels: Mapp
 
 
 def _called(label: str) -> str:
-    """What a label of the derivation means: "w3_x" is the angular velocity of link 3, x; "" if it tells nothing."""
+    """What a label of the derivation means: "w3_x" is the angular velocity of link 3, x; "" if it says nothing."""
     found = re.fullmatch(r"([A-Za-z]+?)(\d+)_([xyz]+)", label)
     return f"{_LETTERS[found[1]]} of link {found[2]}, {found[3]}" if found and found[1] in _LETTERS else ""
 

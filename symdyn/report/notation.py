@@ -89,9 +89,9 @@ def entry_latex(name: str, index: tuple[int, ...]) -> str:
     r"""An entry of a quantity, counted from 1: \tilde{M}_{12}; of one that has an index already C_{r,12}."""
     letter = re.sub(r"\\(?:mathbf|boldsymbol)\{(\\?\w+)\}", r"\1", name_latex(name))
     places = [str(i + 1) for i in index]
-    told = ("" if all(len(p) == 1 for p in places) else ",").join(places)
+    names = ("" if all(len(p) == 1 for p in places) else ",").join(places)
     indexed = re.fullmatch(r"(.+)_\{((?:[^{}]|\{[^{}]*\})+)\}", letter)
-    return f"{indexed[1]}_{{{indexed[2]},{told}}}" if indexed else f"{letter}_{{{told}}}"
+    return f"{indexed[1]}_{{{indexed[2]},{names}}}" if indexed else f"{letter}_{{{names}}}"
 
 
 def _frame(name: str) -> str:

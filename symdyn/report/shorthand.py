@@ -18,7 +18,7 @@ class Short(Moving):
 
 
 class Shorthand:
-    """Sines and cosines of the expressions -> symbols; `legend` tells what each stands for."""
+    """Sines and cosines of the expressions -> symbols; `legend` says what each stands for."""
 
     def __init__(self, expressions: Iterable[sp.Basic]) -> None:
         found = set().union(*[e.atoms(sp.sin, sp.cos) for e in expressions])

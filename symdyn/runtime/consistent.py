@@ -42,7 +42,7 @@ _RESTARTS = 8
 
 
 class NotConsistent(ArgumentError):
-    """A start violates the constraints; `found` tells which and by how much, the message also what to do."""
+    """A start violates the constraints; `found` says which and by how much, the message also what to do."""
 
     def __init__(self, found: str, advice: str = "") -> None:
         super().__init__(found, advice)

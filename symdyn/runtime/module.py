@@ -151,7 +151,7 @@ class Module:
         params, inputs   as everywhere, or with an array (n,) for each name that varies, or (n, n_p), (n, n_in)
         out              where the result goes, else a new array
 
-        Rows that cannot be evaluated are NaN, and an EvaluationWarning tells which and why. Values have the same bits as
+        Rows that cannot be evaluated are NaN, and an EvaluationWarning says which and why. Values have the same bits as
         those of `rhs`. Quickest with states entry by entry in memory (x = a.T of an array a (n_x, n)).
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")

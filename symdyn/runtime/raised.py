@@ -1,4 +1,4 @@
-"""Where in the user's functions, or in generated modules, an exception arose; what is the user's is told so."""
+"""Where in the user's functions, or in generated modules, an exception arose; what is the user's is reported as such."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, of_
         raise
     except Exception as error:  # whatever it is, it is the user's
         name = getattr(function, "__name__", "<lambda>")
-        told = f"{what}{'' if name == '<lambda>' else f' ({name})'} raised {_said(error)}"
+        message = f"{what}{'' if name == '<lambda>' else f' ({name})'} raised {_said(error)}"
         frames = _frames(error)[1:]
         if frames:
             file = frames[0][0].f_code.co_filename
             line = next(n for frame, n in reversed(frames) if frame.f_code.co_filename == file)
-            told += f", in line {line} of {Path(file).name}"
-        raise InputRaised(told, t, np.array(x)) from error
+            message += f", in line {line} of {Path(file).name}"
+        raise InputRaised(message, t, np.array(x)) from error
 
 
 class Place(NamedTuple):
@@ -70,8 +70,8 @@ def raise_by_text(error: BaseException) -> None:
     """Raises EvaluationError from what the text of a user's function raised in a generated module; passes over anything else."""
     place = place_of(error)
     if place is not None:
-        told = f"the function {place.signature} raised {_said(error)}, in its line {place.line}: {place.text}"
-        raise EvaluationError(told) from error
+        message = f"the function {place.signature} raised {_said(error)}, in its line {place.line}: {place.text}"
+        raise EvaluationError(message) from error
 
 
 def in_prologue(error: BaseException) -> bool:

@@ -117,13 +117,13 @@ def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
     A, B = linear.A, linear.B[:, [inputs.index(n) for n in driven]]
     for value, shares in _out_of_reach(A, B):
         if value.real > -NEUTRAL * np.linalg.norm(A):
-            raise ArgumentError(f"{owner}: the linear equations are not stabilizable: the mode {_told(shares, linear.states)} "
+            raise ArgumentError(f"{owner}: the linear equations are not stabilizable: the mode {_mode_of(shares, linear.states)} "
                                 f"with the eigenvalue {_number(value)} 1/s does not decay, and no input ({', '.join(driven)}) "
                                 "reaches it; add an input, or hold what it moves (hold=[...] of linearize)")
     root = _root(state_weights)
     for value, shares in _out_of_reach(A.T, root):
         if abs(value.real) <= NEUTRAL * np.linalg.norm(A):
-            raise ArgumentError(f"{owner}: Q gives no weight to the mode {_told(shares, linear.states)} with the eigenvalue "
+            raise ArgumentError(f"{owner}: Q gives no weight to the mode {_mode_of(shares, linear.states)} with the eigenvalue "
                                 f"{_number(value)} 1/s, which neither decays nor grows, so that no gain of least cost brings it "
                                 "back; give it a weight in Q")
     try:
@@ -178,8 +178,8 @@ def _demand_definite(matrix: np.ndarray, names: Sequence[str], what: str, owner:
         wanted = "positive definite" if strictly else "positive semidefinite"
         direction = vectors[:, 0] * scale
         worst = float(direction @ matrix @ direction / (direction @ direction))
-        raise ArgumentError(f"{owner}: {what} is not {wanted}: along {_told(np.abs(direction), names)} it is {worst:.6g}; give "
-                            f"it {'more than 0' if strictly else '0 or more'} there")
+        raise ArgumentError(f"{owner}: {what} is not {wanted}: along {_mode_of(np.abs(direction), names)} it is {worst:.6g}; "
+                            f"give it {'more than 0' if strictly else '0 or more'} there")
 
 
 def _out_of_reach(A: np.ndarray, B: np.ndarray) -> list[tuple[complex, np.ndarray]]:
@@ -214,7 +214,7 @@ def _root(Q: np.ndarray) -> np.ndarray:
     return found
 
 
-def _told(shares: np.ndarray, names: Sequence[str]) -> str:
+def _mode_of(shares: np.ndarray, names: Sequence[str]) -> str:
     """States by their shares of the square, the largest first."""
     squares = shares**2 / max(float(shares @ shares), 1e-300)
     order = [k for k in np.argsort(-squares, kind="stable") if squares[k] >= SHARE]

@@ -18,7 +18,7 @@ from symdyn.statics.terms import Place, null_space
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 # Unknown names that a message lists.
-TOLD = 8
+LISTED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,8 +177,8 @@ def listed(values: Any, known: Iterable[str], what: str, owner: str) -> list[str
         faults.append(f"there is no {shown(name)}" + (f", did you mean {' or '.join(near)}?" if near else
                                                  f"; there are {', '.join(there) or 'none'}"))
     if faults:
-        more = f"; and {len(faults) - TOLD} more" if len(faults) > TOLD else ""
-        raise ArgumentError(f"{owner}: {what}: {'; '.join(faults[:TOLD])}{more}")
+        more = f"; and {len(faults) - LISTED} more" if len(faults) > LISTED else ""
+        raise ArgumentError(f"{owner}: {what}: {'; '.join(faults[:LISTED])}{more}")
     return result
 
 

@@ -73,11 +73,11 @@ def gimbal(short: bool) -> Iterator[Row]:
 def _angles(subject: Subject, kind: str, d: float, sol: Any, truth: np.ndarray, usual: int, rtol: float) -> Row:
     called = "ZYX angles and their rates" if kind == "angles" else "ZYX angles, speeds in body axes"
     done = f"{called} past 90 degrees at a distance of {d:g} rad: {sol.n_steps} steps and {sol.n_rejected} rejected"
-    named = any("gimbal lock" in text for text in (sol.message, *sol.told))
+    named = any("gimbal lock" in text for text in (sol.message, *sol.warned))
     origin = "steps times the error one may have times 1 + omega t, over the cosine at the closest, at most by half of the digits"
     if not sol.success:
-        told = named and "t =" in sol.message
-        return Row("gimbal lock", subject.name, f"{done}: {sol.message}", None, None, "", DEGRADE if told
+        warned = named and "t =" in sol.message
+        return Row("gimbal lock", subject.name, f"{done}: {sol.message}", None, None, "", DEGRADE if warned
                    else FAIL, "angles have no rates there; the run stops and names it" if named else
                    "the run stops without naming gimbal lock")
     found = float(np.abs(_rotations(sol) - truth).max())
@@ -87,7 +87,7 @@ def _angles(subject: Subject, kind: str, d: float, sol: Any, truth: np.ndarray, 
         return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
                    PASS if sol.n_steps < 100 * usual or named else FAIL,
                    "the motion is right" if sol.n_steps < 100 * usual else "the motion is right, at many times the usual steps, "
-                   f"which is {'told' if named else 'not told'}")
+                   f"which is {'warned' if named else 'not warned'}")
     return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
                DEGRADE if named else FAIL, "digits are lost near gimbal lock, and a warning says so" if named else
                "digits are lost near gimbal lock without a word")

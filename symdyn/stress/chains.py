@@ -70,7 +70,7 @@ def chaos(short: bool) -> Iterator[Row]:
         share = float((error[::10] / (steps * local * most + 1e-300)).max())
         yield within("chaos", subject.name, f"{label}, run at rtol {rtol:g}, {run.n_steps} steps: largest error over what may "
                      "have grown from errors of steps", share, 1.0, "errors the step control allows, summed over steps and "
-                     "magnified as the exact Jacobian tells", "errors grow no faster than they must",
+                     "magnified as the exact Jacobian predicts", "errors grow no faster than they must",
                      "errors grow faster than the motion magnifies")
         # And as fast: once they exist they are magnified.
         k = 10 * (len(error) // 40)

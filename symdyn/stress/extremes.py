@@ -141,8 +141,8 @@ def _short_motion(subject: Subject, heavy: list[int], ratio: float) -> Row:
         demand_motion(other, first)
         return energy_row(other, path(other, float(first.t[-1])), "mass ratios", done)
     except MotionStops as stop:
-        named = "stopped at t =" in stop.told and "state there" in stop.told
-        return Row("mass ratios", subject.name, f"{done}{stop.told}", None, None, "", DEGRADE if named else FAIL,
+        named = "stopped at t =" in stop.message and "state there" in stop.message
+        return Row("mass ratios", subject.name, f"{done}{stop.message}", None, None, "", DEGRADE if named else FAIL,
                    "such masses lead where the description does not reach; it stops with time, state and reason" if named else
                    "the message lacks time, state or reason")
 

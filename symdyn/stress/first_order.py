@@ -1,4 +1,4 @@
-"""First-order bounds of rounding errors: every operation of a tape rounds once, and one reverse pass tells what that does to each
+"""First-order bounds of rounding errors: every operation of a tape rounds once, and one reverse pass gives what that does to each
 result.
 
 A result y of operations v_i = f_i(...), each computed as v_i (1 + d_i) with |d_i| <= k_i eps, is off by sum_i (dy/dv_i) v_i d_i

@@ -17,7 +17,7 @@ PASS, DEGRADE, FAIL = "pass", "degrade", "fail"
 LEGEND = {
     PASS: "the figure is within its bound, or what must happen happens",
     DEGRADE: "the run stops early and names why, or digits are lost where the problem itself or a known limit takes them; the "
-             "row tells which, and what to do",
+             "row says which, and what to do",
     FAIL: "anything else",
 }
 _WIDTH = 118
@@ -26,11 +26,11 @@ STILL = "the motion stands still"
 
 
 class NotApplicable(Exception):
-    """A check has nothing to look at here; the message tells why."""
+    """A check has nothing to look at here; the message says why."""
 
 
 class NoUsualMotion(NotApplicable):
-    """The usual motion of a mechanism cannot be looked at; done, why: of the row that tells it once."""
+    """The usual motion of a mechanism cannot be looked at; done, why: of the row that says it once."""
 
     def __init__(self, reason: str, done: str, why: str) -> None:
         super().__init__(reason)
@@ -38,12 +38,13 @@ class NoUsualMotion(NotApplicable):
 
 
 class MotionStops(NoUsualMotion):
-    """It stops early; t: when, of its end, s; told: its message."""
+    """It stops early; t: when, of its end, s; message: why."""
 
-    def __init__(self, t: float, end: float, told: str) -> None:
-        super().__init__(f"the usual motion stops early: {told}", f"the usual motion stops at t = {t:.9g} s, before {end:g} s: "
-                         f"{told}", "checks that need the whole of it are left out")
-        self.told = told
+    def __init__(self, t: float, end: float, message: str) -> None:
+        super().__init__(f"the usual motion stops early: {message}",
+                         f"the usual motion stops at t = {t:.9g} s, before {end:g} s: "
+                         f"{message}", "checks that need the whole of it are left out")
+        self.message = message
 
 
 class StandsStill(NoUsualMotion):
@@ -106,7 +107,7 @@ class StressReport:
 
     def table(self) -> str:
         """The rows as text, the numbers at the left; below each what was done, where the bound comes from, and why."""
-        lines = [HEAD, *[told(row) for row in self.rows]]
+        lines = [HEAD, *[described(row) for row in self.rows]]
         lines += [f"left out: {text}" for text in self.left_out]
         wrapped = textwrap.TextWrapper(_WIDTH, subsequent_indent=" " * 10)
         return "\n".join([*lines, *[wrapped.fill(f"{verdict}: {text}") for verdict, text in LEGEND.items()], self.summary()])
@@ -157,7 +158,7 @@ class Interrupted(KeyboardInterrupt):
 HEAD = f"{'verdict':8}{'check':19}{'system':35}{'figure':>10}{'bound':>10}"
 
 
-def told(row: Row) -> str:
+def described(row: Row) -> str:
     """A row as text of several lines."""
     head = f"{row.verdict:8}{row.check:19}{row.system:35}{number(row.figure):>10}{number(row.bound):>10}"
     wrapped = textwrap.TextWrapper(_WIDTH, initial_indent=" " * 8, subsequent_indent=" " * 10)

@@ -139,9 +139,9 @@ def functions(subject: Subject) -> list[str]:
 def rounding(subject: Subject, short: bool) -> Iterator[Row]:
     """Every function at random and adversarial states, by every compiler and backend, against 32 digits.
 
-    Two bounds: what the condition of the problem costs, which tells whether the equations are solved as well as they can be; and,
-    of each result, what rounding every operation once can do, which tells whether the code computes these equations at all, also
-    where the condition tells nothing, next to lost rank.
+    Two bounds: what the condition of the problem costs, which shows whether the equations are solved as well as they can be; and,
+    of each result, what rounding every operation once can do, which shows whether the code computes these equations at all, also
+    where the condition says nothing, next to lost rank.
     """
     names = functions(subject)
     if not names:

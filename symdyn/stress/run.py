@@ -27,7 +27,7 @@ from symdyn.systems import names as catalogue
 
 # In the short form, where the whole catalogue would take too long.
 SHORT = ("cart_pole", "pendulum_absolute")
-# The check of a row that tells why a motion was not looked at.
+# The check of a row that says why a motion was not looked at.
 USUAL = "usual motion"
 
 
@@ -133,7 +133,7 @@ def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
 
 
 def _subject(system: Any) -> str | Subject:
-    """A name, which a process can be given, or what is put under stress; what is wrong with it is told before anything is run."""
+    """A name, which a process can take, or the system under test; its faults are reported before anything is run."""
     if isinstance(system, str):
         named(system)
         return system
@@ -160,7 +160,7 @@ def _chosen(names: str | Sequence[str] | None) -> list[Check]:
 
 
 def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
-    """One check after the other, of a mechanism after its start. What is wrong with its usual motion is told by the first one
+    """One check after the other, of a mechanism after its start. What is wrong with its usual motion is reported by the first one
     that looks at it."""
     for system, names, short in tasks:
         subject = None
@@ -171,11 +171,11 @@ def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
             yield begun, [] if fit else [f"{', '.join(names)}, {subject.name}: it cannot be run"], 0 if fit else len(names)
             if not fit:
                 continue
-        told = False
+        reported = False
         for name in names:
             rows, left_out = _one(subject, name, short)
-            yield [row for row in rows if not (told and row.check == USUAL)], left_out, 1
-            told = told or any(row.check == USUAL for row in rows)
+            yield [row for row in rows if not (reported and row.check == USUAL)], left_out, 1
+            reported = reported or any(row.check == USUAL for row in rows)
 
 
 def _one(subject: Subject | None, name: str, short: bool) -> tuple[list[Row], list[str]]:
@@ -242,7 +242,7 @@ def _held() -> Iterator[None]:
 
 
 def _silent() -> None:
-    """In a process of a pool: an interrupt ends it without a word; the one that started it tells what is to be told."""
+    """In a process of a pool: an interrupt ends it without a word; the one that started it reports."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -80,7 +80,7 @@ def _refused(check: str, what: str, run: Any, words: tuple[str, ...]) -> Row:
 
 
 def _named(check: str, name: str, done: str, sol: Any, words: tuple[str, ...]) -> Row:
-    """The row of a run that stopped: graceful if it tells time, state, and one of the words."""
+    """The row of a run that stopped: graceful if it says time, state, and one of the words."""
     good = "stopped at t =" in sol.message and "state there" in sol.message and any(word in sol.message for word in words)
     return Row(check, name, f"{done}; {sol.message[:300]}", None, None, "", DEGRADE if good else FAIL,
                "it stops with time, state and reason" if good else "the message lacks time, state or reason")

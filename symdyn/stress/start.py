@@ -18,7 +18,7 @@ START = "start"
 
 
 def start(subject: Subject) -> Iterator[Row]:
-    """A row that fails where nothing can be run, with all that was said; one that tells where the start was moved."""
+    """A row that fails where nothing can be run, with all that was said; one that says where the start was moved."""
     try:
         x = subject.start
         subject.module.evaluate("rhs", 0.0, x, subject.params, subject.inputs)

@@ -139,14 +139,14 @@ class Subject:
         return {"q": q, "u": u, "z": z} if len(z) else {"q": q, "u": u}
 
     def run(self, t: Any, x: np.ndarray | None = None, params: Any = None, rtol: float = RTOL, **options: Any) -> Solution:
-        """A motion; warnings are kept in `told` of the solution."""
+        """A motion; warnings are kept in `warned` of the solution."""
         if options.get("method") is None:
             options["method"] = self.method
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             sol = self.module.simulate(t, params=self.params if params is None else params, rtol=rtol,
                                        **self.parts(self.start if x is None else x), **options)
-        sol.told = [str(w.message) for w in caught]  # type: ignore[attr-defined]
+        sol.warned = [str(w.message) for w in caught]  # type: ignore[attr-defined]
         return sol  # type: ignore[no-any-return]
 
     def has(self, name: str) -> bool:

@@ -155,7 +155,7 @@ def _add_lumped_rotor(system: System) -> Body:
 def published_tower_beam() -> Beam:
     """The land-based tower with its published modes, two fore and aft along x and two from side to side along y. They were fitted
     to another model: the first frequencies on land are 3.4 % and 0.9 % above those of the tower's own modes, as
-    `symdyn bench flexible --only land_based` tells."""
+    `symdyn bench flexible --only land_based` shows."""
     data = nrel_5mw_tower.ONSHORE
     directions = [("x", c) for c in data.fore_aft] + [("y", c) for c in data.side_to_side]
     shapes = [Shape(direction, c, name=mode) for (direction, c), mode in zip(directions, TOWER_MODES, strict=True)]

@@ -65,7 +65,7 @@ class Node:
         return self.recorder.pow(self, exponent) if isinstance(exponent, (Node, Number)) else NotImplemented
 
     def __repr__(self) -> str:
-        """The operation with its arguments by name or number: a tape is too long to be told whole."""
+        """The operation with its arguments by name or number: a tape is too long to be reported whole."""
         if self.op == "leaf":
             return f"<{self.args[1]}>"
         listed = ", ".join(a.label if isinstance(a, Node) else repr(a) for a in self.args)

@@ -53,7 +53,7 @@ class Recorder:
     # -- leaves, names, sections
 
     def leaf(self, name: str, mask: int) -> Node:
-        """An input of the tape; mask tells its kind (node.COORDINATE, ...)."""
+        """An input of the tape; mask says its kind (node.COORDINATE, ...)."""
         return self._make("leaf", (mask, name), mask)
 
     def name(self, name: str, value: Any, axes: bool = False) -> Any:
@@ -84,7 +84,7 @@ class Recorder:
         return self._section
 
     def positive(self, node: Any, reason: str) -> Any:
-        """The value, which must be positive when it is computed; reason tells what it means if not."""
+        """The value, which must be positive when it is computed; reason says what it means if not."""
         if isinstance(node, Node):
             if node.op == "neg":  # what is computed, and divided by, is the value without its sign
                 return self.guard(node, node, reason)
@@ -92,7 +92,7 @@ class Recorder:
         return node
 
     def guard(self, value: Any, margin: Any, reason: str) -> Any:
-        """A value that may be used only where the margin is positive; where it is not, the code stops and tells the reason."""
+        """A value that may be used only where the margin is positive; where it is not, the code stops and says the reason."""
         node = self.guarded(value, margin)
         core = node.args[0] if isinstance(node, Node) and node.op == "neg" else node
         if isinstance(core, Node) and core.op == "guard":

@@ -6,7 +6,7 @@ are depends on the equations alone, not on time or the machine. The others are c
 A check is a function of a Sample that returns its residual, or None where it does not apply; a new formulation joins by
 naming its quantities alike, a new check by one line in CHECKS, or in CONSTRAINED.
 
-A residual above the tolerance of its check has one of three causes, which are told apart by measurement. Digits were lost in an
+A residual above the tolerance of its check has one of three causes, distinguished by measurement. Digits were lost in an
 ill-conditioned state: with more digits the residual falls below the tolerance. Constants of the description were rounded to
 doubles, such as the entries of a rotation matrix: the residual is as large as the residual that a change of each of these
 constants by half a unit of its last place makes, the condition of the identity included. Otherwise the equations are wrong.

@@ -31,11 +31,11 @@ def test_a_word_is_in_help_and_takes_what_its_function_takes(word: str, capsys: 
     takes = inspect.signature(measurement.function()).parameters
     for option in measurement.options:
         assert option.parameter in takes
-        default = re.search(r"\(default: (\d+)\)", option.told["help"])
+        default = re.search(r"\(default: (\d+)\)", option.settings["help"])
         if default and takes[option.parameter].default is not None:
             assert int(default[1]) == takes[option.parameter].default
     needed = {name for name, p in takes.items() if p.default is p.empty}
-    assert needed == {o.parameter for o in measurement.options if o.told.get("nargs") == "+" and not o.flag}
+    assert needed == {o.parameter for o in measurement.options if o.settings.get("nargs") == "+" and not o.flag}
 
 
 @pytest.mark.parametrize("arguments", [["bench"], ["bench", "published"]])

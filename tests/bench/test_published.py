@@ -12,7 +12,7 @@ from symdyn.bench.work import against, resume
 from symdyn.bench.work.against.mechanism import calibrated
 from symdyn.bench.work.against.peer import Failed
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Subject, Yardstick
+from symdyn.bench.work.subject import Subject, Comparison
 from symdyn.errors import SymdynError
 from symdyn.lab import extended
 from symdyn.lab.loop_cases import REFERENCE
@@ -289,12 +289,12 @@ def test_errors_in_other_coordinates_where_a_state_is_known(swinging):
     formulation, exact = swinging["embedding"]
     other, = Subject("swing", {"": systems.get("pendulum")}, 2.0).formulated(["absolute"])[0]
     same = other.module.simulate(np.r_[0.0, TIMES], rtol=1e-12).x[1:]
-    yardstick = Yardstick(Reference("closed form", tuple(TIMES), exact.tolist(), 15.0, ""), formulation, bodies=True)
+    comparison = Comparison(Reference("closed form", tuple(TIMES), exact.tolist(), 15.0, ""), formulation, bodies=True)
     alone = np.full_like(same, np.nan)
     alone[-1] = same[-1]
-    for errors in yardstick.errors(other, alone):
+    for errors in comparison.errors(other, alone):
         assert np.isnan(errors[:-1]).all() and errors[-1] < 1e-9
-    assert np.isnan(yardstick.errors(other, np.full_like(same, np.nan))).all()
+    assert np.isnan(comparison.errors(other, np.full_like(same, np.nan))).all()
 
 
 def test_other_programs_come_before_what_takes_long_to_compile(monkeypatch):

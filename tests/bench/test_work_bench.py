@@ -25,7 +25,7 @@ from symdyn.bench.work.picture import COLORS, styles_of
 from symdyn.bench.work.plan import Job, Walk, spread
 from symdyn.bench.work.record import Reference, Row
 from symdyn.bench.work.reference import agreement
-from symdyn.bench.work.subject import Subject, Yardstick
+from symdyn.bench.work.subject import Subject, Comparison
 from symdyn.bench.work.timing import Timing, one_pass
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
@@ -105,7 +105,7 @@ def test_repeats_are_spread_over_passes_and_the_least_time_counts():
     took = iter([3.0, 1.0, 1.1, 1.2, 9.0, 9.0])
     timing, row = Timing(), Row("a", "b", 1e-6, errors=(0.1, 0.2))
     timing.add(1, lambda repeats: (one_pass(lambda: next(took), repeats), 7), 3)
-    assert timing.told(row, 2).repeats == 1 and timing.told(row, 2).time == 3.0
+    assert timing.reported(row, 2).repeats == 1 and timing.reported(row, 2).time == 3.0
     assert timing.again(row, 3).repeats == 1  # a run of over ENOUGH seconds is not made again
     quick = iter([0.5, 0.1, 0.11, 0.12, 0.1])
     timing = Timing()
@@ -608,10 +608,10 @@ def test_bodies_that_carry_joints_in_absolute_coordinates_do_not_count():
     first, other = subject("slider_crank").formulated(["augmented", "absolute"])[0]
     assert len(other.module.metadata.bodies) == 4 > len(first.module.metadata.bodies) == 2
     x, y = (f.module.simulate(np.r_[0.0, times], rtol=1e-11).x[1:] for f in (first, other))
-    yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 11.0, ""), first, bodies=True)
+    comparison = Comparison(Reference("agreement", tuple(times), x.tolist(), 11.0, ""), first, bodies=True)
     for wrong, bound in ((0.0, 1e-9), (1e-3, 1e-2)):
         y[:, :3] += wrong  # pose of the first rod
-        q, u = yardstick.errors(other, y)
+        q, u = comparison.errors(other, y)
         assert (q <= bound).all() and (q >= 0.1 * wrong).all() and (u <= bound).all()
 
 

@@ -12,7 +12,7 @@ from symdyn.bench.work.cases import CASES, file_name, of_system, subject
 from symdyn.bench.work.converged import Exact, TooLong, converged, states
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.reference import agreement, default_times, find_reference
-from symdyn.bench.work.subject import Yardstick
+from symdyn.bench.work.subject import Comparison
 from symdyn.errors import CompileError, SymdynError
 from symdyn.lab import extended
 
@@ -31,7 +31,7 @@ def test_closed_forms_hold_in_angles_and_parameters(name, formulation):
     times = [0.03 * about.end, 0.1 * about.end]
     first = about.first()
     reference = Reference("closed form", tuple(times), about.closed(times), 15.9, "", first.coordinates)
-    errors = Yardstick(reference, first).errors(made, made.module.simulate(np.r_[0.0, times], rtol=1e-14).x[1:])
+    errors = Comparison(reference, first).errors(made, made.module.simulate(np.r_[0.0, times], rtol=1e-14).x[1:])
     assert np.max(errors) < 1e-13
 
 
@@ -105,7 +105,7 @@ def test_two_runs_agree_where_digits_would_take_too_long(pendulum, tmp_path, mon
     monkeypatch.setenv("SYMDYN_CACHE_DIR", str(tmp_path))
     about, formulations = pendulum
     told = []
-    reference = find_reference(of_system(formulations[0].system, end=1.0), formulations, seconds=1e-9, told=told.append)
+    reference = find_reference(of_system(formulations[0].system, end=1.0), formulations, seconds=1e-9, log=told.append)
     assert reference.kind == "agreement" and "would take about" in reference.how and "differ by" in reference.how
     assert reference.digits > 11 and told
     assert np.abs(np.array(reference.x) - about.closed(reference.times)).max() < 1e-11
@@ -133,20 +133,20 @@ def test_errors_in_other_coordinates_are_those_of_bodies(pendulum):
     about, (first, absolute) = pendulum
     times = [1.0, 2.0]
     reference = Reference("closed form", tuple(times), about.closed(times), 15.9, "", first.coordinates)
-    yardstick = Yardstick(reference, first)
+    comparison = Comparison(reference, first)
     x = absolute.module.simulate([0.0, *times], rtol=1e-13).x[1:]
-    assert np.max(yardstick.errors(absolute, x)) < 1e-11
+    assert np.max(comparison.errors(absolute, x)) < 1e-11
     x[1, 2] += 1e-3  # rad
-    q, _ = yardstick.errors(absolute, x)
+    q, _ = comparison.errors(absolute, x)
     # Of the origin, at the pivot, and nine entries of R with the norm sqrt(3), two pairs of which turn.
     assert abs(q[1] - 1e-3 * np.sqrt(2 / 3)) < 1e-5 and q[0] < 1e-11
-    everything = Yardstick(reference, first, bodies=True)
+    everything = Comparison(reference, first, bodies=True)
     x = first.module.simulate([0.0, *times], rtol=1e-14).x[1:]
     x[1] += 1e-3, 1e-4  # rad, rad/s
     q, u = everything.errors(first, x)
     size = np.abs(np.array(reference.x)[:, 1]).max()  # of the rate; velocities are (l, 1) times it
     assert abs(q[1] - 1e-3 * np.sqrt(2 / 3)) < 1e-5 and abs(u[1] - 1e-4 / size) < abs(reference.x[1][1]) / size * 1e-3
-    assert np.isnan(yardstick.errors(first, reference.x[:1] * np.ones((1, 2)))[0][1])  # it did not get there
+    assert np.isnan(comparison.errors(first, reference.x[:1] * np.ones((1, 2)))[0][1])  # it did not get there
 
 
 def test_every_stored_reference_is_of_the_list():
@@ -174,7 +174,7 @@ def test_stored_references_are_of_the_mechanisms_as_they_are(name):
     found = store.find(name, first, default_times(about))
     assert found is not None and found.digits == data["digits"]
     tight = first.module.simulate(np.r_[0.0, found.times[:2]], rtol=1e-13).x[1:]
-    assert np.nanmax(Yardstick(found, first).errors(first, tight)) < 1e-9
+    assert np.nanmax(Comparison(found, first).errors(first, tight)) < 1e-9
 
 
 def user_function(tmp_path, body, line):
@@ -198,7 +198,7 @@ def test_what_a_compiler_says_is_told_once(tmp_path):
     told = []
     about = of_system(user_function(tmp_path, "-q", "nonsense"), 1.0)
     with pytest.raises(CompileError, match="nonsense") as caught:
-        find_reference(about, [about.first()], told=told.append)
+        find_reference(about, [about.first()], log=told.append)
     assert str(caught.value).count("Output:") == 1 and "reference" not in str(caught.value)
     assert not any("Output" in text or "nonsense" in text for text in told)
 

@@ -218,7 +218,7 @@ def test_independent_columns_are_the_first() -> None:
 def test_doubtful_columns_are_refused() -> None:
     A = np.eye(4)[:, :3].copy()
     A[:, 2] = A[:, 0] + [0, 0, 0, 3e-8]
-    with pytest.raises(SymdynError, match="whether c can be told from the parameters before it is not clear in double precision"):
+    with pytest.raises(SymdynError, match="whether c can be distinguished from the parameters before it is unclear in double"):
         independent(A, "abc")
 
 

@@ -76,7 +76,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
         patch.setattr(full_condition, "STATES", 201)
         patch.setattr(full_pictures, "mechanism", lambda sol: embedded.mechanism(sol, [("start", 0.0)])[:1])
         patch.setattr(full, "stress", lambda subject, short: stress(subject, short, checks=["condition", "energy", "inputs"]))
-        path = full_report("pendulum", tmp_path_factory.mktemp("full") / "new" / "page.html", budget=60, told=told.append)
+        path = full_report("pendulum", tmp_path_factory.mktemp("full") / "new" / "page.html", budget=60, log=told.append)
     return path, told
 
 
@@ -90,7 +90,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of text alone."""
     monkeypatch.setattr(full, "stress", lambda subject, short: StressReport())
     monkeypatch.setattr(full, "_show_condition", lambda part, subject: part.shown.update(
-        found=SimpleNamespace(told=(), places=(), near=False), curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
+        found=SimpleNamespace(warnings=(), places=(), near=False),
+        curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
     monkeypatch.setattr(full_work, "measure", lambda *arguments: None)
     monkeypatch.setattr(full_work, "shown", lambda benchmark: {"parts": [], "text": "a table", "note": ""})
 
@@ -239,7 +240,7 @@ def test_a_part_that_fails_is_told_and_loses_nothing(quick: None, tmp_path: Path
     monkeypatch.setattr(full, "stress", crash)
     monkeypatch.setattr(full, "_show_condition", crash)
     told: list[str] = []
-    page = full_report("pendulum", tmp_path / "page.html", told=told.append).read_text(encoding="utf-8")
+    page = full_report("pendulum", tmp_path / "page.html", log=told.append).read_text(encoding="utf-8")
     assert "This part could not be made: nothing can be measured &lt;here&gt;" in section(page, "work")
     for name in ("stress", "condition"):
         assert re.search(r"could not be made: ZeroDivisionError in test_full_report\.py:\d+: by zero", section(page, name))

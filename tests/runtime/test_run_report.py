@@ -149,7 +149,7 @@ def test_a_run_that_stopped_early_is_told_and_text_is_escaped(module: Module, tm
         stopped = module.simulate((0.0, 1.0), max_steps=2)
     stopped.message = "stopped <early> & told"
     text = stopped.report(tmp_path / "run.htm").read_text(encoding="utf-8")
-    assert '<p class="told bad">Stopped &lt;early&gt; &amp; told</p>' in text
+    assert '<p class="message bad">Stopped &lt;early&gt; &amp; told</p>' in text
     assert "simulate with work=True for the balance" in text
     stopped.t, stopped.x = stopped.t[:0], stopped.x[:0]
     for cached in ("energies", "energy", "inputs", "outputs", "frames"):

@@ -19,7 +19,7 @@ from symdyn.bench.work.plan import Peers, Walk, jobs_of
 from symdyn.bench.work.record import Key, Reference, Row, Skipped
 from symdyn.bench.work.reference import PATIENCE, find_reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
-from symdyn.bench.work.subject import Formulation, Subject, Yardstick
+from symdyn.bench.work.subject import Formulation, Subject, Comparison
 from symdyn.bench.work.timing import PASSES
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
@@ -41,9 +41,9 @@ class Benchmark:
     operations      of one evaluation of the right-hand side, by formulation
     about           machine, compiler, version
     measure         of what errors are: STATE, or BODIES if formulations with different coordinates take part
-    timed           when this run began; command: what tells the command that it belongs to, if that measures several mechanisms
+    timed           when this run began; command: identifies the command it belongs to, if that measures several mechanisms
     notes           what a reader must know of the motion, a sentence each
-    asked           keys of all rows that were asked for; motion: what tells the motion, machine and code, fingerprint also what
+    asked           keys of all rows that were asked for; motion: identifies the motion, machine and code, fingerprint also what
                     errors are of; carried: rows of earlier runs that were not asked for, which a later one may go on with
     """
 
@@ -73,7 +73,7 @@ class Benchmark:
 
     @property
     def still(self) -> bool:
-        """Whether nothing moves: the best of runs without errors tells nothing."""
+        """Whether nothing moves: the best of runs without errors says nothing."""
         return STILL in self.notes
 
     @property
@@ -144,13 +144,13 @@ class Benchmark:
 
 
 def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bool = False,
-        told: Callable[[str], None] = lambda text: None, command: str = "", share: float | None = None,
+        log: Callable[[str], None] = lambda text: None, command: str = "", share: float | None = None,
         begun: float | None = None) -> Benchmark:
     """Measure a mechanism.
 
     folder     rows that an unfinished run left there are kept, and timed again at the end where that is cheap; every row is
                written as soon as it is measured
-    progress   show a bar (needs tqdm);  told: called with what is going on;  command: see Benchmark
+    progress   show a bar (needs tqdm);  log: called with what is going on;  command: see Benchmark
     share      of the budget, s, where it is for several mechanisms;  begun: of time.perf_counter, when it began to count
     Raises SymdynError where nothing can be measured.
     """
@@ -159,13 +159,13 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
     formulations, skipped, first, moved = _formulated(subject, asked)
     budget = math.inf if asked.budget is None else asked.budget if share is None else share
     now = clock.perf_counter()
-    reference = find_reference(subject, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), told,
+    reference = find_reference(subject, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), log,
                                begun + budget * _AT_MOST)
     bodies = _differ(first, formulations)
     motion = _motion(subject, first)
     notes = [*filter(None, [moved]), *[STILL] * stands_still(reference, first), *[NO_COMPILER] * (find_compiler() is None)]
     for note in notes:
-        told(f"{subject.name}: {note}")
+        log(f"{subject.name}: {note}")
     waited = clock.perf_counter() - begun
     result = Benchmark(subject.name, subject.end, [], skipped, reference, asked.at,
                        {f.name: f.operations for f in formulations}, resume.about(), "it was interrupted",
@@ -175,7 +175,7 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
     deadline = begun + budget
     with contextlib.ExitStack() as stack:
         peers = Peers(formulations, asked, subject, deadline, stack)
-        jobs = list(jobs_of(formulations, asked, Yardstick(reference, first, bodies), peers))
+        jobs = list(jobs_of(formulations, asked, Comparison(reference, first, bodies), peers))
         result = replace(result, asked=tuple(job.key for job in jobs))
         kept = result.carried.kept(result.fingerprint, result.asked)
         bar = progress_bar(desc=subject.name, total=len(jobs) * PASSES, unit="run", leave=False) if progress else None
@@ -196,15 +196,15 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
 
 def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None, share: float | None, waited: float) -> str:
     """Why rows are missing; empty if none is. share: of the budget, None: all of it; waited: s before anything could be run."""
-    told = [f"{left} of {total} runs were not made"] if left else []
+    missing = [f"{left} of {total} runs were not made"] if left else []
     if late:
-        told.append(f"{late[0]} was not ready" if len(late) == 1 else f"{len(late)} other programs were not ready")
-    if budget is None or not told:
+        missing.append(f"{late[0]} was not ready" if len(late) == 1 else f"{len(late)} other programs were not ready")
+    if budget is None or not missing:
         return ""
     part = "" if share is None else f", of which this mechanism has {share:.3g} s"
     over = waited > (budget if share is None else share)
     why = f", which derivation, compilation and reference used up: they took {waited:.2g} s" if over else ""
-    return f"{' and '.join(told)} within the budget of {budget:.4g} s{part}{why}"
+    return f"{' and '.join(missing)} within the budget of {budget:.4g} s{part}{why}"
 
 
 def finished(subject: Subject, asked: Asked, folder: Path, command: str) -> Benchmark | None:
@@ -230,15 +230,15 @@ def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list
         raise SymdynError(f"{subject.name}: none of the formulations that were asked for fits:\n  - "
                           + "\n  - ".join(map(str, skipped)))
     first = formulations[0] if asked.formulations is None else subject.first()
-    moved, told = on_constraints(subject, first)
-    if told:
+    moved, note = on_constraints(subject, first)
+    if note:
         names = [f.name for f in formulations if f.name in moved.names]
         skipped += [Skipped(f.name, "", ELSEWHERE) for f in formulations if f.name not in names]
         if not names:
             raise SymdynError(f"{subject.name}: {ELSEWHERE}")
         formulations = moved.formulated(names)[0]
         first = next((f for f in formulations if f.name == first.name), None) or moved.formulated([first.name])[0][0]
-    return formulations, skipped, first, told
+    return formulations, skipped, first, note
 
 
 def _differ(first: Formulation, formulations: Sequence[Formulation]) -> bool:

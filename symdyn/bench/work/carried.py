@@ -20,7 +20,7 @@ DAMAGED = (KeyError, TypeError, ValueError, AttributeError)
 class Carried:
     """Rows of earlier runs.
 
-    rows   by fingerprint, which tells what errors are of and measured by, then by key, each with when it was timed
+    rows   by fingerprint, which identifies what errors are of and measured by, then by key, each with when it was timed
     done   what the latest run was asked for with this run's fingerprint, if it was done with all of it; else nothing
     """
 

@@ -102,7 +102,7 @@ def _save(result: Benchmark, place: Path, results: list[Benchmark], pictures: li
 
 
 def _fingerprint(subjects: Sequence[Subject], asked: Asked) -> str:
-    """What tells commands apart that measure several mechanisms; empty of one."""
+    """What distinguishes commands that measure several mechanisms; empty of one."""
     plain = asdict(replace(asked, budget=None))
     return resume.fingerprint(sorted(one.name for one in subjects), plain, resume.installed(asked.against)) if len(
         subjects) > 1 else ""

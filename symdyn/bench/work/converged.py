@@ -46,10 +46,10 @@ class Exact(Precise):
 
 
 def states(formulation: Formulation, times: Sequence[float], digits: int, until: float = np.inf,
-           told: Callable[[float], None] = lambda t: None, compiled: bool = False) -> list[list[Any]]:
+           log: Callable[[float], None] = lambda t: None, compiled: bool = False) -> list[list[Any]]:
     """The states at these times, numbers of an mpmath context; local errors of 10^-digits.
 
-    until   of time.perf_counter; told: called with the time reached; compiled: see Precise
+    until   of time.perf_counter; log: called with the time reached; compiled: see Precise
     Raises TooLong past it; SymdynError where the equations cannot be evaluated or the steps vanish.
     """
     precise = Exact(formulation, digits + SPARE, compiled)
@@ -62,7 +62,7 @@ def states(formulation: Formulation, times: Sequence[float], digits: int, until:
         return precise("rhs", t, x)
 
     def corrected(t: Any, x: list[Any]) -> list[Any]:
-        told(float(t))
+        log(float(t))
         return precise.projected(t, x)
 
     now, found = context.mpf(0), []
@@ -93,12 +93,12 @@ def expected_seconds(formulation: Formulation, end: float, digits: int = DIGITS)
 
 
 def converged(formulation: Formulation, times: Sequence[float], digits: int = DIGITS, until: float = np.inf,
-              told: Callable[[float], None] = lambda t: None) -> tuple[Reference, list[list[str]]]:
+              log: Callable[[float], None] = lambda t: None) -> tuple[Reference, list[list[str]]]:
     """The motion at two tolerances: the reference, and its states as text of as many digits as both runs agree in.
 
     Raises TooLong past `until` (of time.perf_counter), SymdynError where a run stops.
     """
-    coarse, fine, compiled = quad.twice(lambda n, compiled: states(formulation, times, n, until, told, compiled), digits, MORE)
+    coarse, fine, compiled = quad.twice(lambda n, compiled: states(formulation, times, n, until, log, compiled), digits, MORE)
     differ = distance(coarse, fine, len(formulation.equations.symbols.coordinates), len(formulation.equations.symbols.speeds))
     kept = float(min(digits, -np.log10(max(differ, 1e-40))))
     if kept < 1:

@@ -14,7 +14,7 @@ from symdyn.bench.work.against.apart import Prepared, TooLong
 from symdyn.bench.work.against.peer import Peer, taken_as
 from symdyn.bench.work.methods import AUTO, SERIES
 from symdyn.bench.work.record import NAN, Row
-from symdyn.bench.work.subject import Formulation, Yardstick
+from symdyn.bench.work.subject import Formulation, Comparison
 from symdyn.bench.work.timing import Timing, one_pass, seconds_of
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 
@@ -24,7 +24,7 @@ N_LOOKS = 100
 _ITERATED = 1e-13
 
 
-def own(formulation: Formulation, method: str, tolerance: float | None, step: float | None, yardstick: Yardstick,
+def own(formulation: Formulation, method: str, tolerance: float | None, step: float | None, comparison: Comparison,
         repeats: int, at: Sequence[float] = (), timing: Timing | None = None) -> Row:
     """A row of one of our methods or SciPy's; where a run stops, its message says why.
 
@@ -35,7 +35,7 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
     given: dict[str, Any] = {"method": method, "rtol": tolerance or _ITERATED}
     if step is not None:
         given |= {"first_step": step, "max_step": step}
-    end = float(yardstick.times[-1])
+    end = float(comparison.times[-1])
     timing = timing or Timing()
 
     def run(until: float, wanted: int) -> tuple[list[float], int]:
@@ -53,29 +53,29 @@ def own(formulation: Formulation, method: str, tolerance: float | None, step: fl
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # it is in the row
         try:
-            sol = formulation.module.simulate(_looks(yardstick.times), **given)
+            sol = formulation.module.simulate(_looks(comparison.times), **given)
             if sol.success:
                 for t in dict.fromkeys((*at, end)):
-                    timing.add(_index(yardstick, t), lambda wanted, t=t: run(t, wanted), repeats)  # type: ignore[misc]
+                    timing.add(_index(comparison, t), lambda wanted, t=t: run(t, wanted), repeats)  # type: ignore[misc]
             energy = _energy_error(formulation, sol, given)
         except ArgumentError:
             raise
         except SymdynError as error:
             return Row(*row.key, message=str(error))
-    places = np.searchsorted(sol.t, yardstick.times[yardstick.times <= sol.t[-1]]) if sol.success else np.zeros(0, dtype=int)
-    q, u = yardstick.errors(formulation, sol.x[places])
+    places = np.searchsorted(sol.t, comparison.times[comparison.times <= sol.t[-1]]) if sol.success else np.zeros(0, dtype=int)
+    q, u = comparison.errors(formulation, sol.x[places])
     worse = np.fmax(q, u)
     row = Row(*row.key, evaluations=sol.nfev, steps=sol.n_steps, error=float(worse[-1]), error_q=float(q[-1]),
               error_u=float(u[-1]), errors=tuple(worse.tolist()), energy_error=energy,
               constraint_error=_constraint_error(formulation, sol), message="" if sol.success else sol.message)
-    row = timing.told(row, len(yardstick.times)) if sol.success else row
+    row = timing.reported(row, len(comparison.times)) if sol.success else row
     if method == AUTO:
         row = replace(row, chosen=sol.method, why=sol.why)
     return row if SERIES in (row.method, row.chosen) else replace(row, operations=row.evaluations * formulation.operations)
 
 
 def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequence[float], tolerance: float,
-             yardstick: Yardstick, repeats: int, timing: Timing | None = None) -> Row:
+             comparison: Comparison, repeats: int, timing: Timing | None = None) -> Row:
     """A row of another program.
 
     ready   it, prepared to run the motion until each of the times `ends`, the last of which is the motion's
@@ -83,7 +83,7 @@ def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequen
     Raises TooLong.
     """
     row = Row(taken_as(peer, formulation.name), peer.name, tolerance, None)
-    errors = np.full((2, len(yardstick.times)), NAN)
+    errors = np.full((2, len(comparison.times)), NAN)
     timing = timing or Timing()
     try:
         for place, t in enumerate(ends):
@@ -94,25 +94,25 @@ def peer_row(peer: Peer, formulation: Formulation, ready: Prepared, ends: Sequen
                 states[:] = [x]
                 return seconds, evaluations
 
-            index = _index(yardstick, t)
+            index = _index(comparison, t)
             timing.add(index, one, repeats)
             alone = np.full((index + 1, len(states[0])), NAN)
             alone[index] = states[0]
-            for k, part in enumerate(yardstick.errors(formulation, alone)):
+            for k, part in enumerate(comparison.errors(formulation, alone)):
                 errors[k, index] = part[index]
     except TooLong:
         raise
-    except Exception as error:  # whatever another program raises is told as its own
+    except Exception as error:  # whatever another program raises is reported as its own
         return Row(*row.key, peer=True, message=str(error) or type(error).__name__)
     worse = np.fmax(*errors)
     row = Row(*row.key, error=float(worse[-1]), error_q=float(errors[0, -1]), error_u=float(errors[1, -1]),
               errors=tuple(worse.tolist()), peer=True,
               message="" if np.isfinite(worse[-1]) else "the state at the end is not finite")
-    return timing.told(row, len(yardstick.times))
+    return timing.reported(row, len(comparison.times))
 
 
-def _index(yardstick: Yardstick, t: float) -> int:
-    return next(k for k, known in enumerate(yardstick.times) if math.isclose(known, t, rel_tol=1e-12))
+def _index(comparison: Comparison, t: float) -> int:
+    return next(k for k, known in enumerate(comparison.times) if math.isclose(known, t, rel_tol=1e-12))
 
 
 def _looks(times: np.ndarray) -> np.ndarray:

@@ -133,7 +133,7 @@ def _legend(figure: Any, rows: Sequence[Row], styles: dict[str, Any]) -> None:
     if others:
         silent = {name for name in others if not any(r.evaluations for r in rows if r.line == name)}
         handles += [entry("other programs:", linestyle="none"), *[
-            entry(f"{name} (tells no evaluations)" if name in silent else name, **styles[name]) for name in others]]
+            entry(f"{name} (reports no evaluations)" if name in silent else name, **styles[name]) for name in others]]
     figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9, handlelength=3.2)
 
 

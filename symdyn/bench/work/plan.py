@@ -14,7 +14,7 @@ from symdyn.bench.work.against.peer import Peer, taken_as
 from symdyn.bench.work.asked import Asked
 from symdyn.bench.work.measure import own, peer_row
 from symdyn.bench.work.record import Key, Row, Skipped
-from symdyn.bench.work.subject import Formulation, Subject, Yardstick
+from symdyn.bench.work.subject import Formulation, Subject, Comparison
 from symdyn.bench.work.timing import PASSES, Timing
 from symdyn.errors import ArgumentError, SymdynError
 
@@ -183,7 +183,7 @@ class Peers:
             yield peer, least, ready
 
 
-def jobs_of(formulations: Sequence[Formulation], asked: Asked, yardstick: Yardstick, peers: Peers) -> Iterator[Job]:
+def jobs_of(formulations: Sequence[Formulation], asked: Asked, comparison: Comparison, peers: Peers) -> Iterator[Job]:
     """All rows; a coarse grid of tolerances first, so that a short budget shows the whole range, and at each of them all
     formulations and methods one after the other, so that they see the machine alike."""
     lines = [(f, m) for f in formulations for m in asked.methods]
@@ -192,17 +192,17 @@ def jobs_of(formulations: Sequence[Formulation], asked: Asked, yardstick: Yardst
         for f, m in lines:
             yield Job((f.name, m, tolerance, None),
                        lambda timing, f=f, m=m, tolerance=tolerance: own(  # type: ignore[misc]
-                           f, m, tolerance, None, yardstick, asked.repeats, asked.at, timing))
+                           f, m, tolerance, None, comparison, asked.repeats, asked.at, timing))
         for peer, f, ready in compared:
             yield Job((taken_as(peer, f.name), peer.name, tolerance, None),
                        lambda timing, peer=peer, f=f, ready=ready, tolerance=tolerance: peer_row(  # type: ignore[misc]
-                           peer, f, ready, peers.ends, tolerance, yardstick, asked.repeats, timing), True)
+                           peer, f, ready, peers.ends, tolerance, comparison, asked.repeats, timing), True)
     for step in spread(asked.steps or ()):
         for f, m in lines:
             if methods.takes_steps(m):
                 yield Job((f.name, m, None, step),
                            lambda timing, f=f, m=m, step=step: own(  # type: ignore[misc]
-                               f, m, None, step, yardstick, asked.repeats, asked.at, timing))
+                               f, m, None, step, comparison, asked.repeats, asked.at, timing))
 
 
 def spread(values: Sequence[float]) -> list[float]:

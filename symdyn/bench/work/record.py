@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 NAN = math.nan
-# What tells rows apart: formulation, method, tolerance, step.
+# What distinguishes rows: formulation, method, tolerance, step.
 Key = tuple[str, str, float | None, float | None]
-# A median this many times the least time tells of other work on the machine.
+# A median this many times the least time shows other work on the machine.
 DISTURBED = 1.25
 # Types of figures -> what they may be in a file.
 _PLAIN: dict[str, tuple[type, ...]] = {"str": (str,), "int": (int,), "bool": (bool,), "float": (int, float),
@@ -27,7 +27,7 @@ class Row:
     evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not tell
     operations            evaluations times the operations of the right-hand side's tape; 0 of peers, and of taylor, whose
                           evaluations are orders of series
-    error                 at the end, norm-wise relative: the larger of error_q and error_u (see `subject.Yardstick`)
+    error                 at the end, norm-wise relative: the larger of error_q and error_u (see `subject.Comparison`)
     error_q, error_u      of coordinates and of speeds, or of poses and velocities of all bodies
     errors                of the state at each time of the reference; worst: the largest of them
     until                 time inside the integrator, s, and evaluations of runs that end at each time of the reference; not
@@ -66,7 +66,7 @@ class Row:
 
     @property
     def key(self) -> Key:
-        """What tells rows apart."""
+        """What distinguishes rows."""
         return self.formulation, self.method, self.tolerance, self.step
 
     @property

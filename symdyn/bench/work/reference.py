@@ -13,7 +13,7 @@ import numpy as np
 from symdyn.bench.work import store
 from symdyn.bench.work.converged import converged, expected_seconds
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Formulation, Subject, Yardstick
+from symdyn.bench.work.subject import Formulation, Subject, Comparison
 from symdyn.errors import CompileError, SimulationWarning, SymdynError
 
 # Seconds that a run with more digits may take where no budget is given.
@@ -24,8 +24,8 @@ N_TIMES = 10
 _TIGHT = (1e-12, 1e-13, 1e-14)
 _METHODS = ("dop853", "Radau", "DOP853")
 _SECONDS_OF_SCIPY = 20.0
-# Characters of a reason that are told on the way; where there is no reference, all of it is told, once.
-_TOLD = 160
+# Characters of a reason that are reported on the way; where there is no reference, all of it is reported, once.
+_SHOWN = 160
 
 
 def default_times(subject: Subject) -> list[float]:
@@ -35,11 +35,11 @@ def default_times(subject: Subject) -> list[float]:
 
 
 def find_reference(subject: Subject, formulations: Sequence[Formulation], seconds: float = PATIENCE,
-                   told: Callable[[str], None] = lambda text: None, until: float = math.inf) -> Reference:
+                   log: Callable[[str], None] = lambda text: None, until: float = math.inf) -> Reference:
     """The best reference that there is, or that can be made within about so many seconds.
 
     until  of time.perf_counter, after which no run is begun but for the two that must agree
-    told   is called with what is going on
+    log   called with one line at each stage
     Raises SymdynError where nothing gives a reference.
     """
     first, times = formulations[0], default_times(subject)
@@ -54,13 +54,13 @@ def find_reference(subject: Subject, formulations: Sequence[Formulation], second
         if expected > seconds:
             why = f"a run with more digits would take about {expected:.0f} s"
         else:
-            told(f"a reference with more digits is made, about {expected:.0f} s; it is kept")
+            log(f"a reference with more digits is made, about {expected:.0f} s; it is kept")
             reference, text = converged(first, times, until=min(until, clock.perf_counter() + 2 * seconds))
             store.keep(first, reference, text)
             return reference
     except SymdynError as error:
         why = str(error)
-    told(f"{textwrap.shorten(why.splitlines()[0].rstrip('.'), _TOLD)}: taken are the two tightest runs that agree")
+    log(f"{textwrap.shorten(why.splitlines()[0].rstrip('.'), _SHOWN)}: taken are the two tightest runs that agree")
     return agreement(formulations, times, why, until)
 
 
@@ -97,11 +97,11 @@ def agreement(formulations: Sequence[Formulation], times: Sequence[float], why: 
     for k, (formulation, method, rtol, x) in enumerate(runs):
         if formulation.coordinates != first.coordinates:
             continue
-        yardstick = Yardstick(Reference("agreement", tuple(times), x.tolist(), 0.0, ""), formulation)
+        comparison = Comparison(Reference("agreement", tuple(times), x.tolist(), 0.0, ""), formulation)
         for other, other_method, other_rtol, y in runs:
             if (other.coordinates, other_method) == (formulation.coordinates, method):
                 continue  # the same errors of the same steps, however near they are
-            differ = float(np.max(yardstick.errors(other, y)))
+            differ = float(np.max(comparison.errors(other, y)))
             if math.isfinite(differ) and (best is None or differ < best[0]):
                 best = differ, (f"{formulation.name} with {method} at {rtol:g} and {other.name} with {other_method} at "
                                 f"{other_rtol:g} differ by {differ:.1e}"), k

@@ -1,4 +1,4 @@
-"""What tells that results are of the same, those of a run that was done, and whether new ones can be written."""
+"""What shows that results are of the same, those of a run that was done, and whether new ones can be written."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def about() -> dict[str, str]:
 
 
 def now() -> str:
-    """The time of day of this machine, to the minute, which tells runs apart for a reader."""
+    """The time of day of this machine, to the minute, which distinguishes runs for a reader."""
     return clock.strftime("%Y-%m-%d %H:%M")
 
 

@@ -22,8 +22,8 @@ STILL = ("the motion stands still: it ends where it begins, so that errors, ener
 # A motion that nowhere goes farther than this stands still, relative to the largest entry of its start, or to 1 m, rad, m/s or
 # rad/s where that is smaller.
 _NEAR = 1e-12
-# Entries that changed by more than this are told.
-_TOLD = 1e-12
+# Entries that changed by more than this are reported.
+_CHANGED = 1e-12
 # Said of formulations with an orientation other than the first one's.
 ELSEWHERE = ("the initial state violates the constraints, and the nearest one that does not is another motion in these "
              "coordinates; set system.initial to a state that fulfils them")
@@ -47,14 +47,14 @@ def on_constraints(subject: Subject, first: Formulation) -> tuple[Subject, str]:
     symbols = first.equations.symbols
     start = dict(zip((*symbols.coordinates, *symbols.speeds), map(float, found), strict=True))
     changed = [f"{symbol.name} from {before:.6g} to {after:.6g}" for (symbol, after), before in zip(
-        start.items(), map(float, x), strict=False) if abs(after - before) > _TOLD * max(1.0, abs(before))]
-    told = f"the initial state violates the constraints; the motion begins at the nearest one that does not: {', '.join(changed)}"
+        start.items(), map(float, x), strict=False) if abs(after - before) > _CHANGED * max(1.0, abs(before))]
+    note = f"the initial state violates the constraints; the motion begins at the nearest one that does not: {', '.join(changed)}"
     if subject.given is not None:
-        return replace(subject, given=_beginning(subject.given, start)), told
+        return replace(subject, given=_beginning(subject.given, start)), note
     kind, system = next(iter(subject.variants.items()))
     moved = copy.copy(system)
     moved.initial = _with(system, start)
-    return replace(subject, variants={kind: moved}), told
+    return replace(subject, variants={kind: moved}), note
 
 
 def _with(system: System, start: Mapping[sp.Symbol, float]) -> dict[Any, float]:

@@ -96,9 +96,9 @@ def _index(times: Sequence[float], t: float) -> int | None:
 
 
 def _cached(formulation: Formulation, times: Sequence[float]) -> Path:
-    told = json.dumps([formulation.equations.name, list(formulation.coordinates), _given(formulation), [float(t) for t in times]])
+    key = json.dumps([formulation.equations.name, list(formulation.coordinates), _given(formulation), [float(t) for t in times]])
     stem = re.sub(r"[^A-Za-z0-9_-]", "_", formulation.equations.name)
-    return cache_dir() / "references" / f"{stem}-{hashlib.sha256(told.encode()).hexdigest()[:16]}.json"
+    return cache_dir() / "references" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.json"
 
 
 def run(names: Sequence[str] = (), digits: int | None = None, file: Path | None = None) -> int:

@@ -83,7 +83,7 @@ class Subject:
 
     @property
     def lacking(self) -> list[str]:
-        """Parameters without a number; none of a description with faults, which are told when it is derived."""
+        """Parameters without a number; none of a description with faults, which are reported when it is derived."""
         try:
             given: list[Any] = [self.given.symbols] if self.given is not None else [s.check() for s in self.variants.values()]
         except SymdynError:
@@ -134,7 +134,7 @@ class Subject:
         return made
 
 
-class Yardstick:
+class Comparison:
     """Errors of motions against a reference, also of those in other coordinates than the reference has.
 
     In the reference's coordinates the errors are |q - q_ref| / s_q and |u - u_ref| / s_u in the Euclidean norm, s the largest

@@ -86,15 +86,15 @@ def best(benchmark: Benchmark, at: float | None) -> Iterator[str]:
         ours, theirs = benchmark.best(error, at, False), benchmark.best(error, at, True) if peers else None
         if ours is None and theirs is None:
             continue
-        line = f"  {error:.0e}  " + _told(ours, index)
+        line = f"  {error:.0e}  " + _shown(ours, index)
         if peers:
-            line = f"{line:72}" + _told(theirs, index)
+            line = f"{line:72}" + _shown(theirs, index)
             if ours is not None and theirs is not None:
                 line += f"   ({theirs.time_at(index) / ours.time_at(index):.2g} times ours)"
         yield line
 
 
-def _told(row: Row | None, index: int | None) -> str:
+def _shown(row: Row | None, index: int | None) -> str:
     if row is None:
         return "none"
     chosen = f" ({row.chosen})" if row.chosen else ""

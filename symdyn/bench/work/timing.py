@@ -14,7 +14,7 @@ from symdyn.bench.work.record import NAN, Row
 # Passes over all rows that the repeats are spread over: the speed of a processor that others use changes within seconds.
 PASSES = 3
 # Seconds after which a run is not repeated any more; short runs are repeated for as long as MUCH s in a pass, but MOST times as
-# often as asked at most: on a machine with other work a median of few of them tells nothing.
+# often as asked at most: on a machine with other work a median of few of them says nothing.
 ENOUGH, MUCH, MOST = 2.0, 0.01, 8
 
 # repeats asked for in all passes together -> s inside the integrator of the runs of one pass, evaluations of the right-hand side
@@ -39,9 +39,9 @@ class Timing:
         for place in self.runs:
             if sum(self.seconds[place]) < ENOUGH:
                 self._repeat(place, repeats)
-        return self.told(row, len(row.errors))
+        return self.reported(row, len(row.errors))
 
-    def told(self, row: Row, n_times: int) -> Row:
+    def reported(self, row: Row, n_times: int) -> Row:
         """The row with what was measured.
 
         n_times   of the reference
@@ -60,7 +60,7 @@ class Timing:
 
 
 def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf) -> list[float]:
-    """What the runs of one pass take, s, each as it tells.
+    """What the runs of one pass take, s, each by its own clock.
 
     repeats    asked for in all passes together;  deadline: of time.perf_counter, after which none is begun
     """
@@ -73,5 +73,5 @@ def one_pass(run: Callable[[], float], repeats: int, deadline: float = math.inf)
 
 
 def seconds_of(solution: Any) -> float:
-    """Inside the integrator, where it tells, else of the whole call."""
+    """Inside the integrator, where it reports it, else of the whole call."""
     return float(solution.seconds if solution.integrator_seconds is None else solution.integrator_seconds)

@@ -74,7 +74,7 @@ def augmented(coordinates: Sequence[sp.Symbol], mass: Matrix, force: Vector, con
     labels = _labels(given, names, len(rows) if hasattr(rows, "__len__") else 0)
     expressions, sound = _taken(given, rows, labels)
     speeds = [c.dot for c in q]
-    # Inputs in constraints are told by constraint_faults.
+    # Inputs in constraints are reported by constraint_faults.
     parts = [Part(c.name, [c.expression], speeds=True, inputs=True) for c in expressions]
     parameters, inputs = given.symbols([Part("mass", list(M), moving=False), Part("force", F, speeds=True, inputs=True), *parts])
     faults += constraint_faults(sound, [*q, *speeds], (), speeds)
@@ -163,7 +163,7 @@ class _Coordinates(Constrained, Motion):
 
     @cached_property
     def length(self) -> Any:
-        """1 m: which of the coordinates are lengths, and how long the mechanism is, is not told."""
+        """1 m: which of the coordinates are lengths, and how long the mechanism is, is not known."""
         return 1
 
     @property

@@ -163,11 +163,11 @@ class ConstrainedTree(Constrained, TreeQuantities):
 def _demand_orientation(model: Model, coordinates: str, orientation: Any) -> None:
     """Raises SymdynError for an orientation that is none, or that nothing takes."""
     if not isinstance(orientation, (EulerAngles, EulerParameters)):
-        raise SymdynError(f"orientation is {shown(orientation)}; it tells how bodies turn in absolute coordinates: pass "
+        raise SymdynError(f"orientation is {shown(orientation)}; it describes how bodies turn in absolute coordinates: pass "
                           "sd.EulerParameters() or sd.EulerAngles('ZYX')")
     unused = "coordinates are 'relative'" if coordinates != "absolute" else "the system is planar" if model.planar else ""
     if unused:
-        raise SymdynError(f"orientation {type(orientation).__name__} is given, but {unused}: it tells how bodies turn in "
+        raise SymdynError(f"orientation {type(orientation).__name__} is given, but {unused}: it describes how bodies turn in "
                           "absolute coordinates in space; leave it out" +
                           (", or pass coordinates='absolute'" if coordinates != "absolute" and not model.planar else ""))
 

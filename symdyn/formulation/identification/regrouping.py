@@ -1,7 +1,7 @@
 """How a dependent column of a regressor follows from independent ones, as expressions of the model's parameters.
 
 That it does is known from numbers; here the factors are found exactly. The equations of motion are linear in u_dot, and
-what they depend on is told by their derivatives by u_dot and u and their value at rest. At states where sines, cosines
+what they depend on follows from their derivatives by u_dot and u and their value at rest. At states where sines, cosines
 and coordinates are short fractions these fold to short expressions of parameters, most of them zero, so that a factor is
 mostly one entry divided by another.
 """
@@ -39,11 +39,11 @@ def factors(recorder: Recorder, columns: np.ndarray, dependent: np.ndarray, para
     """Factors x, on the tape, with columns @ x = dependent at every state.
 
     columns      (n_u, n) of the regressor, independent; dependent (n_u,): a column that they give
-    parameters   numbers for the parameters, to tell what is zero
+    parameters   numbers for the parameters, which decide what is zero
     unit_groups  coordinates that form a unit vector, by name
     Raises SymdynError if they cannot be found.
     """
-    rows = _told_by(recorder, np.column_stack([columns, dependent]))
+    rows = _rows_of(recorder, np.column_stack([columns, dependent]))
     found: dict[tuple[Any, ...], None] = {}
     for count, state in enumerate(_states(rows, unit_groups), start=1):
         at = vector(*substitute(tuple(rows.ravel()), state, recorder)).reshape(rows.shape)
@@ -52,16 +52,16 @@ def factors(recorder: Recorder, columns: np.ndarray, dependent: np.ndarray, para
             result = _Elimination.of(recorder, list(found), parameters).solve()
             if result is not None:
                 return result
-    raise SymdynError(f"a column of the regressor depends on {columns.shape[1]} others, but {_STATES} states did not tell how; "
+    raise SymdynError(f"a column of the regressor depends on {columns.shape[1]} others, but {_STATES} states did not show how; "
                       "describe the joints by plain coordinates rather than by expressions of them")
 
 
-def _told_by(recorder: Recorder, Y: np.ndarray) -> np.ndarray:
-    """Rows that hold all that Y tells: its derivatives by u_dot and by u, and Y itself, all at u = u_dot = 0."""
+def _rows_of(recorder: Recorder, Y: np.ndarray) -> np.ndarray:
+    """Rows that determine Y: its derivatives by u_dot and by u, and Y itself, all at u = u_dot = 0."""
     moving = [n for n in reachable(Y.ravel()) if n.op == "leaf" and n.mask & (SPEED | ACCELERATION)]
     entries: list[Any] = Y.ravel().tolist()
-    told = entries + [e for leaf in moving for e in forward(recorder, entries, {leaf: 1})]
-    return vector(*substitute(tuple(told), dict.fromkeys(moving, 0), recorder)).reshape(-1, Y.shape[1])
+    values = entries + [e for leaf in moving for e in forward(recorder, entries, {leaf: 1})]
+    return vector(*substitute(tuple(values), dict.fromkeys(moving, 0), recorder)).reshape(-1, Y.shape[1])
 
 
 def _states(rows: np.ndarray, unit_groups: Sequence[Sequence[str]]) -> Iterator[dict[Node, Any]]:

@@ -26,7 +26,7 @@ from symdyn.tape.differentiate import forward
 from symdyn.tape.node import SEED, Node, exact, is_zero
 from symdyn.tape.tape import reachable
 
-# Deflection of a beam's free end, by its length, that is told to be far.
+# Deflection of a beam's free end, by its length, that counts as large.
 FAR = 0.2
 
 

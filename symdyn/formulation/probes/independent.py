@@ -56,7 +56,7 @@ def independent(A: np.ndarray, names: Sequence[str]) -> Independent:
             rest = rest - Q @ (Q.T @ rest)
         left = float(np.linalg.norm(rest))
         if TOLERANCE / GAP < left < TOLERANCE * GAP:
-            raise SymdynError(f"whether {names[column]} can be told from the parameters before it is not clear in double "
+            raise SymdynError(f"whether {names[column]} can be distinguished from the parameters before it is unclear in double "
                               f"precision: {left:.1e} of its column of the regressor is left, independent is more than "
                               f"{TOLERANCE * GAP:.0e}, dependent less than {TOLERANCE / GAP:.0e}")
         if left > TOLERANCE:

@@ -1,4 +1,4 @@
-"""Speeds that move nothing, told before any code is made: the mass matrix or a pivot is singular at every state."""
+"""Speeds that move nothing, reported before any code is made: the mass matrix or a pivot is singular at every state."""
 
 from __future__ import annotations
 

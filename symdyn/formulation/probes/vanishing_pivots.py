@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # Positions that are compared; squares of velocities that differ by less of them are the same, those below ZERO^2 are none.
 POSITIONS, ALIKE, ZERO = 3, 1e-9, 1e-11
-# Digits by which inertias are told from none, in squares.
+# Digits by which inertias are distinguished from none, in squares.
 DIGITS, NOTHING = 40, 1e-50
 
 

@@ -39,7 +39,7 @@ class Page:
     Of all: coriolis (n_u, n_u), gravity_load (n_u,), momentum and momentum_G (6,), center_of_mass (3,); see their modules.
     page_inverse_dynamics and page_accelerations (n_u,): what these recursions give for inverse_dynamics and accelerations, which
     code is made from; they are compared in symdyn.verification.
-    `notes` tells what the mechanism does not have, and why.
+    `notes` says what the mechanism does not have, and why.
     """
 
     def __init__(self, tree: Tree, loads: Loads) -> None:

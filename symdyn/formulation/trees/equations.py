@@ -110,7 +110,7 @@ def _reach(model: Model) -> dict[sp.Symbol, float]:
 
 
 def _charts(model: Model) -> tuple[tuple[str, str, str, str], ...]:
-    """Joints whose orientation is told by Euler angles of their own; the second angle is what brings gimbal lock."""
+    """Joints whose orientation is described by Euler angles of their own; the second angle is what brings gimbal lock."""
     oriented = [(j, getattr(j, "orientation", None)) for j in model.joints]
     return tuple((j.name, angles.sequence, angles.speeds, j.coordinates[-2].name) for j, angles in oriented
                  if isinstance(angles, EulerAngles) and j.coordinates[-2] in model.coordinates)

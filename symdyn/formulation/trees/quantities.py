@@ -1,4 +1,4 @@
-"""What a tree of links tells whatever the formulation: its equations, J, positions, energy, power, the user's outputs."""
+"""What a tree of links provides whatever the formulation: its equations, J, positions, energy, power, the user's outputs."""
 
 from __future__ import annotations
 

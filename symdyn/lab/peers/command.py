@@ -54,7 +54,7 @@ def _found(kinds: Sequence[tuple[str, Callable[[], Made]]]) -> tuple[list[Made],
 
 
 def _in_one_line(fault: SymdynError) -> str:
-    """A message; of a failed build, which comes with the compiler's output, what tells most."""
+    """A message; of a failed build, which comes with the compiler's output, what says most."""
     first, *rest = str(fault).splitlines()
     complaints = [line for line in rest if "error" in line.lower()]
     return " ".join([first, *complaints[:1], *[line for line in rest if line.startswith("Source kept at")]])

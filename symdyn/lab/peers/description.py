@@ -1,4 +1,4 @@
-"""A mechanism as plain text for the peers; `model.hpp` reads it and tells its format."""
+"""A mechanism as plain text for the peers; `model.hpp` reads it and documents its format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _AXES = {(1, 0, 0): "X", (0, 1, 0): "Y", (0, 0, 1): "Z"}
 
 @dataclass(frozen=True)
 class Description:
-    """What the peers are told of a mechanism.
+    """What the peers know of a mechanism.
 
     text      gravity, joints and bodies; p0, p1, ... stand for the parameters
     values    number of each parameter

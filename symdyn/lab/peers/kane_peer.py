@@ -33,7 +33,7 @@ void loop(long n, long fed, double *q, const double *u, const double *p, double 
 
 
 class KanePeer:
-    """The generator. Raises CompilerNotFound, whose message tells what to install."""
+    """The generator. Raises CompilerNotFound, whose message says what to install."""
 
     def __init__(self) -> None:
         self.compiler = c_compiler()

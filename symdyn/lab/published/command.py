@@ -73,11 +73,11 @@ class Result:
                 if known and line.within(bound) is None:
                     run = max(known, key=lambda run: run.tolerance)
                     yield f"{line.program:26}{line.form:14}{bound:>8.0e}{run.tolerance:>9.0e}{'not timed':>11}{run.error:>10.1e}"
-            yield self._told(bound)
+            yield self._sentence(bound)
         for name, why in self.left_out.items():
             yield f"  left out: {name}: {textwrap.shorten(why, 170)}"
 
-    def _told(self, bound: float) -> str:
+    def _sentence(self, bound: float) -> str:
         if self.unfinished:
             return f"  within {bound:g}: not decided, the budget was used up before all programs were looked at and timed"
         ours, theirs = self.least(bound, False), self.least(bound, True)
@@ -101,12 +101,12 @@ class Result:
 
 
 def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, deadline: float = math.inf,
-            told: Callable[[str], None] = lambda text: None, before: Mapping[str, Any] | None = None,
+            log: Callable[[str], None] = lambda text: None, before: Mapping[str, Any] | None = None,
             store: Callable[[Result], None] = lambda result: None, progress: bool = False) -> Result:
     """One mechanism.
 
     peers      default: all;  deadline: of time.perf_counter, after which nothing new is tried
-    told       called with what is going on
+    log       called with one line at each stage
     before     the record of a run that was stopped: the tolerances that it found are timed again, not looked for
     store      called with what is known after every line;  progress: show a bar (needs tqdm)
     Raises SymdynError where there is no reference.
@@ -114,13 +114,13 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
     peers = against.names() if peers is None else peers
     found = {(line["program"], line["formulation"]): line for line in (before or {}).get("lines", ()) if line["searched"]}
     with warnings.catch_warnings(), contextlib.ExitStack() as stack:
-        warnings.simplefilter("ignore", SimulationWarning)  # where a run stops it is told
+        warnings.simplefilter("ignore", SimulationWarning)  # where a run stops it is reported
         step: Callable[[], Any] = lambda: None
         if progress:
             bar = progress_bar(desc=case.name, total=len(case.systems) * len(case.methods) + PASSES + sum(
                 len(against.peers(name)) for name in peers), unit="step", leave=False)
             stack.callback(bar.close)
-            step, told = bar.update, lambda text: bar.write(f"symdyn: {text}", file=sys.stderr)
+            step, log = bar.update, lambda text: bar.write(f"symdyn: {text}", file=sys.stderr)
         formulations = case.formulations()
         exact, how = case.reference(formulations[0])
         lines, left_out, late = list[Line](), dict[str, str](), list[str]()
@@ -133,8 +133,8 @@ def measure(case: Case, peers: Sequence[str] | None = None, repeats: int = 5, de
             else:
                 search(line, case, exact, until)
                 if line.runs:
-                    told(f"{case.name}: {line.program}, {line.formulation.name}: {len(line.runs)} tolerances, "
-                         f"{clock.perf_counter() - begun:.1f} s")
+                    log(f"{case.name}: {line.program}, {line.formulation.name}: {len(line.runs)} tolerances, "
+                        f"{clock.perf_counter() - begun:.1f} s")
             lines.append(line)
             store(Result(case, how, lines, left_out, True))
             step()
@@ -240,8 +240,8 @@ def _sound(record: Mapping[str, Any]) -> bool:
         for line in record["lines"]:
             for run in line["runs"]:
                 math.isfinite(Run.of(run).tolerance + Run.of(run).error)
-        told = [record["text"], record["timed"], record["fingerprint"]]
-        told += [line[k] for line in record["lines"] for k in ("program", "formulation", "why")]
-        return (all(isinstance(text, str) for text in told) and isinstance(record["missed"], list)
+        texts = [record["text"], record["timed"], record["fingerprint"]]
+        texts += [line[k] for line in record["lines"] for k in ("program", "formulation", "why")]
+        return (all(isinstance(text, str) for text in texts) and isinstance(record["missed"], list)
                 and isinstance(record["unfinished"], bool) and all("searched" in line for line in record["lines"]))
     return False

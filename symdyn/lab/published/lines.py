@@ -57,7 +57,7 @@ class Line:
     look       tolerance -> s inside the integrator, states at the case's times
     timed      tolerance, repeats, deadline -> s inside the integrator of the runs of one pass
     searched   all tolerances that are of interest were tried: a later run need not
-    taken      what it is told to run, if that is no formulation of ours
+    taken      what it is asked to run, if that is no formulation of ours
     """
 
     program: str
@@ -72,12 +72,12 @@ class Line:
 
     @property
     def form(self) -> str:
-        """What it is told to run."""
+        """What it is asked to run."""
         return self.taken or self.formulation.name
 
     @property
     def key(self) -> tuple[str, str]:
-        """What tells lines apart."""
+        """What distinguishes lines."""
         return self.program, self.formulation.name
 
     def within(self, bound: float) -> Run | None:
@@ -89,8 +89,8 @@ class Line:
         if not self.runs:
             return self.why
         errors = [r.error for r in self.runs if math.isfinite(r.error)]
-        told = f"not within the bounds, its least error is {min(errors):.1e}" if errors else "no run reached the end"
-        return f"{told}; {self.why}" if self.why else told
+        reason = f"not within the bounds, its least error is {min(errors):.1e}" if errors else "no run reached the end"
+        return f"{reason}; {self.why}" if self.why else reason
 
 
 def lines_of(case: Case, formulations: Sequence[Formulation], peers: Sequence[str], left_out: dict[str, str],
@@ -164,7 +164,7 @@ def search(line: Line, case: Case, exact: np.ndarray, deadline: float) -> None:
         try:
             took, states = line.look(tolerance)
             error = case.error(case.history(line.formulation, case.times, states), exact)
-        except Exception as failed:  # whatever another program raises is told as its own
+        except Exception as failed:  # whatever another program raises is reported as its own
             line.why = str(failed) or type(failed).__name__
             whole[0] &= not isinstance(failed, TooLong)
         line.runs.append(Run(tolerance, error))
@@ -208,6 +208,6 @@ def time_all(runs: Sequence[tuple[Line, Run]], repeats: int, deadline: float = m
                 continue
             try:
                 run.seconds += line.timed(run.tolerance, repeats, deadline)
-            except Exception as failed:  # whatever another program raises is told as its own
+            except Exception as failed:  # whatever another program raises is reported as its own
                 line.why = str(failed) or type(failed).__name__
         step()

@@ -21,7 +21,7 @@ class Listed(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The file's name without ending, with its folder where that tells more."""
+        """The file's name without ending, with its folder where that says more."""
         stem = Path(self.file).stem
         return Path(self.file).parts[0].removesuffix("_description") if stem == "anymal" else stem
 

@@ -42,7 +42,7 @@ PATIENCE = 4
 # The method of motions that are integrated at once.
 METHOD = "dop853"
 NO_VECTORS = "the C compiler has no vectors"
-TOLD = 3
+LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,10 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     varying = inputs if by_time else None
     solution = _one_by_one(module, asked, varying, given, note, options) if note else _on_vectors(module, asked)
     if solution.messages:
-        told = [f"{k}: {message}" for k, message in list(solution.messages.items())[:TOLD]]
-        more = f"; and {len(solution.messages) - TOLD} more, see `messages`" if len(solution.messages) > TOLD else ""
-        warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(told)}{more}", SimulationWarning, stacklevel=3)
+        examples = [f"{k}: {message}" for k, message in list(solution.messages.items())[:LISTED]]
+        more = f"; and {len(solution.messages) - LISTED} more, see `messages`" if len(solution.messages) > LISTED else ""
+        warnings.warn(f"{len(solution.messages)} of {n} motions failed: {'; '.join(examples)}{more}", SimulationWarning,
+                      stacklevel=3)
     near = locked(module, times, solution.x, asked.rtol) if metadata.charts else []
     for sentence in outside(module, times, solution.x, asked.params, given) + near:
         warnings.warn(sentence, SimulationWarning, stacklevel=3)
@@ -274,8 +275,8 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
         except SimulationInterrupted:
             for late in range(k, n):
                 messages[late] = f"{module.name}: not finished"
-            told = f"{module.name}: interrupted after {int(success.sum())} of {n} motions"
-            raise SimulationInterrupted(solution(), told) from None
+            message = f"{module.name}: interrupted after {int(success.sum())} of {n} motions"
+            raise SimulationInterrupted(solution(), message) from None
         except SymdynError as error:
             messages[k] = str(error)
             continue
@@ -292,6 +293,6 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
         if not done.success:
             messages[k] = done.message
     if doubts:
-        more = f"; and {len(doubts) - TOLD} more" if len(doubts) > TOLD else ""
-        warnings.warn(f"of {n} motions {'; '.join(doubts[:TOLD])}{more}", SimulationWarning, stacklevel=4)
+        more = f"; and {len(doubts) - LISTED} more" if len(doubts) > LISTED else ""
+        warnings.warn(f"of {n} motions {'; '.join(doubts[:LISTED])}{more}", SimulationWarning, stacklevel=4)
     return solution()

@@ -63,6 +63,6 @@ class BatchSolution:
         return len(self.x)
 
     def __repr__(self) -> str:
-        told = f"; {self.note}" if self.note else ""
+        remark = f"; {self.note}" if self.note else ""
         return (f"<BatchSolution {self.metadata.name}: {len(self)} trajectories, {int(self.success.sum())} of them to the "
-                f"end, {self.width} at once{told}>")
+                f"end, {self.width} at once{remark}>")

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 UNIT = "rhs_batch"
-# Of so many rows a warning tells the numbers.
-TOLD = 8
+# Of so many rows a warning says the numbers.
+LISTED = 8
 
 
 class Table(ctypes.Structure):
@@ -78,11 +78,11 @@ def rhs_batch(module: Module, t: Any, x: Any, params: Any = None, inputs: Any = 
         arrays = {what: a.copy() if np.may_share_memory(a, out) else a for what, a in arrays.items()}
     reasons = (_on_vectors if module.backend == "c" else _broadcast)(module, n, arrays, xd)
     if reasons:
-        told = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)])}"
-                for k, why in list(reasons.items())[:TOLD]]
-        more = f"; and {len(reasons) - TOLD} more" if len(reasons) > TOLD else ""
+        rows = [f"row {k}: {why}{_given_not_finite(module, states[min(k, len(states) - 1)])}"
+                for k, why in list(reasons.items())[:LISTED]]
+        more = f"; and {len(reasons) - LISTED} more" if len(reasons) > LISTED else ""
         warnings.warn(f"{module.name}: rhs cannot be evaluated in {len(reasons)} of {n} rows, which are NaN: "
-                      f"{'; '.join(told)}{more}", EvaluationWarning, stacklevel=3)
+                      f"{'; '.join(rows)}{more}", EvaluationWarning, stacklevel=3)
     return xd
 
 

@@ -36,15 +36,15 @@ def outside(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, in
         found = np.full((len(states), len(about)), np.nan)
         found[there] = _rows(module, times[there], states[there], p, given)
         values[group] = found.reshape(*x[group].shape[:2], -1)
-    told = []
+    messages = []
     for (label, least, most, message), column in zip(about, np.moveaxis(values, -1, 0), strict=True):
         low, high = np.fmin.reduce(column, axis=1), np.fmax.reduce(column, axis=1)
         wrong = np.flatnonzero((low < least) | (high > most))
         if len(wrong):
             worst = Watched(label, least, most, float(low[wrong].min()), float(high[wrong].max()), message)
-            told.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, at worst: "
-                        f"{worst.message}")
-    return told
+            messages.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, at worst: "
+                            f"{worst.message}")
+    return messages
 
 
 def _rows(module: Module, t: np.ndarray, x: np.ndarray, params: np.ndarray, inputs: np.ndarray) -> np.ndarray:

@@ -208,7 +208,7 @@ class PythonUnit:
     def broadcast(self, name: str, t: np.ndarray, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """A function that gives rows, at t (n,), x (n, n_x), parameters (n, n_p) and inputs (n, n_in): (n, n_out).
 
-        Raises the module's SingularError, which tells the rows, where single ones cannot be evaluated; ArithmeticError or
+        Raises the module's SingularError, which says the rows, where single ones cannot be evaluated; ArithmeticError or
         ValueError where it is not known which.
         """
         sizes = self.metadata.sizes
@@ -268,7 +268,7 @@ class PythonEvaluator:
                 return self._evaluate(*rows)
             except RowsError as error:
                 why, first = str(error), error.first
-            while first:  # as with C the first row that fails is told; one before it may fail later on
+            while first:  # as with C the first row that fails is reported; one before it may fail later on
                 try:
                     self._evaluate(*[a[:first] for a in rows])
                     break

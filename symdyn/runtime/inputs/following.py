@@ -79,8 +79,8 @@ class Followed:
             raise ArgumentError(f"the motion {self.name} returned {shown(given)} at t = {t:.6g}; needed are three numbers: "
                                 f"value, rate and acceleration{why}")
         if not np.isfinite(values).all():
-            told = ", ".join(f"{what} {value:g}" for what, value in zip(PARTS, values, strict=True) if not np.isfinite(value))
-            raise InputRaised(f"the motion {self.name} has the {told} at t = {t:.6g}", t, x)
+            bad = ", ".join(f"{what} {value:g}" for what, value in zip(PARTS, values, strict=True) if not np.isfinite(value))
+            raise InputRaised(f"the motion {self.name} has the {bad} at t = {t:.6g}", t, x)
         return values
 
 

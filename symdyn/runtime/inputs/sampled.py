@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Instants closer than this part of the shortest period are one.
 ONE_INSTANT = 1e-9
-# A period shorter than this part of the largest time cannot be told from rounding of time.
+# A period shorter than this part of the largest time cannot be distinguished from rounding of time.
 RESOLVED = 1e-11
 
 
@@ -223,5 +223,5 @@ def check_span(samplers: Sequence[Sampler], span: tuple[float, float], owner: st
     for sampler in samplers:
         period, far = sampler.sampled.period, max(abs(span[0]), abs(span[1]))
         if period < RESOLVED * far:
-            raise ArgumentError(f"{owner}: the period of {sampler.what}, {period:g} s, cannot be told from rounding at t = "
-                                f"{far:g} s; pass a longer one")
+            raise ArgumentError(f"{owner}: the period of {sampler.what}, {period:g} s, cannot be distinguished from rounding at "
+                                f"t = {far:g} s; pass a longer one")

@@ -78,7 +78,7 @@ def _by_tolerance(module: Module, request: Request, verdict: str, explicit: str)
     if _fits(module, request, FINEST):
         return FINEST, f"{asked(f'{finest:.3g} or less')} Taylor series are most exact"
     return explicit, (f"{asked(f'{finest:.3g} or less')} Taylor series would be most exact, but do not fit (method='{FINEST}' "
-                      "tells why); the explicit method of order 8 is quickest")
+                      "says why); the explicit method of order 8 is quickest")
 
 
 def _fits(module: Module, request: Request, method: str) -> bool:
@@ -219,7 +219,7 @@ class Modes:
 
     def ringing(self, tolerated: np.ndarray) -> Ringing | None:
         """What the modes near the largest eigenvalue add to the state, and how long it lasts; None if it stays or cannot be
-        told."""
+        reported."""
         fast = np.abs(self.values) >= FAST * self.radius
         decay = -self.values[fast].real
         if not (fast.any() and (decay > 0).all()):

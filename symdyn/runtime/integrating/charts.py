@@ -47,17 +47,17 @@ def _limit(rtol: float, speeds: str) -> float:
 def locked(module: Module, t: np.ndarray, x: np.ndarray, rtol: float) -> list[str]:
     """A sentence for every chart whose angles are too near to gimbal lock in some of many motions, at the states that are kept:
     t (n_t,), x (n, n_t, n_x), NaN where there is no state."""
-    told = []
+    messages = []
     found = distances(module, x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
     for k, (joint, sequence, speeds, _) in enumerate(module.metadata.charts):
         near = np.where(np.isfinite(found[..., k]), found[..., k], np.inf)
         wrong = np.flatnonzero((near < _limit(rtol, speeds)).any(axis=1))
         if len(wrong):
             worst, i = divmod(int(near.argmin()), len(t))
-            told.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, the {sequence} "
-                        f"angles of joint {joint} came too near to gimbal lock, in motion {worst} at t = {t[i]:.9g} within "
-                        f"{near.min():.2g} rad: rounding errors of their rates exceed rtol = {rtol:g} there; {INSTEAD}")
-    return told
+            messages.append(f"{module.name}: in {len(wrong)} of {len(x)} motions, the first of them {wrong[0]}, the {sequence} "
+                            f"angles of joint {joint} came too near to gimbal lock, in motion {worst} at t = {t[i]:.9g} within "
+                            f"{near.min():.2g} rad: rounding errors of their rates exceed rtol = {rtol:g} there; {INSTEAD}")
+    return messages
 
 
 def warn_near_lock(module: Module, request: Request, t: np.ndarray, x: np.ndarray, run: Callable[[Request], Outcome],

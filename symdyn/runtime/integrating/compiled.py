@@ -209,13 +209,13 @@ def run_compiled(module: Module, request: Request, method: str, bar: Any = None,
             chatters = chatter(of.t, report.x, of.n_steps) if chatter is not None else ""
             if chatters:
                 break
-            told, ends = short(of.t, report.x, of.n_steps) if short is not None else ("", False)
+            warning, ends = short(of.t, report.x, of.n_steps) if short is not None else ("", False)
             if ends:
-                chatters = told
+                chatters = warning
                 break
-            if told:
-                warned.append(told)
-                warnings.warn(told, SimulationWarning, stacklevel=5)  # now: such a run may take very long
+            if warning:
+                warned.append(warning)
+                warnings.warn(warning, SimulationWarning, stacklevel=5)  # now: such a run may take very long
     except KeyboardInterrupt:
         interrupted = True
     if run.trouble and isinstance(run.trouble[0], KeyboardInterrupt):

@@ -127,14 +127,14 @@ def not_seen(module: Module, look: np.ndarray | None, functions: Sequence[str], 
     spacing of samples."""
     if look is None or spacing:
         return ""
-    told = []
+    parts = []
     for record, wanted in zip(module.metadata.events, look, strict=True):
         of = [f"the function {f}" for f in record.functions] + [f"the input {i}" for i in record.inputs if i in functions]
         of += [record.unproved] if record.unproved else []
-        told += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
-    if not told:
+        parts += [f"{record.name} depends on {', '.join(of)}"] if wanted and of else []
+    if not parts:
         return ""
-    return (f"{module.name}: zeros of events may be missed: {'; '.join(told)}, and a pulse of a function between two samples is "
+    return (f"{module.name}: zeros of events may be missed: {'; '.join(parts)}, and a pulse of a function between two samples is "
             "not seen; give event_spacing, the time between samples, as short as the shortest pulse that matters")
 
 

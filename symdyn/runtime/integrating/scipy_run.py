@@ -93,8 +93,8 @@ class Field:
 
     def note(self, error: EvaluationError, t: float, inputs: Any) -> None:
         """Keep why an evaluation failed."""
-        told = not_finite(self.module.metadata.inputs, inputs, t)
-        self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + told)
+        which = not_finite(self.module.metadata.inputs, inputs, t)
+        self.trouble.append(str(error).removeprefix(f"{self.module.name}: ") + which)
         self.cause = error.__cause__
 
     def jacobian(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -230,12 +230,12 @@ class Run:
         if not self.message and self.chatter is not None and self.accepted % STEPS_OF_SCIPY == 0:
             self.message = self.chatter(self.here, self.state, self.accepted)
         if not self.message and self.short is not None and self.accepted % TRIED_OF_SCIPY == 0:
-            told, ends = self.short(self.here, self.state, self.accepted)
+            message, ends = self.short(self.here, self.state, self.accepted)
             if ends:
-                self.message = told
-            elif told:
-                self.warned.append(told)
-                warnings.warn(told, SimulationWarning, stacklevel=7)  # now: such a run may take very long
+                self.message = message
+            elif message:
+                self.warned.append(message)
+                warnings.warn(message, SimulationWarning, stacklevel=7)  # now: such a run may take very long
         if not self.message and self.accepted == self.request.max_steps and self.solver.status == "running":
             self.message = f"stopped after {self.accepted} steps, as asked"
 
@@ -259,8 +259,8 @@ class Run:
         """What to add to a message where constraints depend on each other, unlike at the start."""
         n, p, start = self.request.n_state, self.request.p, self.request.x0
         places = [(self.here, self.state), *(self.field.failed if self.field.trouble else ())]
-        told = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
-        return next(filter(None, told), "")
+        found = (lost_rank(self.module, t, x[:n], p, start[:n], self.request.span[0]) for t, x in places)
+        return next(filter(None, found), "")
 
     def _project(self) -> None:
         solver = self.solver

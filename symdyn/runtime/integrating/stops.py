@@ -54,13 +54,13 @@ def lost_rank(module: Module, t: float, x: np.ndarray, p: np.ndarray, x0: np.nda
     if len(among) - int(flat.sum()) < 2:  # one alone depends on no other
         flat[:] = True
     vanishing, tied = ([names(module)[k] for k in rows] for rows in (among[flat], among[~flat]))
-    told = []
+    parts = []
     if vanishing:
-        told.append(f"the gradient of {vanishing[0]} nearly vanishes" if len(vanishing) == 1 else
-                    f"the gradients of {', '.join(vanishing)} nearly vanish")
+        parts.append(f"the gradient of {vanishing[0]} nearly vanishes" if len(vanishing) == 1 else
+                     f"the gradients of {', '.join(vanishing)} nearly vanish")
     if tied:
-        told.append(f"{', '.join(tied)} nearly depend on each other")
-    return f"; the constraints nearly lose rank there ({now} instead of {before}): {'; '.join(told)}"
+        parts.append(f"{', '.join(tied)} nearly depend on each other")
+    return f"; the constraints nearly lose rank there ({now} instead of {before}): {'; '.join(parts)}"
 
 
 def describe_stop(metadata: Metadata, t: float, x: np.ndarray, reason: str) -> str:

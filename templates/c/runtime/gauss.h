@@ -100,7 +100,7 @@ static int symdyn_begin(symdyn_run *run) {
     return 0;
 }
 
-// The next step: a whole one, or a part of one that was given up. The first one tells how long they are; where more than one in
+// The next step: a whole one, or a part of one that was given up. The first one says how long they are; where more than one in
 // eight is given up, they get shorter. A length that was asked for is given up only where the sweeps find no end.
 static int symdyn_ahead(symdyn_run *run) {
     const double left = fabs(run->method.t_first + run->direction * (double)run->method.n_whole * run->method.h_whole - run->t);

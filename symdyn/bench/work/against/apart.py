@@ -107,7 +107,7 @@ class Apart:
         if self.gone is not None:
             raise self.gone
         rest = self.deadline - clock.perf_counter()
-        with contextlib.suppress(BrokenPipeError):  # that it died is told below
+        with contextlib.suppress(BrokenPipeError):  # that it died is reported below
             self.pipe.send((name, arguments))
         allowed = max(_LEAST, rest if key in self.done else _PART * rest)
         found = self._answer(allowed, f"what it does for a tolerance of {key[1]:g}", Failed)

@@ -63,7 +63,7 @@ class Mujoco:
             """n steps, and where it is asked for, the state after every one of them."""
             model.opt.timestep = end / n
             begin(q0, u0)
-            mujoco.set_mju_user_warning(lambda told: None)  # which it would write into a file; the state at the end tells it
+            mujoco.set_mju_user_warning(lambda text: None)  # which it would write into a file; the state at the end shows it
             begun = clock.perf_counter()
             try:
                 if every is None:

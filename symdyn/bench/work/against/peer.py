@@ -33,11 +33,11 @@ class Runner(Protocol):
 
 
 class Unfit(SymdynError):
-    """A peer that cannot run a mechanism; the message tells why, in one short sentence."""
+    """A peer that cannot run a mechanism; the message says why, in one short sentence."""
 
 
 class Failed(SymdynError):
-    """A run of a peer that did not reach the end at this tolerance; the message tells what the peer said."""
+    """A run of a peer that did not reach the end at this tolerance; the message says what the peer said."""
 
 
 @contextmanager
@@ -78,5 +78,5 @@ class Peer(Protocol):
 
 
 def taken_as(peer: Peer, formulation: str) -> str:
-    """What a program is told to run: a formulation of ours, or bodies and joints."""
+    """What a program is asked to run: a formulation of ours, or bodies and joints."""
     return BODIES if peer.bodies else formulation

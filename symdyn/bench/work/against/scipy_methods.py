@@ -66,13 +66,13 @@ class Scipy:
             warnings.simplefilter("ignore", UserWarning)  # a tolerance below what it takes is raised to that
             solver = getattr(integrate, self.method)(f, 0.0, x0, end, rtol=tolerance, atol=tolerance, **exact)
             while solver.status == "running":
-                told = solver.step()
+                message = solver.step()
                 if times is not None and solver.status != "failed":
                     states += [solver.dense_output()(t) for t in times[len(states):np.searchsorted(times, solver.t, "right")]]
                 if clock.perf_counter() > last:
                     raise Failed(f"{self.name} at {tolerance:g} takes longer than {LONGEST:g} s")
         if solver.status == "failed":
-            raise Failed(f"{self.name} at {tolerance:g}: {told}")
+            raise Failed(f"{self.name} at {tolerance:g}: {message}")
         return solver.y if times is None else np.array(states), solver.nfev
 
     def _odeint(self, f: Any, slope: Any, x0: np.ndarray, end: float, tolerance: float, times: np.ndarray | None
@@ -80,11 +80,11 @@ class Scipy:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it says is looked at
             # With times its first step is another one, which it chooses by the first of them.
-            rows, told = odeint(f, x0, np.r_[0.0, end if times is None else times], Dfun=slope, tfirst=True, rtol=tolerance,
-                                atol=tolerance, full_output=True, mxstep=_MANY_STEPS, tcrit=(end,))
-        if told["message"] != "Integration successful.":
-            raise Failed(f"{self.name} at {tolerance:g}: {told['message']}")
-        return rows[-1] if times is None else rows[1:], int(told["nfe"][-1])
+            rows, message = odeint(f, x0, np.r_[0.0, end if times is None else times], Dfun=slope, tfirst=True, rtol=tolerance,
+                                   atol=tolerance, full_output=True, mxstep=_MANY_STEPS, tcrit=(end,))
+        if message["message"] != "Integration successful.":
+            raise Failed(f"{self.name} at {tolerance:g}: {message['message']}")
+        return rows[-1] if times is None else rows[1:], int(message["nfe"][-1])
 
 
 PEERS = (Scipy("DOP853"), Scipy("LSODA"), Scipy("Radau"))
