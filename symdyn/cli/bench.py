@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from symdyn.cli.measurements import MEASUREMENTS
-from symdyn.cli.mechanism import find_subject
+from symdyn.cli.mechanism import find_system_under_test
 from symdyn.cli.messages import FAILED, INTERRUPTED, Stop, complain
 from symdyn.cli.options import options_of
 from symdyn.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from symdyn.bench.work.subject import Subject
+    from symdyn.bench.work.system_under_test import SystemUnderTest
 
 
 def work(arguments: argparse.Namespace) -> int:
@@ -23,10 +23,10 @@ def work(arguments: argparse.Namespace) -> int:
     _look_for_words(arguments.systems)
     options = options_of(arguments)
 
-    def find(name: str) -> Subject:
+    def find(name: str) -> SystemUnderTest:
         """Raises ArgumentError, so that what is wrong with several names, and besides, is reported at once."""
         try:
-            return find_subject(name, options, arguments.end)
+            return find_system_under_test(name, options, arguments.end)
         except Stop as stop:
             raise ArgumentError(str(stop)) from None
 

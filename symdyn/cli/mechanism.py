@@ -12,7 +12,7 @@ from symdyn.cli.messages import Stop
 from symdyn.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from symdyn.bench.work.subject import Subject
+    from symdyn.bench.work.system_under_test import SystemUnderTest
     from symdyn.model.system import System
 
 
@@ -35,19 +35,19 @@ def find_mechanism(name: str, options: Mapping[str, Any]) -> System:
     return case.maker()(**case.options)
 
 
-def find_subject(name: str, options: Mapping[str, Any], end: float | None = None) -> Subject:
+def find_system_under_test(name: str, options: Mapping[str, Any], end: float | None = None) -> SystemUnderTest:
     """What `symdyn bench` measures of it: if what makes it has an option `orientation`, in angles and in parameters.
 
     end   s, default: the system's duration
     Raises Stop as find_mechanism.
     """
-    from symdyn.bench.work.cases import from_maker, subject, title
+    from symdyn.bench.work.cases import from_maker, named_case, title
     from symdyn.cli import userfile
 
     if is_file(name):
         return from_maker(title(Path(name).stem, options), userfile.maker(Path(name)), end, options)
     with _refused():
-        return subject(name, end, options)
+        return named_case(name, end, options)
 
 
 def title_of(name: str, options: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from symdyn.runtime.integrating.charts import INSTEAD, distances
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.stress.reference import DEPENDENT, conditions
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 
 STATES, BETWEEN = 1001, 101
 RTOL = 1e-9
@@ -53,41 +53,41 @@ class Along:
         return any(place.near for place in self.places)
 
 
-def along(subject: Subject) -> Along:
+def along(tested: SystemUnderTest) -> Along:
     """The usual motion of a mechanism for its duration, with the conditions at STATES times and closer at the worst places."""
-    sol = subject.run(np.linspace(0.0, subject.duration, STATES), rtol=RTOL)
+    sol = tested.run(np.linspace(0.0, tested.duration, STATES), rtol=RTOL)
     warnings = (*sol.warned, *([] if sol.success else [sol.message]))  # type: ignore[attr-defined]
     if not len(sol.t):
         return Along(sol, sol.t, {}, (), warnings)
-    t, x = _closer(subject, sol.t, sol.x)
-    curves = _curves(subject, t, x)
-    places = [*(_peaks(subject, t, x, list(curves.values())[-1]) if curves else ()), *_locks(subject, t, x)]
+    t, x = _closer(tested, sol.t, sol.x)
+    curves = _curves(tested, t, x)
+    places = [*(_peaks(tested, t, x, list(curves.values())[-1]) if curves else ()), *_locks(tested, t, x)]
     return Along(sol, t, curves, tuple(sorted(places, key=lambda p: p.t)), warnings)
 
 
-def _curves(subject: Subject, t: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-    if not subject.has("mass_matrix"):
+def _curves(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+    if not tested.has("mass_matrix"):
         return {}
-    n = len(subject.symbols.speeds)
-    M = subject.evaluate("mass_matrix", t, x).reshape(-1, n, n)
+    n = len(tested.symbols.speeds)
+    M = tested.evaluate("mass_matrix", t, x).reshape(-1, n, n)
     curves = {"mass matrix, in its units": np.array([_condition(m) for m in M]),
               "mass matrix, scaled": np.array([_condition(_scaled(m)) for m in M])}
-    if subject.constrained:
-        curves["mass matrix with constraints, scaled"] = conditions(subject, t, x)
+    if tested.constrained:
+        curves["mass matrix with constraints, scaled"] = conditions(tested, t, x)
     return curves
 
 
-def _closer(subject: Subject, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _closer(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States with more of them on both sides of the worst, which may be narrow."""
-    curves = _curves(subject, t, x)
+    curves = _curves(tested, t, x)
     worst = [_highest(list(curves.values())[-1], 1.0)] if curves else []
-    worst += [_highest(-d, -NEAR_LOCK) for d in distances(subject.module, x).T]
+    worst += [_highest(-d, -NEAR_LOCK) for d in distances(tested.module, x).T]
     times, states = [t], [x]
     for k in sorted({k for found in worst for k in found}):
         low, high = max(k - 1, 0), min(k + 1, len(t) - 1)
         if high <= low:
             continue
-        sol = subject.run(np.linspace(t[low], t[high], BETWEEN), x[low], rtol=RTOL)
+        sol = tested.run(np.linspace(t[low], t[high], BETWEEN), x[low], rtol=RTOL)
         if sol.success:
             times.append(sol.t[1:-1])
             states.append(sol.x[1:-1])
@@ -103,34 +103,34 @@ def _highest(values: np.ndarray, least: float) -> list[int]:
     return list(dict.fromkeys([int(high.argmax()), *sorted(peaks, key=lambda k: -high[k])]))[:PEAKS]
 
 
-def _peaks(subject: Subject, t: np.ndarray, x: np.ndarray, values: np.ndarray) -> list[Place]:
+def _peaks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, values: np.ndarray) -> list[Place]:
     """The worst place, and the highest of the other peaks that are near a singularity."""
     high = np.where(np.isnan(values), np.inf, values)
-    return [Place(float(t[k]), _sentence(subject, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
+    return [Place(float(t[k]), _sentence(tested, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
             for i, k in enumerate(_highest(values, NEAR))]
 
 
-def _sentence(subject: Subject, t: float, x: np.ndarray, value: float, first: bool) -> str:
+def _sentence(tested: SystemUnderTest, t: float, x: np.ndarray, value: float, first: bool) -> str:
     head = f"{'largest condition' if first else 'condition'} {value:.3g}"
     if not math.isfinite(value):
         return f"{head}: the accelerations are not determined"
     digits = math.ceil(math.log10(max(value, 1.0)))
     lost = f"costs up to {digits} of 16 digits" if value > 10 else "costs less than a digit"
-    weakest = _weakest(subject, t, x)
+    weakest = _weakest(tested, t, x)
     return f"{head}, {lost}" + (f"; least determined: {', '.join(weakest)}" if weakest else "")
 
 
-def _weakest(subject: Subject, t: float, x: np.ndarray) -> list[str]:
+def _weakest(tested: SystemUnderTest, t: float, x: np.ndarray) -> list[str]:
     """Accelerations and multipliers that the smallest singular value belongs to."""
-    n = len(subject.symbols.speeds)
-    matrix = _scaled(subject.evaluate("mass_matrix", t, x[None, :]).reshape(n, n))
-    names = [u.dot.name for u in subject.symbols.speeds]
-    if subject.constrained:
-        rows = subject.evaluate("C_r", t, x[None, :]).reshape(-1, n)
+    n = len(tested.symbols.speeds)
+    matrix = _scaled(tested.evaluate("mass_matrix", t, x[None, :]).reshape(n, n))
+    names = [u.dot.name for u in tested.symbols.speeds]
+    if tested.constrained:
+        rows = tested.evaluate("C_r", t, x[None, :]).reshape(-1, n)
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         rows = rows / np.where(size > 0, size, 1.0)
         matrix = np.block([[matrix, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
-        names += [f"multiplier of {name}" for name in subject.equations.constraints]
+        names += [f"multiplier of {name}" for name in tested.equations.constraints]
     if n < 2 or not np.isfinite(matrix).all():
         return []
     _, values, vectors = np.linalg.svd(matrix)
@@ -138,10 +138,10 @@ def _weakest(subject: Subject, t: float, x: np.ndarray) -> list[str]:
     return [names[k] for k in np.argsort(-direction) if direction[k] > _NAMED * direction.max()][:4]
 
 
-def _locks(subject: Subject, t: np.ndarray, x: np.ndarray) -> list[Place]:
+def _locks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> list[Place]:
     """For the Euler angles of every joint where they come nearest to gimbal lock, and where else they come near."""
     found = []
-    for (joint, sequence, *_), d in zip(subject.module.metadata.charts, distances(subject.module, x).T, strict=True):
+    for (joint, sequence, *_), d in zip(tested.module.metadata.charts, distances(tested.module, x).T, strict=True):
         for k in _highest(-d, -NEAR_LOCK):
             near = bool(d[k] < NEAR_LOCK)
             advice = f": {INSTEAD}" if near else ""

@@ -31,7 +31,7 @@ from symdyn.shown import shown
 from symdyn.stress.flow import stands_still
 from symdyn.stress.record import number
 from symdyn.stress.run import stress
-from symdyn.stress.subject import Subject, named
+from symdyn.stress.system_under_test import SystemUnderTest, named
 
 if TYPE_CHECKING:
     from symdyn.given import PathName
@@ -116,13 +116,13 @@ def page(equations: Equations, system: Any, formulation: str, budget: float, ver
 
     system        what sd.bench takes; formulation: the equations' as it names them, empty where it takes equations
     """
-    subject = Subject(equations)
+    tested = SystemUnderTest(equations)
     makers: dict[str, tuple[str, Callable[[Part], None]]] = {
         "equations": ("Equations of motion", lambda part: _show_equations(part, equations)),
         "generated": ("What is generated", lambda part: _show_generated(part, equations)),
-        "condition": ("Condition along the motion", lambda part: _show_condition(part, subject)),
+        "condition": ("Condition along the motion", lambda part: _show_condition(part, tested)),
         "work": ("Work against error", lambda part: _show_work(part, system, formulation, budget, log)),
-        "stress": ("Stability under stress", lambda part: _show_stress(part, subject))}
+        "stress": ("Stability under stress", lambda part: _show_stress(part, tested))}
     if verify:
         makers["proof"] = ("Proof by identities", lambda part: part.shown.update(result=equations.verify()))
     parts = {key: _made(title, make, log) for key, (title, make) in makers.items()}
@@ -176,9 +176,9 @@ def _show_generated(part: Part, equations: Equations) -> None:
     part.shown = {"report": report, "candidates": report.candidates, "backend": report.backend, "fallback": report.fallback}
 
 
-def _show_condition(part: Part, subject: Subject) -> None:
-    found = full_condition.along(subject)
-    if len(found.solution.t) and stands_still(subject, found.solution.x):
+def _show_condition(part: Part, tested: SystemUnderTest) -> None:
+    found = full_condition.along(tested)
+    if len(found.solution.t) and stands_still(tested, found.solution.x):
         part.notes.append(STILL)
     part.shown = {"found": found, "curves": [_range(label, values) for label, values in found.curves.items()],
                   "states": len(found.t), "end": f"{found.solution.t[-1]:g}" if len(found.solution.t) else "0",
@@ -202,9 +202,9 @@ def _show_work(part: Part, system: Any, formulation: str, budget: float, log: Lo
         part.notes.append(part.shown["note"])
 
 
-def _show_stress(part: Part, subject: Subject) -> None:
-    subject.module.parameters()  # without numbers no check could begin
-    report = stress(subject, short=True)
+def _show_stress(part: Part, tested: SystemUnderTest) -> None:
+    tested.module.parameters()  # without numbers no check could begin
+    report = stress(tested, short=True)
     order = {"fail": 0, "degrade": 1, "pass": 2}
     part.shown = {"rows": sorted(report.rows, key=lambda row: order[row.verdict]), "left_out": report.left_out,
                   "summary": report.summary(), "passed": report.passed}

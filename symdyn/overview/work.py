@@ -25,11 +25,11 @@ WITHOUT_COMPILER, OTHERS_WITHOUT = (("DOP853", "RK45"), ("Radau", "LSODA")), ("D
 _AGAIN = 0.5
 
 
-def measure(subject: Any, formulation: str, budget: float, log: Callable[[str], None]) -> list[Benchmark]:
+def measure(tested: Any, formulation: str, budget: float, log: Callable[[str], None]) -> list[Benchmark]:
     """A formulation with every method, and all formulations with one method, while the budget, s, lasts.
 
-    subject       what sd.bench takes
-    formulation   as sd.bench names it; empty where the subject is equations, of which there is one formulation
+    tested        what sd.bench takes
+    formulation   as sd.bench names it; empty where these are equations, of which there is one formulation
     The second is missing where it would have one formulation. They are not put together: where coordinates differ errors are
     those of bodies. Raises SymdynError where nothing can be measured, also within the budget.
     """
@@ -43,7 +43,7 @@ def measure(subject: Any, formulation: str, budget: float, log: Callable[[str], 
     def run(formulations: Sequence[str] | None, methods: Sequence[str], seconds: float) -> Benchmark:
         from symdyn.bench.work import bench
 
-        return bench(subject, formulations=formulations, methods=methods, tolerances=TOLERANCES, repeats=REPEATS, budget=seconds)
+        return bench(tested, formulations=formulations, methods=methods, tolerances=TOLERANCES, repeats=REPEATS, budget=seconds)
 
     compiled = find_compiler() is not None
     own = (formulation,) if formulation else None

@@ -16,7 +16,7 @@ from symdyn.model.symbols import coordinates, parameters, speeds
 from symdyn.model.system import System
 from symdyn.stress.flow import local_error
 from symdyn.stress.record import DEGRADE, FAIL, PASS, Row, within
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 
 DISTANCES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-12, 0.0)
 
@@ -45,7 +45,7 @@ def free_body(orientation: str) -> System:
 
 def gimbal(short: bool) -> Iterator[Row]:
     """Pitch past 90 degrees at several distances from gimbal lock, in Euler angles and in Euler parameters."""
-    reference = Subject(free_body("parameters"))
+    reference = SystemUnderTest(free_body("parameters"))
     rtol, times = 1e-9, np.linspace(0.0, 5.0, 21)
     distances = DISTANCES[::3] if short else DISTANCES
     truth, steps = {}, {}
@@ -63,32 +63,32 @@ def gimbal(short: bool) -> Iterator[Row]:
                  max(steps.values()) / min(steps.values()), 2.0, "the motions differ by the small rotation about x only, which "
                  "changes the angle that is turned by less than a tenth", "the effort does not depend on the distance")
     for kind in ("angles", "body"):
-        subject = Subject(free_body(kind))
+        tested = SystemUnderTest(free_body(kind))
         for d in distances:
             start = np.array([0.0, 0, 0, 0, 2.0, d] if kind == "angles" else [0.0, 0, 0, d, 2.0, 0.0])
-            sol = subject.run(times, start, rtol=rtol, atol=rtol, max_steps=100_000)
-            yield _angles(subject, kind, d, sol, truth[d], steps[d], rtol)
+            sol = tested.run(times, start, rtol=rtol, atol=rtol, max_steps=100_000)
+            yield _angles(tested, kind, d, sol, truth[d], steps[d], rtol)
 
 
-def _angles(subject: Subject, kind: str, d: float, sol: Any, truth: np.ndarray, usual: int, rtol: float) -> Row:
+def _angles(tested: SystemUnderTest, kind: str, d: float, sol: Any, truth: np.ndarray, usual: int, rtol: float) -> Row:
     called = "ZYX angles and their rates" if kind == "angles" else "ZYX angles, speeds in body axes"
     done = f"{called} past 90 degrees at a distance of {d:g} rad: {sol.n_steps} steps and {sol.n_rejected} rejected"
     named = any("gimbal lock" in text for text in (sol.message, *sol.warned))
     origin = "steps times the error one may have times 1 + omega t, over the cosine at the closest, at most by half of the digits"
     if not sol.success:
         warned = named and "t =" in sol.message
-        return Row("gimbal lock", subject.name, f"{done}: {sol.message}", None, None, "", DEGRADE if warned
+        return Row("gimbal lock", tested.name, f"{done}: {sol.message}", None, None, "", DEGRADE if warned
                    else FAIL, "angles have no rates there; the run stops and names it" if named else
                    "the run stops without naming gimbal lock")
     found = float(np.abs(_rotations(sol) - truth).max())
     # Rates of angles grow as one over the distance, and so do errors of the step control on the way past.
     bound = min((sol.n_steps + usual) * 2 * math.sqrt(6) * rtol * (1 + 2 * 5.0) / max(d, 1e-300), 1e-6)
     if found <= bound:
-        return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
+        return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", found, bound, origin,
                    PASS if sol.n_steps < 100 * usual or named else FAIL,
                    "the motion is right" if sol.n_steps < 100 * usual else "the motion is right, at many times the usual steps, "
                    f"which is {'warned' if named else 'not warned'}")
-    return Row("gimbal lock", subject.name, f"{done}: largest error of the rotation", found, bound, origin,
+    return Row("gimbal lock", tested.name, f"{done}: largest error of the rotation", found, bound, origin,
                DEGRADE if named else FAIL, "digits are lost near gimbal lock, and a warning says so" if named else
                "digits are lost near gimbal lock without a word")
 
@@ -106,7 +106,7 @@ def flips(short: bool) -> Iterator[Row]:
 
     periods = 30 if short else 1000
     I, a, c = (1.0, 2.0, 3.0), 1.0, 1.05 * math.sqrt(1 / 3)
-    subject = Subject(free_body("parameters"))
+    tested = SystemUnderTest(free_body("parameters"))
     start = np.array([1.0, 0, 0, 0, a, 0.0, c])
     with mpmath.workdps(40):
         T = _period(I, a, c)
@@ -116,17 +116,17 @@ def flips(short: bool) -> Iterator[Row]:
         by = [(_omega(I, a + da, c + dc, end) - wanted) / h for da, dc in ((h, 0), (0, h))]
         growth = float(max(max(abs(e) for e in row) for row in by))
         wanted = np.array([float(e) for e in wanted])
-    methods: list[str] = [m for m in ("dop853", "taylor") if m in COMPILED and subject.module.backend == "c"]
+    methods: list[str] = [m for m in ("dop853", "taylor") if m in COMPILED and tested.module.backend == "c"]
     for method in methods or ["DOP853"]:
         rtol = 1e-13
-        sol = subject.run(np.array([0.0, end]), start, rtol=rtol, atol=rtol, method=method)
+        sol = tested.run(np.array([0.0, end]), start, rtol=rtol, atol=rtol, method=method)
         found = float(np.abs(sol.u[-1] - wanted).max())
-        local = local_error(subject, min(end, 20 * float(T)), rtol, np.ones(7), start, method)
+        local = local_error(tested, min(end, 20 * float(T)), rtol, np.ones(7), start, method)
         bound = sol.n_steps * (2 * local + 16 * EPS) * growth * 10
         if not sol.success:
-            yield Row("flips", subject.name, f"{method}: {periods} periods", None, None, "", FAIL, sol.message)
+            yield Row("flips", tested.name, f"{method}: {periods} periods", None, None, "", FAIL, sol.message)
             continue
-        yield within("flips", subject.name, f"{method}: {1.1 * periods:g} periods about the intermediate axis, {sol.n_steps} "
+        yield within("flips", tested.name, f"{method}: {1.1 * periods:g} periods about the intermediate axis, {sol.n_steps} "
                      f"steps at rtol {rtol:g}: angular velocity against elliptic functions (relative to 1 rad/s)", found, bound,
                      f"steps times their largest error ({local:.1g}, measured) times the derivative of the closed form by its "
                      f"start ({growth:.2g}), ten times for the place in a period where they are made",
@@ -180,7 +180,7 @@ def platform() -> System:
 
 def rotor(short: bool) -> Iterator[Row]:
     """A rotor at 1e4 rad/s on a slow platform: steady precession."""
-    subject = Subject(platform())
+    tested = SystemUnderTest(platform())
     g, m, l, I, I_3, b, b_3 = 9.81, 2.0, 0.1, 0.01, 0.02, 0.5, 0.4
     omega, tilt, end = 1e4, 1.0, 0.5 if short else 10.0
     # (I + m l^2 + b - b_3) phi_dot^2 cos theta - I_3 omega phi_dot + m g l = 0, the slow root, without cancellation.
@@ -189,18 +189,18 @@ def rotor(short: bool) -> Iterator[Row]:
     start = np.array([0.0, tilt, 0.0, rate, 0.0, omega - rate * math.cos(tilt)])
     scales = np.array([1.0, 1.0, omega * end, 1.0, 1.0, omega])
     rtol = 1e-12
-    sol = subject.run((0.0, end), start, rtol=rtol, atol=rtol * scales)
+    sol = tested.run((0.0, end), start, rtol=rtol, atol=rtol * scales)
     if not sol.success:
-        yield Row("fast rotor", subject.name, f"{end:g} s at 1e4 rad/s", None, None, "", FAIL, sol.message)
+        yield Row("fast rotor", tested.name, f"{end:g} s at 1e4 rad/s", None, None, "", FAIL, sol.message)
         return
     found = max(float(np.abs(sol.q[:, 1] - tilt).max()), float(np.abs(sol.q[:, 0] - rate * sol.t).max()))
-    local = local_error(subject, end, rtol, scales, start)
+    local = local_error(tested, end, rtol, scales, start)
     bound = sol.n_steps * (2 * local + 16 * EPS) * (1 + end)
-    yield within("fast rotor", subject.name, f"rotor at 1e4 rad/s on a platform that precesses at {rate:.3g} rad/s, {end:g} s, "
+    yield within("fast rotor", tested.name, f"rotor at 1e4 rad/s on a platform that precesses at {rate:.3g} rad/s, {end:g} s, "
                  f"{sol.n_steps} steps: largest error of tilt and precession, rad", found, bound, "steps times their largest "
                  f"error ({local:.1g}, measured), which nutation keeps and precession lets grow by 1 + t", "the platform "
                  "precesses steadily, as it must", "the platform leaves its steady precession")
     energy = sol.energy_error()
-    yield within("fast rotor", subject.name, "energy over the same motion, most of it the rotor's", energy,
+    yield within("fast rotor", tested.name, "energy over the same motion, most of it the rotor's", energy,
                  sol.n_steps * (2 * local + 16 * EPS) * 2, "twice the error of the rotor's speed, in its scale",
                  "energy is kept as the tolerances promise")

@@ -12,7 +12,7 @@ from symdyn.functions.tapes import function_tape
 from symdyn.stress.first_order import HIGHER_ORDER, FirstOrder, first_order
 from symdyn.stress.reference import DIGITS, exactly_as_written, halves, largest, leaves
 from symdyn.stress.statements import Statements
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 
 # For products of rounding errors, which the first order leaves out, where divisors change by less than HIGHER_ORDER.
 SAFETY = 2.0
@@ -32,7 +32,7 @@ class Coded:
     comparable   which entries are compared together, and in what scale: see symdyn.stress.reference, together and weights
     """
 
-    def __init__(self, subject: Subject, statements: Sequence[Statements], rows: np.ndarray,
+    def __init__(self, tested: SystemUnderTest, statements: Sequence[Statements], rows: np.ndarray,
                  comparable: tuple[np.ndarray, np.ndarray], true: tuple[np.ndarray, np.ndarray],
                  params: np.ndarray | None = None) -> None:
         n, size = true[0].shape
@@ -44,11 +44,11 @@ class Coded:
         for one in statements:
             if not len(todo):
                 break
-            found = first_order(one.tape, leaves(subject, rows[todo], params), len(todo))
+            found = first_order(one.tape, leaves(tested, rows[todo], params), len(todo))
             self._take(found, todo)
             if one.smooths:
                 holds = todo[~found.failed]
-                found_there = exactly_as_written(subject, one.tape, rows[holds], params)
+                found_there = exactly_as_written(tested, one.tape, rows[holds], params)
                 self.hi[holds], self.lo[holds] = halves(found_there, size)
             todo = todo[found.failed]
 
@@ -73,7 +73,7 @@ class Coded:
         return np.where(errors > SMALLEST, digits, -16.0).max(axis=1, initial=-16.0)  # type: ignore[no-any-return]
 
 
-def imbalance(subject: Subject, rows: np.ndarray, u_dot: np.ndarray, backend: str) -> np.ndarray:
+def imbalance(tested: SystemUnderTest, rows: np.ndarray, u_dot: np.ndarray, backend: str) -> np.ndarray:
     """Decimal digits by which accelerations (n, n_u) at rows of free leaves miss M u_dot + k + C_r^T lam = F, whatever lam is,
     beyond what is due, (n,).
 
@@ -83,11 +83,11 @@ def imbalance(subject: Subject, rows: np.ndarray, u_dot: np.ndarray, backend: st
     """
     if not len(rows):
         return np.zeros(0)
-    tapes = {name: function_tape(subject.equations, name) for name in TERMS if subject.has(name)}
-    true = {name: exactly_as_written(subject, tape, rows) for name, tape in tapes.items()}
+    tapes = {name: function_tape(tested.equations, name) for name in TERMS if tested.has(name)}
+    true = {name: exactly_as_written(tested, tape, rows) for name, tape in tapes.items()}
     off = {}
     for name, tape in tapes.items():
-        found = SAFETY * first_order(tape, leaves(subject, rows), len(rows)).of(backend)
+        found = SAFETY * first_order(tape, leaves(tested, rows), len(rows)).of(backend)
         # Of an algorithm with branches so many roundings of what is largest.
         sizes = np.abs(halves(true[name], found.shape[1])[0]).max(axis=1, initial=0.0, keepdims=True)
         off[name] = np.where(np.isfinite(found), found, EPS * tape.longest_chain() * sizes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symdyn.stress.record import DEGRADE, FAIL, PASS, Row, within
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 
 BOUND = ("decimal digits beyond twice the first-order bound of rounding errors: every operation rounds once, and what that does "
          "to each result follows from one pass backwards through the operations")
@@ -68,16 +68,16 @@ def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
                   "no more digits are lost than the problem itself costs", "digits are lost that the problem does not cost")
 
 
-def refusals(subject: Subject, label: str, found: Sequence[Finding], refused: int) -> Row:
+def refusals(tested: SystemUnderTest, label: str, found: Sequence[Finding], refused: int) -> Row:
     """Values that were refused: right where the system that is solved has no digits left."""
     least = min(f.least_refused for f in found)
-    return Row("refused states", subject.name, f"{label}: {refused} values refused; condition there from {least:.2g}", 1 / least
+    return Row("refused states", tested.name, f"{label}: {refused} values refused; condition there from {least:.2g}", 1 / least
                if least > 0 else np.inf, 1e-8, "a pivot that vanishes to half of the digits", DEGRADE if least > 1e8 else FAIL,
                "only states are refused whose equations are singular to half of the digits" if least > 1e8 else
                "states are refused whose equations are well-conditioned")
 
 
-def first_order_row(subject: Subject, label: str, found: Sequence[Finding], of: str = "functions",
+def first_order_row(tested: SystemUnderTest, label: str, found: Sequence[Finding], of: str = "functions",
                     states: int = 0) -> Iterator[Row]:
     """The row of errors against what rounding of every operation may do at most, at ordinary states.
 
@@ -90,7 +90,7 @@ def first_order_row(subject: Subject, label: str, found: Sequence[Finding], of: 
         noise = f"; none holds at {many} states, where a divisor loses all but one digit"
     if not known:
         if noise:
-            yield Row("first order", subject.name, f"{label}: 0 of {len(found)} {of}{noise}", None, None, "", DEGRADE,
+            yield Row("first order", tested.name, f"{label}: 0 of {len(found)} {of}{noise}", None, None, "", DEGRADE,
                       "nothing can be said of errors: divisors are nothing but rounding error")
         return
     worst = max(known, key=lambda f: f.beyond)
@@ -100,26 +100,26 @@ def first_order_row(subject: Subject, label: str, found: Sequence[Finding], of: 
     others = ", ".join(f.name for f in found if f.beyond == -np.inf and not f.unknown)
     if others:
         done += f"; no bound is known of {others}, which run an algorithm with branches"
-    yield within("first order", subject.name, done + noise, worst.beyond, 0.0, BOUND, "errors are those of rounding",
+    yield within("first order", tested.name, done + noise, worst.beyond, 0.0, BOUND, "errors are those of rounding",
                  "errors are larger than rounding can make them")
 
 
-def set_aside(subject: Subject, found: Sequence[Finding]) -> Iterator[Row]:
+def set_aside(tested: SystemUnderTest, found: Sequence[Finding]) -> Iterator[Row]:
     """Rows of states at which the condition does not tell what digits are lost: what is, and whether rounding explains it."""
     if any(f.near.states or f.near.beyond > 0 or f.near.imbalance > 0 for f in found):
-        yield _aside(subject, "lost rank", [(f.name, f.near) for f in found],
+        yield _aside(tested, "lost rank", [(f.name, f.near) for f in found],
                      "which lie next to a position where constraints lose rank", "the exact multipliers and accelerations grow "
                      "without bound towards such a position; they are smoothed there, so that motions pass it, and what is "
                      "computed is the smooth solution but for rounding")
     if any(f.singular.states or f.singular.beyond > 0 or f.singular.imbalance > 0 for f in found):
         least = min(f.singular.least for f in found)
-        yield _aside(subject, "singular states", [(f.name, f.singular) for f in found],
+        yield _aside(tested, "singular states", [(f.name, f.singular) for f in found],
                      f"where the condition of what is solved is {least:.2g} or more", "the mass matrix is singular to the last "
                      "digit, as at gimbal lock: accelerations have no digits there, and a motion that comes there stops and "
                      "names it")
 
 
-def _aside(subject: Subject, check: str, found: Sequence[tuple[str, Aside]], where: str, why: str) -> Row:
+def _aside(tested: SystemUnderTest, check: str, found: Sequence[tuple[str, Aside]], where: str, why: str) -> Row:
     every = [aside for _, aside in found]
     beyond, missed = max(a.beyond for a in every), max(a.imbalance for a in every)
     names = ", ".join(dict.fromkeys(name for name, a in found if a.states or max(a.beyond, a.imbalance) > 0))
@@ -130,8 +130,8 @@ def _aside(subject: Subject, check: str, found: Sequence[tuple[str, Aside]], whe
     if any(a.noise for a in every):
         done += f"; at {max(a.noise for a in every)} of them a divisor is nothing but rounding error, and no digit is due"
     if max(beyond, missed) == -np.inf:
-        return Row(check, subject.name, done, None, None, "", DEGRADE, why)
+        return Row(check, tested.name, done, None, None, "", DEGRADE, why)
     good = max(beyond, missed) <= 0
     origin = BOUND if missed == -np.inf else BOUND + "; of accelerations without one what their equations may miss"
-    return Row(check, subject.name, done, max(beyond, missed), 0.0, origin, DEGRADE if good else FAIL,
+    return Row(check, tested.name, done, max(beyond, missed), 0.0, origin, DEGRADE if good else FAIL,
                why if good else "errors are larger than rounding can make them: what is computed is not the solution")

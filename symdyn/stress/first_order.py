@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.stress.subject import EPS
+from symdyn.stress.system_under_test import EPS
 from symdyn.tape.floats import Arrays, Slopes
 from symdyn.tape.node import Node
 from symdyn.tape.ops import OPERATIONS

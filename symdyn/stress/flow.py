@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.stress.record import MotionStops, NotApplicable, StandsStill
-from symdyn.stress.subject import RTOL, Subject
+from symdyn.stress.system_under_test import RTOL, SystemUnderTest
 
 # Intervals of the variational equations; more operations than this make no Jacobian to be compiled.
 INTERVALS = 400
@@ -42,80 +42,80 @@ class Path:
         return float(min(2 * self.local, 2 * np.sqrt(len(self.scales)) * self.rtol))
 
 
-def scales_of(subject: Subject, x: np.ndarray) -> np.ndarray:
+def scales_of(tested: SystemUnderTest, x: np.ndarray) -> np.ndarray:
     """For each entry of the state the largest value of its unit in rows of states, 1 where all are zero, (n_x,)."""
-    metadata = subject.module.metadata
+    metadata = tested.module.metadata
     units = [metadata.units.get(name, name) for name in metadata.x]
     most = np.abs(x).max(axis=0)
     largest = {unit: max(m for u, m in zip(units, most, strict=True) if u == unit) for unit in units}
     return np.array([largest[unit] or 1.0 for unit in units])
 
 
-def path(subject: Subject, end: float, rtol: float = RTOL, resolved: bool = False) -> Path:
+def path(tested: SystemUnderTest, end: float, rtol: float = RTOL, resolved: bool = False) -> Path:
     """The usual motion until `end`, with tolerances in its own scales.
 
     resolved   at PER_STEP intervals a step, shortened to where MOST intervals are enough
     Raises MotionStops where it stops early.
     """
-    pilot = subject.run((0.0, end), rtol=1e-6, max_steps=MEASURED_AMONG)
+    pilot = tested.run((0.0, end), rtol=1e-6, max_steps=MEASURED_AMONG)
     if not pilot.success and pilot.n_steps < MEASURED_AMONG:
         raise MotionStops(float(pilot.t[-1]), end, pilot.message)
-    scales, intervals = scales_of(subject, pilot.x), INTERVALS
+    scales, intervals = scales_of(tested, pilot.x), INTERVALS
     if resolved:
-        steps = subject.run((0.0, end), rtol=rtol, atol=rtol * scales, steps=True, max_steps=MOST // PER_STEP)
+        steps = tested.run((0.0, end), rtol=rtol, atol=rtol * scales, steps=True, max_steps=MOST // PER_STEP)
         end = float(steps.t[-1])
         intervals = max(INTERVALS, 2 * (PER_STEP * steps.n_steps // 2))
-    sol = subject.run(np.linspace(0.0, end, 2 * intervals + 1), rtol=rtol, atol=rtol * scales)
+    sol = tested.run(np.linspace(0.0, end, 2 * intervals + 1), rtol=rtol, atol=rtol * scales)
     if not sol.success:
         raise MotionStops(float(sol.t[-1]), end, sol.message)
-    return Path(sol, scales, rtol, local_error(subject, end, rtol, scales))
+    return Path(sol, scales, rtol, local_error(tested, end, rtol, scales))
 
 
-def stands_still(subject: Subject, x: np.ndarray) -> bool:
+def stands_still(tested: SystemUnderTest, x: np.ndarray) -> bool:
     """Whether no coordinate changes over rows of states, of a run at RTOL or thereabouts, by more than errors of steps may make
     up: STILL of the largest value of its unit, of 1 rad, or of the longest parameter in metres."""
-    module = subject.module
-    known, params = module.metadata.units, zip(module.metadata.parameters, subject.params, strict=True)
+    module = tested.module
+    known, params = module.metadata.units, zip(module.metadata.parameters, tested.params, strict=True)
     longest = max((abs(float(p)) for name, p in params if known.get(name) == "m"), default=1.0)
     n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
     least = np.array([longest if known.get(name) == "m" else 1.0 for name in module.metadata.x])
-    change = np.ptp(x, axis=0) <= STILL * np.maximum(scales_of(subject, x), least)
+    change = np.ptp(x, axis=0) <= STILL * np.maximum(scales_of(tested, x), least)
     return bool(np.delete(change, slice(n_q, n_q + n_u)).all())  # rounding alone gives speeds beside those that are zero
 
 
-def demand_motion(subject: Subject, sol: Solution) -> None:
+def demand_motion(tested: SystemUnderTest, sol: Solution) -> None:
     """Raises StandsStill if nothing moves."""
-    if stands_still(subject, sol.x):
+    if stands_still(tested, sol.x):
         raise StandsStill(float(sol.t[-1]))
 
 
-def local_error(subject: Subject, end: float, rtol: float, scales: np.ndarray, start: np.ndarray | None = None,
+def local_error(tested: SystemUnderTest, end: float, rtol: float, scales: np.ndarray, start: np.ndarray | None = None,
                 method: str | None = None) -> float:
     """The largest error (scaled) of some of the steps, each against a run over it at rtol 1e-14 in four steps or more."""
-    every = subject.run((0.0, end), start, rtol=rtol, atol=rtol * scales, steps=True, max_steps=MEASURED_AMONG, method=method)
+    every = tested.run((0.0, end), start, rtol=rtol, atol=rtol * scales, steps=True, max_steps=MEASURED_AMONG, method=method)
     n = len(every.t) - 1
     worst = 0.0
     for k in np.unique(np.linspace(0, n - 1, MEASURED).astype(int)):
         # By the same method: "auto" might take an explicit one where stiff motion begins beside its slow part.
-        sharp = subject.run((every.t[k], every.t[k + 1]), every.x[k], rtol=FINE, atol=FINE * scales, steps=True,
-                            max_step=(every.t[k + 1] - every.t[k]) / 4, method=every.method)
+        sharp = tested.run((every.t[k], every.t[k + 1]), every.x[k], rtol=FINE, atol=FINE * scales, steps=True,
+                           max_step=(every.t[k + 1] - every.t[k]) / 4, method=every.method)
         if sharp.success:
             worst = max(worst, float(np.linalg.norm((sharp.x[-1] - every.x[k + 1]) / scales)))
     return worst
 
 
-def flow(subject: Subject, motion: Path, stride: int = 1) -> np.ndarray:
+def flow(tested: SystemUnderTest, motion: Path, stride: int = 1) -> np.ndarray:
     """Phi(t_k, 0), scaled, at every second time of the motion, (n, n_x, n_x), by the Magnus series of fourth order; stride: with
     intervals so many times as long.
 
     Source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, Physics Reports 470 (2009) 151.
     Raises NotApplicable where there is no Jacobian, or it is too long to be compiled in passing.
     """
-    operations = subject.equations.tape("rhs").operations
-    if not subject.has("jacobian_x") or operations > LONGEST:
+    operations = tested.equations.tape("rhs").operations
+    if not tested.has("jacobian_x") or operations > LONGEST:
         raise NotApplicable(f"its right-hand side has {operations} operations; a Jacobian is compiled up to {LONGEST}")
     sol, n = motion.sol, motion.sol.x.shape[1]
-    J = subject.evaluate("jacobian_x", sol.t[::stride], sol.x[::stride], inputs=sol.inputs[::stride]).reshape(-1, n, n)
+    J = tested.evaluate("jacobian_x", sol.t[::stride], sol.x[::stride], inputs=sol.inputs[::stride]).reshape(-1, n, n)
     if not np.isfinite(J).all():
         raise NotApplicable("the Jacobian cannot be evaluated along the motion")
     J = J * (motion.scales[None, None, :] / motion.scales[None, :, None])

@@ -16,7 +16,7 @@ from symdyn.model.system import System
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.stress.flow import local_error
 from symdyn.stress.record import DEGRADE, FAIL, Row, within
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 
 DECADES = tuple(10.0**k for k in range(0, 13, 2))
 # How many times as many steps a stiff method may take for stiffness that is 1e12 times as large: what is stiff dies away within
@@ -28,10 +28,10 @@ def constraint_drift(short: bool) -> Iterator[Row]:
     """Violations of constraints after a million steps."""
     wanted = 20_000 if short else 1_000_000
     for name in ("pendulum_absolute",) if short else ("pendulum_absolute", "four_bar"):
-        subject = Subject(name)
+        tested = SystemUnderTest(name)
         longest = 0.01
         end = wanted * longest
-        sol = subject.run(np.linspace(0.0, end, 1001), rtol=1e-6, atol=1e-6, max_step=longest)
+        sol = tested.run(np.linspace(0.0, end, 1001), rtol=1e-6, atol=1e-6, max_step=longest)
         if not sol.success:
             yield Row("constraint drift", name, f"{end:g} s", None, None, "", FAIL, sol.message)
             continue
@@ -46,37 +46,37 @@ def constraint_drift(short: bool) -> Iterator[Row]:
 
 def energy_drift(short: bool) -> Iterator[Row]:
     """Energy of a pendulum over ten thousand periods, by every compiled method that is meant for it."""
-    subject = Subject("pendulum")
+    tested = SystemUnderTest("pendulum")
     periods = 200 if short else 10_000
-    one = subject.run((0.0, 10.0), rtol=1e-10)
+    one = tested.run((0.0, 10.0), rtol=1e-10)
     crossing = np.flatnonzero((one.q[:-1, 0] - one.q[:, 0].mean()) * (one.q[1:, 0] - one.q[:, 0].mean()) < 0)
     period = 2 * float(np.diff(one.t[crossing]).mean())
     for method in ("dop853", "taylor", "gauss"):
-        if method not in COMPILED or subject.module.backend != "c":
+        if method not in COMPILED or tested.module.backend != "c":
             continue
         rtol = 1e-13
         end = periods * period
         options: dict[str, Any] = {"max_step": period / 40} if method == "gauss" else {}
         try:
-            sol = subject.run(np.linspace(0.0, end, 1001), rtol=rtol, method=method, **options)
+            sol = tested.run(np.linspace(0.0, end, 1001), rtol=rtol, method=method, **options)
         except ArgumentError as error:
-            yield Row("energy drift", subject.name, f"{method}: {periods} periods", None, None, "", FAIL, str(error))
+            yield Row("energy drift", tested.name, f"{method}: {periods} periods", None, None, "", FAIL, str(error))
             continue
         done = f"{method}: {periods} periods of {period:.4g} s, {sol.n_steps} steps: energy error"
         if not sol.success:
-            yield Row("energy drift", subject.name, done, None, None, "", FAIL, sol.message)
+            yield Row("energy drift", tested.name, done, None, None, "", FAIL, sol.message)
             continue
         if method == "gauss":
-            yield within("energy drift", subject.name, done, sol.energy_error(), 1e-13, "symmetric, symplectic steps keep "
+            yield within("energy drift", tested.name, done, sol.energy_error(), 1e-13, "symmetric, symplectic steps keep "
                          "energy but for rounding, which compensated summation keeps from adding up: a few hundred roundings",
                          "energy does not drift")
             continue
         scales = np.abs(one.x).max(axis=0)
-        local = local_error(subject, 4 * period, rtol, np.ones(len(scales)), None, method)
+        local = local_error(tested, 4 * period, rtol, np.ones(len(scales)), None, method)
         gradient = float(np.linalg.norm(scales)) * 2 * 9.81
         size, _ = sol.energy_scale
         bound = sol.n_steps * (2 * local + 8 * EPS) * max(gradient, size) / size
-        yield within("energy drift", subject.name, done, sol.energy_error(), bound, "steps times their largest error "
+        yield within("energy drift", tested.name, done, sol.energy_error(), bound, "steps times their largest error "
                      f"({local:.1g}, measured) and roundings, all to one side",
                      "energy drifts no faster than errors of steps add up")
 
@@ -103,26 +103,26 @@ def spring_chain() -> System:
 
 def stiffness(short: bool) -> Iterator[Row]:
     """A damped spring whose stiffness goes through twelve decades, by implicit methods; explicit ones may take long."""
-    subject = Subject(spring_chain())
+    tested = SystemUnderTest(spring_chain())
     end, rtol = 10.0, 1e-8
-    methods = ["radau"] if "radau" in COMPILED and subject.module.backend == "c" else ["Radau"]
+    methods = ["radau"] if "radau" in COMPILED and tested.module.backend == "c" else ["Radau"]
     for method in [*methods, "auto", "dop853"]:
-        if method == "dop853" and subject.module.backend != "c":
+        if method == "dop853" and tested.module.backend != "c":
             continue
         taken = []
         for k in DECADES[::3] if short else DECADES:
             # Damping in proportion to the root of stiffness: half of what is critical.
-            p = subject.module.parameters({"k_2": k, "d_2": math.sqrt(k)})
-            wanted = _exact(k, math.sqrt(k), subject.start, end)
+            p = tested.module.parameters({"k_2": k, "d_2": math.sqrt(k)})
+            wanted = _exact(k, math.sqrt(k), tested.start, end)
             try:
-                sol = subject.run(np.array([0.0, end]), params=p, rtol=rtol, atol=rtol * 1e-2, method=method, max_steps=200_000)
+                sol = tested.run(np.array([0.0, end]), params=p, rtol=rtol, atol=rtol * 1e-2, method=method, max_steps=200_000)
             except ArgumentError as error:
-                yield Row("stiffness", subject.name, f"{method}: k = {k:g} N/m", None, None, "", FAIL, str(error))
+                yield Row("stiffness", tested.name, f"{method}: k = {k:g} N/m", None, None, "", FAIL, str(error))
                 continue
             done = f"{method}: k = {k:g} N/m, {sol.n_steps} steps in {end:g} s"
             if not sol.success:
                 slow = sol.method == "dop853" and sol.n_steps >= 200_000 and method != "auto"
-                yield Row("stiffness", subject.name, f"{done}: {sol.message[:100]}", None, None, "", DEGRADE if slow else FAIL,
+                yield Row("stiffness", tested.name, f"{done}: {sol.message[:100]}", None, None, "", DEGRADE if slow else FAIL,
                           "an explicit method takes steps as short as the stiffness asks; use an implicit one, or method='auto'"
                           if slow else f"it stops early; why this method: {getattr(sol, 'why', '')}")
                 continue
@@ -130,11 +130,11 @@ def stiffness(short: bool) -> Iterator[Row]:
             # Slow entries only: positions, the speed of mass 1; the spring's own speed follows from them.
             found = float(np.abs(sol.x[-1, :3] - wanted[:3]).max())
             bound = sol.n_steps * 2 * math.sqrt(4) * rtol
-            yield within("stiffness", subject.name, f"{done}: error of positions and slow speed", found, bound,
+            yield within("stiffness", tested.name, f"{done}: error of positions and slow speed", found, bound,
                          "steps times the error one may have; a damped motion magnifies none",
                          "the slow motion is right", "the slow motion is wrong")
         if method in methods and len(taken) > 1:
-            yield within("stiffness", subject.name, f"{method}: most steps over those at the least stiffness ({taken})",
+            yield within("stiffness", tested.name, f"{method}: most steps over those at the least stiffness ({taken})",
                          max(taken) / taken[0], MORE, "what is stiff dies away in a time shorter by the root of the stiffness; "
                          "each decade of time from there on may cost once the steps of the soft problem",
                          "stiffness does not shorten the steps", "stiffness shortens the steps of an implicit method")

@@ -10,7 +10,7 @@ import numpy as np
 
 from symdyn.functions.tapes import function_tape, tape_as_derived
 from symdyn.precision.program import Lost, program
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 from symdyn.tape.kernels import DAMPED, ROUNDS, SMOOTHED
 from symdyn.tape.node import Node
 from symdyn.tape.tape import Tape, unsigned
@@ -26,27 +26,27 @@ FORCES = ("k_tilde", "F_tilde", "inverse_dynamics")
 MAY_DEPEND = ("outputs", "reactions", "cut_loads", "power")
 
 
-def exact(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray,
+def exact(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray, ud: np.ndarray,
           params: np.ndarray | None = None) -> list[list[mpmath.mpf] | None]:
     """A function at rows of states with 32 digits, all numbers taken as the binary ones they are; None where it is undefined."""
     context = _precise()
-    fixed, free = _fixed(subject, params), free_leaves(subject)
+    fixed, free = _fixed(tested, params), free_leaves(tested)
     rows = [[context.mpf(float(v)) for v in row] for row in np.column_stack([t, x, inputs, ud])]
-    programs = [program(function_tape(subject.equations, name), context, fixed, free)]
+    programs = [program(function_tape(tested.equations, name), context, fixed, free)]
     found: list[list[mpmath.mpf] | None] = []
     for row in rows:
         try:
             found.append(programs[0](row))
         except (Lost, ValueError, TypeError, ZeroDivisionError):
-            found.append(_otherwise(subject, name, context, fixed, free, programs, row))
+            found.append(_otherwise(tested, name, context, fixed, free, programs, row))
     return found
 
 
-def exactly_as_written(subject: Subject, tape: Tape, rows: np.ndarray,
+def exactly_as_written(tested: SystemUnderTest, tape: Tape, rows: np.ndarray,
                        params: np.ndarray | None = None) -> list[list[mpmath.mpf] | None]:
     """A tape with 32 digits at rows of its free leaves, (n, n_free); None where it is undefined."""
     context = _precise()
-    run = program(tape, context, _fixed(subject, params), free_leaves(subject))
+    run = program(tape, context, _fixed(tested, params), free_leaves(tested))
     found: list[list[mpmath.mpf] | None] = []
     for row in rows:
         try:
@@ -66,16 +66,16 @@ def halves(rows: Sequence[list[mpmath.mpf] | None], size: int) -> tuple[np.ndarr
     return hi, lo
 
 
-def free_leaves(subject: Subject) -> list[str]:
+def free_leaves(tested: SystemUnderTest) -> list[str]:
     """Names of time, coordinates, speeds, states, inputs and given accelerations."""
-    symbols = subject.symbols
+    symbols = tested.symbols
     return ["t", *[s.name for group in (symbols.coordinates, symbols.speeds, symbols.states, symbols.inputs) for s in group],
             *[f"{s.name}_dot" for s in symbols.speeds]]
 
 
-def leaves(subject: Subject, rows: np.ndarray, params: np.ndarray | None = None) -> dict[str, Any]:
+def leaves(tested: SystemUnderTest, rows: np.ndarray, params: np.ndarray | None = None) -> dict[str, Any]:
     """Every leaf of a tape by name, from rows of the free ones: arrays (n,), and numbers for parameters."""
-    return {**_fixed(subject, params), **dict(zip(free_leaves(subject), rows.T, strict=True))}
+    return {**_fixed(tested, params), **dict(zip(free_leaves(tested), rows.T, strict=True))}
 
 
 def _precise() -> Any:
@@ -84,19 +84,19 @@ def _precise() -> Any:
     return context
 
 
-def _fixed(subject: Subject, params: np.ndarray | None) -> dict[str, float]:
-    values = subject.params if params is None else params
-    return {s.name: v for s, v in zip(subject.symbols.parameters, values.tolist(), strict=True)}
+def _fixed(tested: SystemUnderTest, params: np.ndarray | None) -> dict[str, float]:
+    values = tested.params if params is None else params
+    return {s.name: v for s, v in zip(tested.symbols.parameters, values.tolist(), strict=True)}
 
 
-def _otherwise(subject: Subject, name: str, context: Any, fixed: dict[str, float], free: Sequence[str], programs: list,
+def _otherwise(tested: SystemUnderTest, name: str, context: Any, fixed: dict[str, float], free: Sequence[str], programs: list,
                row: list) -> list[mpmath.mpf] | None:
     """By the equations for states where what the usual ones divide by vanishes."""
-    if subject.equations.otherwise is None:
+    if tested.equations.otherwise is None:
         return None
     if len(programs) == 1:
-        programs.append(program(subject.equations.otherwise.tape(name), context, fixed, free)
-                        if name in subject.equations.otherwise.quantities else None)
+        programs.append(program(tested.equations.otherwise.tape(name), context, fixed, free)
+                        if name in tested.equations.otherwise.quantities else None)
     try:
         return None if programs[1] is None else programs[1](row)
     except (Lost, ValueError, TypeError, ZeroDivisionError):
@@ -106,37 +106,37 @@ def _otherwise(subject: Subject, name: str, context: Any, fixed: dict[str, float
 # -- what is solved for
 
 
-def solved(subject: Subject, name: str) -> bool:
+def solved(tested: SystemUnderTest, name: str) -> bool:
     """Whether a function's values come from solving for accelerations, multipliers or corrections."""
     if name in ("rhs", "lam", *CORRECTIONS):
         return True
     if name not in MAY_DEPEND:
         return False
-    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
-    found = list(subject.equations.quantity("rhs").ravel())[n_q:n_q + n_u]
-    if subject.has("lam"):
-        found += list(subject.equations.quantity("lam").ravel())
+    n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
+    found = list(tested.equations.quantity("rhs").ravel())[n_q:n_q + n_u]
+    if tested.has("lam"):
+        found += list(tested.equations.quantity("lam").ravel())
     unknown = {unsigned(e) for e in found if isinstance(unsigned(e), Node) and unsigned(e).op != "leaf"}
-    return not unknown.isdisjoint(tape_as_derived(subject.equations, name).steps)
+    return not unknown.isdisjoint(tape_as_derived(tested.equations, name).steps)
 
 
-def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None, scaled: bool = True,
+def conditions(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None, scaled: bool = True,
                gradients: bool = True) -> np.ndarray:
     """Condition of the mass matrix, or of the mass matrix bordered by the constraints, with rows and columns scaled or in plain
     numbers, (n,); of constraints that depend on others without those.
 
     gradients   count small gradients of constraints, too, which scaling takes away: they make multipliers large
     """
-    if not subject.has("mass_matrix"):
+    if not tested.has("mass_matrix"):
         return np.ones(len(x))
-    n = len(subject.symbols.speeds)
-    M = subject.evaluate("mass_matrix", t, x, params).reshape(-1, n, n)
-    if not subject.constrained:
+    n = len(tested.symbols.speeds)
+    M = tested.evaluate("mass_matrix", t, x, params).reshape(-1, n, n)
+    if not tested.constrained:
         return np.array([_condition(_by_diagonal(m) if scaled else m) for m in M])
-    C = subject.evaluate("C_r", t, x, params).reshape(len(M), -1, n)
+    C = tested.evaluate("C_r", t, x, params).reshape(len(M), -1, n)
     whole = np.zeros((len(M), n + C.shape[1], n + C.shape[1]))
     whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = M, C, C.transpose(0, 2, 1)
-    values = _singular_values(subject, t, x, params)
+    values = _singular_values(tested, t, x, params)
     found = np.array([_condition(equilibrated(w) if scaled else w, int((v <= DEPENDENT).sum()))
                       for w, v in zip(whole, values, strict=True)])
     if not gradients:
@@ -144,31 +144,31 @@ def conditions(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarra
     return found * [max(1.0, 1 / v[v > DEPENDENT][-1]) if (v > DEPENDENT).any() else np.inf for v in values]
 
 
-def _singular_values(subject: Subject, t: np.ndarray, x: np.ndarray, params: np.ndarray | None) -> np.ndarray:
+def _singular_values(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, params: np.ndarray | None) -> np.ndarray:
     """Of the constraints' Jacobian with rows as lengths, over the usual largest, (n, m)."""
-    n = len(subject.symbols.speeds)
-    J = subject.evaluate("C_r", t, x, params).reshape(len(x), -1, n)
-    J = J * subject.evaluate("C_scale", t, x, params)[:, :, None]
+    n = len(tested.symbols.speeds)
+    J = tested.evaluate("C_r", t, x, params).reshape(len(x), -1, n)
+    J = J * tested.evaluate("C_scale", t, x, params)[:, :, None]
     sizes = np.array([np.linalg.svd(j, compute_uv=False) if np.isfinite(j).all() else np.zeros(min(j.shape)) for j in J])
     # Relative to the usual: a row whose gradient nearly vanishes costs digits, one that depends on others does not count.
     return np.pad(sizes / max(float(np.median(sizes[:, 0])), 1e-300), ((0, 0), (0, J.shape[1] - sizes.shape[1])))
 
 
-def redundant(subject: Subject, t: np.ndarray, x: np.ndarray) -> bool:
+def redundant(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> bool:
     """Whether some constraints depend on others at states on them, (n, n_x)."""
-    return bool((_singular_values(subject, t, x, None) <= DEPENDENT).any())
+    return bool((_singular_values(tested, t, x, None) <= DEPENDENT).any())
 
 
-def smoothed(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None) -> np.ndarray:
+def smoothed(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, params: np.ndarray | None = None) -> np.ndarray:
     """Whether states are at positions of lost rank, or so near that the smoothing there is larger than rounding errors, (n,).
 
     Regularized with e and iterated, a singular value s keeps the part (1 + s^2 / e^2)^-ROUNDS of its error; see
     symdyn.tape.kernels.
     """
-    if not subject.constrained or not solved(subject, name):
+    if not tested.constrained or not solved(tested, name):
         return np.zeros(len(x), dtype=bool)
     below = (DAMPED if name in CORRECTIONS else SMOOTHED) * EPS ** (-0.5 / ROUNDS)
-    values = _singular_values(subject, t, x, params)
+    values = _singular_values(tested, t, x, params)
     rank = (values > DEPENDENT).sum(axis=1)
     return np.any((values > DEPENDENT) & (values < below), axis=1) | (rank < rank.max())  # type: ignore[no-any-return]
 
@@ -194,12 +194,12 @@ def _condition(matrix: np.ndarray, without: int = 0) -> float:
 # -- sizes
 
 
-def together(subject: Subject, name: str, size: int) -> np.ndarray:
+def together(tested: SystemUnderTest, name: str, size: int) -> np.ndarray:
     """Which entries of a function are computed and compared together, (size,) of numbers from 0: those of one unit, one output,
     origins and rotations apart; the whole function where its entries have no units of their own."""
-    metadata = subject.module.metadata
+    metadata = tested.module.metadata
     units = [metadata.units.get(x, x) for x in metadata.x]
-    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+    n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
     of_speeds = units[n_q:n_q + n_u]
     labels: list = [0] * size
     if name == "rhs":
@@ -207,8 +207,8 @@ def together(subject: Subject, name: str, size: int) -> np.ndarray:
     elif name == "mass_matrix":
         labels = [(a, b) for a in of_speeds for b in of_speeds]
     elif name == "outputs":
-        labels = [k for k, q in enumerate(q for q in subject.equations.quantities if q.startswith("output_"))
-                  for _ in subject.equations.quantity(q).ravel()]
+        labels = [k for k, q in enumerate(q for q in tested.equations.quantities if q.startswith("output_"))
+                  for _ in tested.equations.quantity(q).ravel()]
     elif name == "frames":
         labels = [k % 12 < 3 for k in range(size)]
     elif name in ("reactions", "cut_loads"):
@@ -217,12 +217,13 @@ def together(subject: Subject, name: str, size: int) -> np.ndarray:
     return np.array([known[label] for label in labels], dtype=int)
 
 
-def weights(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, size: int, params: np.ndarray | None = None) -> np.ndarray:
+def weights(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, size: int,
+            params: np.ndarray | None = None) -> np.ndarray:
     """Factors that make a function's entries comparable, (n, size): constraints as lengths, multipliers as forces, accelerations
     and forces by the roots of their inertias, with which the mass matrix is scaled."""
-    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
-    if subject.has("mass_matrix") and (name == "rhs" or (name in FORCES and size == n_u)):
-        inertias = np.abs(np.diagonal(subject.evaluate("mass_matrix", t, x, params).reshape(-1, n_u, n_u), axis1=1, axis2=2))
+    n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
+    if tested.has("mass_matrix") and (name == "rhs" or (name in FORCES and size == n_u)):
+        inertias = np.abs(np.diagonal(tested.evaluate("mass_matrix", t, x, params).reshape(-1, n_u, n_u), axis1=1, axis2=2))
         roots = np.where((inertias > 0) & np.isfinite(inertias), np.sqrt(inertias), 1.0)
         if name in FORCES:
             return 1 / roots  # type: ignore[no-any-return]
@@ -231,7 +232,7 @@ def weights(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, size: int
         return factors
     if name not in ("C", "C_dot", "F_d", "lam"):
         return np.ones((len(x), size))
-    scale = np.abs(subject.evaluate("C_scale", t, x, params))
+    scale = np.abs(tested.evaluate("C_scale", t, x, params))
     scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     return 1 / scale if name == "lam" else scale
 
@@ -245,20 +246,20 @@ def largest(values: np.ndarray, labels: np.ndarray, factors: np.ndarray) -> np.n
     return found / factors
 
 
-def terms(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray,
+def terms(tested: SystemUnderTest, name: str, t: np.ndarray, x: np.ndarray, inputs: np.ndarray,
           params: np.ndarray | None = None) -> np.ndarray:
     """How large the terms are that make up entries whose sum may vanish for every parameter, (n, 1) or (n, size): rounding
     errors are in proportion to them. Zero for the others."""
     def values(of: str) -> np.ndarray:
-        return np.nan_to_num(np.abs(subject.evaluate(of, t, x, params, inputs)), nan=0.0, posinf=0.0)
+        return np.nan_to_num(np.abs(tested.evaluate(of, t, x, params, inputs)), nan=0.0, posinf=0.0)
 
     def size(of: str) -> np.ndarray:
         return values(of).max(axis=1, initial=0.0)  # type: ignore[no-any-return]
 
-    n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+    n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
     speed = np.abs(x[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
     none = np.zeros((len(x), 1))
-    loads = sum((size(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(len(x)))
+    loads = sum((size(of) for of in ("F_tilde", "k_tilde") if tested.has(of)), np.zeros(len(x)))
     if name == "C":  # closed loops: sums of lengths
         return (size("length") / np.fmax(values("C_scale").max(axis=1), 1e-300))[:, None]
     if name == "position_correction":  # of residuals as lengths, and what they are divided by
@@ -267,18 +268,18 @@ def terms(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.
         return (size("length") * speed * (1 + 1 / np.fmax(size("C_r"), 1e-300)) + speed)[:, None]
     if name in ("C_dot", "F_d"):
         return (size("C_r") * speed ** (2 if name == "F_d" else 1))[:, None]
-    if name == "rhs" and subject.has("mass_matrix"):
-        return _alone(subject, values, n_q, n_u)
-    if name == "k_tilde" and subject.has("mass_matrix"):
+    if name == "rhs" and tested.has("mass_matrix"):
+        return _alone(tested, values, n_q, n_u)
+    if name == "k_tilde" and tested.has("mass_matrix"):
         return (size("mass_matrix") * speed**2)[:, None]
     if name == "lam":  # what balances loads and inertial forces, also those of accelerations that constraints ask for
         gradient = np.fmax(size("C_r"), 1e-300)
         return ((loads + size("mass_matrix") * size("F_d") / gradient) / gradient)[:, None]
-    if name == "outputs" and subject.has("positions"):  # often differences of places
+    if name == "outputs" and tested.has("positions"):  # often differences of places
         return size("positions")[:, None]
     if name in ("reactions", "cut_loads"):  # sums of weights, inertial forces, loads
-        found = loads + (size("lam") * size("C_r") if subject.constrained else 0.0)
-        if subject.has("mass_matrix"):
+        found = loads + (size("lam") * size("C_r") if tested.constrained else 0.0)
+        if tested.has("mass_matrix"):
             found = found + size("mass_matrix") * speed**2
             diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
             found = found + (diagonal * values("rhs")[:, n_q:n_q + n_u]).max(axis=1, initial=0.0)
@@ -286,13 +287,13 @@ def terms(subject: Subject, name: str, t: np.ndarray, x: np.ndarray, inputs: np.
     return none
 
 
-def _alone(subject: Subject, values: Callable[[str], np.ndarray], n_q: int, n_u: int) -> np.ndarray:
+def _alone(tested: SystemUnderTest, values: Callable[[str], np.ndarray], n_q: int, n_u: int) -> np.ndarray:
     """Accelerations that each force would cause alone, (n, n_x)."""
     diagonal = np.diagonal(values("mass_matrix").reshape(-1, n_u, n_u), axis1=1, axis2=2)
-    forces = sum((values(of) for of in ("F_tilde", "k_tilde") if subject.has(of)), np.zeros(diagonal.shape))
-    if subject.constrained:
+    forces = sum((values(of) for of in ("F_tilde", "k_tilde") if tested.has(of)), np.zeros(diagonal.shape))
+    if tested.constrained:
         C = values("C_r").reshape(len(forces), -1, n_u)
         forces = forces + (C.transpose(0, 2, 1) * values("lam")[:, None, :]).sum(axis=2)
-    found = np.zeros((len(forces), len(subject.module.metadata.x)))
+    found = np.zeros((len(forces), len(tested.module.metadata.x)))
     found[:, n_q:n_q + n_u] = np.where(diagonal > 0, forces / np.where(diagonal > 0, diagonal, 1.0), 0.0)
     return found

@@ -32,7 +32,7 @@ from symdyn.stress.reference import (
     weights,
 )
 from symdyn.stress.statements import Statements, emitted
-from symdyn.stress.subject import EPS, Subject, evaluated
+from symdyn.stress.system_under_test import EPS, SystemUnderTest, evaluated
 
 # Not looked at: what is no number of the state's own.
 LEFT_OUT = ("length", "C_scale")
@@ -57,15 +57,15 @@ class States:
     closer: int = 0
 
 
-def states(subject: Subject, n: int, seed: int = 1) -> States:
+def states(tested: SystemUnderTest, n: int, seed: int = 1) -> States:
     """Random states, half of them adversarial: right angles and folded ones, angles of many turns, tiny and huge speeds,
     denormal numbers; with constraints on them."""
     rng = np.random.default_rng(seed)
-    symbols, x0 = subject.symbols, subject.start
+    symbols, x0 = tested.symbols, tested.start
     n_q, n_u = len(symbols.coordinates), len(symbols.speeds)
     reach = _reach(symbols)
     x = x0 + rng.uniform(-1, 1, (n, len(x0))) * reach
-    angles = _angles(subject)
+    angles = _angles(tested)
     for k in range(n // 2):
         kind = k % 6
         if kind == 0 and angles:
@@ -81,17 +81,17 @@ def states(subject: Subject, n: int, seed: int = 1) -> States:
             x[k, n_q:] = rng.choice([0.0, 5e-324, -1e-310], len(x0) - n_q)
         else:
             x[k] *= 10.0 ** rng.uniform(-8, 0, len(x0))
-    if subject.constrained or subject.module.metadata.unit_groups:
-        x = _consistent(subject, x, x0)
+    if tested.constrained or tested.module.metadata.unit_groups:
+        x = _consistent(tested, x, x0)
     n_in = len(symbols.inputs)
     return States(rng.uniform(0, 1, n), x, rng.uniform(-1, 1, (n, n_in)), rng.uniform(-1, 1, (n, n_u)))
 
 
-def _consistent(subject: Subject, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
+def _consistent(tested: SystemUnderTest, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     """States on the constraints, from these as guesses; where there is none nearby the start with other speeds."""
     from symdyn.runtime.integrating.stabilization import Projector
 
-    project = Projector(subject.module, subject.params)
+    project = Projector(tested.module, tested.params)
     n_q = project.n_q
     rows = x.copy()
     for k, row in enumerate(x):
@@ -105,21 +105,21 @@ def _consistent(subject: Subject, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     return rows
 
 
-def beside(subject: Subject, where: States) -> States:
+def beside(tested: SystemUnderTest, where: States) -> States:
     """The same states, every other one off the constraints by a thousandth of what coordinates and speeds usually are."""
-    symbols, x = subject.symbols, where.x.copy()
+    symbols, x = tested.symbols, where.x.copy()
     x[1::2] += ASIDE * np.random.default_rng(2).uniform(-1, 1, x[1::2].shape) * _reach(symbols)
     return replace(where, x=x)
 
 
-def towards_lost_rank(subject: Subject, where: States) -> States:
+def towards_lost_rank(tested: SystemUnderTest, where: States) -> States:
     """The same states and, where some of them lie next to a position of lost rank, more around these at smaller distances."""
-    near = np.flatnonzero(smoothed(subject, "rhs", where.t, where.x))[:LANDMARKS]
+    near = np.flatnonzero(smoothed(tested, "rhs", where.t, where.x))[:LANDMARKS]
     if not len(near):
         return where
     k = np.tile(near, len(DISTANCES))
-    sides = np.random.default_rng(4).uniform(-1, 1, where.x[k].shape) * _reach(subject.symbols)
-    x = _consistent(subject, where.x[k] + np.repeat(DISTANCES, len(near))[:, None] * sides, subject.start)
+    sides = np.random.default_rng(4).uniform(-1, 1, where.x[k].shape) * _reach(tested.symbols)
+    x = _consistent(tested, where.x[k] + np.repeat(DISTANCES, len(near))[:, None] * sides, tested.start)
     t, x, inputs, ud = (np.concatenate([old, more]) for old, more in (
         (where.t, where.t[k]), (where.x, x), (where.inputs, where.inputs[k]), (where.ud, where.ud[k])))
     return States(t, x, inputs, ud, len(k))
@@ -130,34 +130,34 @@ def _reach(symbols: Symbols) -> np.ndarray:
     return np.array([float(symbols.reach.get(s, 1)) for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)])
 
 
-def functions(subject: Subject) -> list[str]:
+def functions(tested: SystemUnderTest) -> list[str]:
     """The functions that are looked at, those of the user's outputs included."""
-    return [name for name in subject.everything if name not in LEFT_OUT
-            and any(function_tape(subject.equations, name).running)]
+    return [name for name in tested.everything if name not in LEFT_OUT
+            and any(function_tape(tested.equations, name).running)]
 
 
-def rounding(subject: Subject, short: bool) -> Iterator[Row]:
+def rounding(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     """Every function at random and adversarial states, by every compiler and backend, against 32 digits.
 
     Two bounds: what the condition of the problem costs, which shows whether the equations are solved as well as they can be; and,
     of each result, what rounding every operation once can do, which shows whether the code computes these equations at all, also
     where the condition says nothing, next to lost rank.
     """
-    names = functions(subject)
+    names = functions(tested)
     if not names:
         raise NotApplicable("nothing depends on the state")
-    operations = sum(function_tape(subject.equations, name).operations for name in names)
+    operations = sum(function_tape(tested.equations, name).operations for name in names)
     n = FEW if short else int(np.clip(WORK / max(operations, 1), FEW, STATES))
-    where = towards_lost_rank(subject, states(subject, n))
+    where = towards_lost_rank(tested, states(tested, n))
     # Constraints that depend on others contradict them beside.
-    near = beside(subject, where) if subject.constrained and not redundant(subject, where.t, where.x) else where
-    statements = emitted(subject, names)
-    measured = [Measured(subject, name, near if name in BESIDE else where, None, statements[name]) for name in names]
+    near = beside(tested, where) if tested.constrained and not redundant(tested, where.t, where.x) else where
+    statements = emitted(tested, names)
+    measured = [Measured(tested, name, near if name in BESIDE else where, None, statements[name]) for name in names]
     reference: dict[str, np.ndarray] = {}
     every: list[Finding] = []
-    for label, unit in _builds(subject, names, short):
+    for label, unit in _builds(tested, names, short):
         if isinstance(unit, str):
-            yield Row("rounding", subject.name, label, None, None, "", FAIL, unit)
+            yield Row("rounding", tested.name, label, None, None, "", FAIL, unit)
             continue
         same, found = bool(reference), []
         for one in measured:
@@ -169,28 +169,28 @@ def rounding(subject: Subject, short: bool) -> Iterator[Row]:
         if all(f.digits == -np.inf for f in found):
             raise NotApplicable("no state at which the functions are defined")
         refused = sum(f.refused for f in found)
-        yield from first_order_row(subject, label, found)
+        yield from first_order_row(tested, label, found)
         done = (f"{label}: {len(names)} functions at {len(where.x)} states, half of them adversarial, {refused} values refused "
                 "where 32 digits have one" + ("; the same bits as the first" if same else ""))
-        yield judged("rounding", subject.name, done, found)
+        yield judged("rounding", tested.name, done, found)
         if refused:
-            yield refusals(subject, label, found, refused)
+            yield refusals(tested, label, found, refused)
         every += found
-    yield from set_aside(subject, every)
+    yield from set_aside(tested, every)
 
 
-def _resolved(subject: Subject, x: np.ndarray) -> np.ndarray:
+def _resolved(tested: SystemUnderTest, x: np.ndarray) -> np.ndarray:
     """What entries of states are known relative to, (n, n_x): themselves, but angles the largest of them, because they are
     added along a mechanism."""
-    angles, sizes = _angles(subject), x.copy()
+    angles, sizes = _angles(tested), x.copy()
     if angles:
         sizes[:, angles] = np.abs(x[:, angles]).max(axis=1, keepdims=True)
     return sizes
 
 
-def _angles(subject: Subject) -> list[int]:
+def _angles(tested: SystemUnderTest) -> list[int]:
     """Places of the coordinates that are angles."""
-    units, symbols = subject.module.metadata.units, subject.symbols
+    units, symbols = tested.module.metadata.units, tested.symbols
     return [k for k, s in enumerate(symbols.coordinates) if units.get(s.name) == "rad" and s not in symbols.reach]
 
 
@@ -203,39 +203,39 @@ class Measured:
     coded        with the statements of generated code: what they give but for rounding
     """
 
-    def __init__(self, subject: Subject, name: str, where: States, params: np.ndarray | None = None,
+    def __init__(self, tested: SystemUnderTest, name: str, where: States, params: np.ndarray | None = None,
                  statements: Sequence[Statements] = ()) -> None:
         self.name, self.where = name, where
-        p = subject.params if params is None else params
-        self.chain = max(1, function_tape(subject.equations, name).longest_chain())
+        p = tested.params if params is None else params
+        self.chain = max(1, function_tape(tested.equations, name).longest_chain())
         rng = np.random.default_rng(3)
-        base = subject.evaluate(name, where.t, where.x, p, where.inputs, where.ud)
+        base = tested.evaluate(name, where.t, where.x, p, where.inputs, where.ud)
 
         def changed(values: np.ndarray, sizes: np.ndarray | None = None) -> np.ndarray:
             return values + CHANGE * rng.choice([-1, 1], values.shape) * (values if sizes is None else sizes)
 
-        moved, known = np.zeros(base.shape), _resolved(subject, where.x)
+        moved, known = np.zeros(base.shape), _resolved(tested, where.x)
         for _ in range(TRIALS):
-            other = subject.evaluate(name, changed(where.t), changed(where.x, known), changed(p), changed(where.inputs),
-                                     changed(where.ud))
+            other = tested.evaluate(name, changed(where.t), changed(where.x, known), changed(p), changed(where.inputs),
+                                    changed(where.ud))
             moved = np.fmax(moved, np.abs(other - base) / CHANGE)
-        self.values, self.rest = halves(exact(subject, name, where.t, where.x, where.inputs, where.ud, params), base.shape[1])
-        self.condition = (conditions(subject, where.t, where.x, params, gradients=False) if solved(subject, name)
+        self.values, self.rest = halves(exact(tested, name, where.t, where.x, where.inputs, where.ud, params), base.shape[1])
+        self.condition = (conditions(tested, where.t, where.x, params, gradients=False) if solved(tested, name)
                           else np.ones(len(base)))
-        labels = together(subject, name, base.shape[1])
-        factors = weights(subject, name, where.t, where.x, base.shape[1], params)
-        sizes = np.fmax(np.abs(self.values), terms(subject, name, where.t, where.x, where.inputs, params))
+        labels = together(tested, name, base.shape[1])
+        factors = weights(tested, name, where.t, where.x, base.shape[1], params)
+        sizes = np.fmax(np.abs(self.values), terms(tested, name, where.t, where.x, where.inputs, params))
         amplified = np.fmax(self.condition, 1.0)[:, None]
         with np.errstate(invalid="ignore"):  # of conditions that are infinite: set aside
             self.one = EPS * (largest(moved, labels, factors) + largest(sizes, labels, factors) * amplified)
-            self.plain = self.one if not solved(subject, name) else self.one * np.fmax(1.0, conditions(
-                subject, where.t, where.x, params, False, False)[:, None] / amplified)
+            self.plain = self.one if not solved(tested, name) else self.one * np.fmax(1.0, conditions(
+                tested, where.t, where.x, params, False, False)[:, None] / amplified)
         # No bound holds where a relative change by rounding makes the matrix singular.
         self.singular = ~(self.condition * EPS * self.chain < 1)
-        self.smoothed = smoothed(subject, name, where.t, where.x, params) & ~self.singular
+        self.smoothed = smoothed(tested, name, where.t, where.x, params) & ~self.singular
         rows = np.column_stack([where.t, where.x, where.inputs, where.ud])
-        self.coded = Coded(subject, statements, rows, (labels, factors), (self.values, self.rest), params) if statements else None
-        self._subject = subject
+        self.coded = Coded(tested, statements, rows, (labels, factors), (self.values, self.rest), params) if statements else None
+        self._subject = tested
 
     def run(self, evaluator: Any) -> np.ndarray:
         """The function of generated code at the states, (n, size)."""
@@ -278,13 +278,13 @@ class Measured:
     def _imbalance(self, values: np.ndarray, states: np.ndarray, backend: str) -> float:
         """Digits by which accelerations miss their equations beyond what is due, at those of the states where they have no bound
         themselves."""
-        subject, where = self._subject, self.where
-        if self.coded is None or self.name != "rhs" or not subject.has("mass_matrix"):
+        tested, where = self._subject, self.where
+        if self.coded is None or self.name != "rhs" or not tested.has("mass_matrix"):
             return -np.inf
-        n_q, n_u = len(subject.symbols.coordinates), len(subject.symbols.speeds)
+        n_q, n_u = len(tested.symbols.coordinates), len(tested.symbols.speeds)
         states = states & ~np.isfinite(self.coded.bound(backend)[:, n_q:n_q + n_u]).all(axis=1)
         rows = np.column_stack([where.t, where.x, where.inputs, where.ud])[states]
-        return float(imbalance(subject, rows, values[states, n_q:n_q + n_u], backend).max(initial=-np.inf))
+        return float(imbalance(tested, rows, values[states, n_q:n_q + n_u], backend).max(initial=-np.inf))
 
 
 def compilers() -> list[Compiler]:
@@ -303,7 +303,7 @@ def compilers() -> list[Compiler]:
     return found
 
 
-def _builds(subject: Subject, names: list[str], short: bool) -> Iterator[tuple[str, Any]]:
+def _builds(tested: SystemUnderTest, names: list[str], short: bool) -> Iterator[tuple[str, Any]]:
     """What the functions are run by: name and unit, or what the compiler said."""
     for compiler in compilers():
         levels = ("-O0",) if short else ("-O0", "-O2", "-O3")
@@ -314,9 +314,9 @@ def _builds(subject: Subject, names: list[str], short: bool) -> Iterator[tuple[s
             words = tuple(w for w in compiler.command if not (level and w in ("-O0", "-O1", "-O2", "-O3")))
             label = f"C, {compiler.kind} {level}".rstrip()
             try:
-                yield label, subject.unit(names, "c", replace(compiler, command=(*words, level) if level else words))
+                yield label, tested.unit(names, "c", replace(compiler, command=(*words, level) if level else words))
             except (CompileError, ArgumentError) as error:
                 yield label, str(error)
-    yield "NumPy", subject.unit(names, "numpy")
+    yield "NumPy", tested.unit(names, "numpy")
 
 

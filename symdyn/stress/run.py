@@ -22,7 +22,7 @@ from symdyn.progress import bar as progress_bar
 from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
 from symdyn.stress.record import DEGRADE, FAIL, Interrupted, NotApplicable, NoUsualMotion, Row, StressReport
 from symdyn.stress.start import start
-from symdyn.stress.subject import Subject, named
+from symdyn.stress.system_under_test import SystemUnderTest, named
 from symdyn.systems import names as catalogue
 
 # In the short form, where the whole catalogue would take too long.
@@ -33,7 +33,7 @@ USUAL = "usual motion"
 
 @dataclass(frozen=True)
 class Check:
-    """One check, or a family: run(subject, short) of any mechanism, or run(short) with mechanisms of its own.
+    """One check, or a family: run(tested, short) of any mechanism, or run(short) with mechanisms of its own.
 
     short   whether the short form has it
     """
@@ -132,14 +132,14 @@ def _tasks(system: Any, short: bool, chosen: list[Check]) -> list[Task]:
     return [*[("", (name,), short) for name in own], *[(name, of_system, short) for name in listed if of_system]]
 
 
-def _subject(system: Any) -> str | Subject:
+def _subject(system: Any) -> str | SystemUnderTest:
     """A name, which a process can take, or the system under test; its faults are reported before anything is run."""
     if isinstance(system, str):
         named(system)
         return system
-    if not isinstance(system, (System, Equations, Subject)):
+    if not isinstance(system, (System, Equations, SystemUnderTest)):
         raise ArgumentError(f"stress was given {system!r}; pass a System, Equations, or the name of one of the catalogue")
-    found = system if isinstance(system, Subject) else Subject(system)
+    found = system if isinstance(system, SystemUnderTest) else SystemUnderTest(system)
     found.demand_numbers()
     return found
 
@@ -163,26 +163,26 @@ def _in_turn(tasks: Sequence[Task]) -> Generator[Result]:
     """One check after the other, of a mechanism after its start. What is wrong with its usual motion is reported by the first one
     that looks at it."""
     for system, names, short in tasks:
-        subject = None
+        tested = None
         if system != "":
-            subject = Subject(system) if isinstance(system, str) else system
-            begun = list(start(subject))
+            tested = SystemUnderTest(system) if isinstance(system, str) else system
+            begun = list(start(tested))
             fit = all(row.verdict != FAIL for row in begun)
-            yield begun, [] if fit else [f"{', '.join(names)}, {subject.name}: it cannot be run"], 0 if fit else len(names)
+            yield begun, [] if fit else [f"{', '.join(names)}, {tested.name}: it cannot be run"], 0 if fit else len(names)
             if not fit:
                 continue
         reported = False
         for name in names:
-            rows, left_out = _one(subject, name, short)
+            rows, left_out = _one(tested, name, short)
             yield [row for row in rows if not (reported and row.check == USUAL)], left_out, 1
             reported = reported or any(row.check == USUAL for row in rows)
 
 
-def _one(subject: Subject | None, name: str, short: bool) -> tuple[list[Row], list[str]]:
+def _one(tested: SystemUnderTest | None, name: str, short: bool) -> tuple[list[Row], list[str]]:
     """Rows of a check, and what it leaves out. Whatever a check raises is a row."""
-    check, rows, label = CHECKS[name], [], "-" if subject is None else subject.name
+    check, rows, label = CHECKS[name], [], "-" if tested is None else tested.name
     try:
-        for row in check.run(short) if subject is None else check.run(subject, short):
+        for row in check.run(short) if tested is None else check.run(tested, short):
             rows.append(row)
     except NotApplicable as reason:
         if isinstance(reason, NoUsualMotion):

@@ -18,7 +18,7 @@ from symdyn.model.symbols import coordinates, parameters, time
 from symdyn.model.system import System
 from symdyn.stress.record import DEGRADE, FAIL, Row, within
 from symdyn.stress.reference import conditions
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 from symdyn.systems import get
 
 RTOL = 1e-10
@@ -41,16 +41,16 @@ def two_points() -> System:
 
 def massless(short: bool) -> Iterator[Row]:
     """Links without mass, and nearly so."""
-    subject = Subject(two_points())
+    tested = SystemUnderTest(two_points())
     for m in (1e-4, 1e-8, 1e-12, 0.0):
-        p = subject.module.parameters({"m_1": m})
-        sol = subject.run((0.0, 2.0), params=p, rtol=RTOL, max_steps=200_000)
+        p = tested.module.parameters({"m_1": m})
+        sol = tested.run((0.0, 2.0), params=p, rtol=RTOL, max_steps=200_000)
         done = f"mass of the upper link {m:g} kg of 1 kg, through q2 = 0: {sol.n_steps} steps"
         if not sol.success:
-            yield _named("massless links", subject.name, done, sol, ("singular", "mass", "pivot", "M_tilde"))
+            yield _named("massless links", tested.name, done, sol, ("singular", "mass", "pivot", "M_tilde"))
             continue
         # Near q2 = 0 the condition is 1/m; half of it is felt in the energy, which is quadratic.
-        yield within("massless links", subject.name, f"{done}: energy error", sol.energy_error(),
+        yield within("massless links", tested.name, f"{done}: energy error", sol.energy_error(),
                      sol.n_steps * 2 * math.sqrt(4) * RTOL * (1 + 1 / math.sqrt(max(m, EPS))),
                      "steps times the error one may have times speeds that grow by the root of the mass ratio",
                      "energy survives the whip of the light link")
@@ -60,7 +60,7 @@ def massless(short: bool) -> Iterator[Row]:
     tip = last.add_body("tip")
     last.add_joint(Revolute("shoulder", last.ground, rod, q_1))
     last.add_joint(Revolute("wrist", rod, tip, q_2, parent_point=[1, 0]))
-    yield _refused("massless links", "a last link without mass and inertia", lambda: Subject(last).run((0.0, 1.0)),
+    yield _refused("massless links", "a last link without mass and inertia", lambda: SystemUnderTest(last).run((0.0, 1.0)),
                    ("wrist", "q2"))
 
 
@@ -98,21 +98,21 @@ def configurations(short: bool) -> Iterator[Row]:
     if not short:
         cases.append(("eight windows through the flat position", get("n_four_bar", n=8), 10.0))
     for what, system, end in cases:
-        subject = Subject(system)
+        tested = SystemUnderTest(system)
         end = end / 4 if short else end
-        sol = subject.run((0.0, end), rtol=RTOL, max_steps=200_000)
+        sol = tested.run((0.0, end), rtol=RTOL, max_steps=200_000)
         done = f"{what}: {end:g} s, {sol.n_steps} steps"
         if not sol.success:
-            yield _named("singular positions", subject.name, done, sol, ("rank", "gradient"))
+            yield _named("singular positions", tested.name, done, sol, ("rank", "gradient"))
             continue
         rank = int(sol.rank.min())
         passes = _closed(system.name, sol)
-        yield within("singular positions", subject.name, f"{done}, rank down to {rank} at output times: energy error",
+        yield within("singular positions", tested.name, f"{done}, rank down to {rank} at output times: energy error",
                      sol.energy_error(), sol.n_steps * 2 * math.sqrt(sol.x.shape[1]) * 2 * RTOL * 10,
                      PROJECTED, "energy passes the singular position")
         if passes is not None:
             found, where = passes
-            yield within("singular positions", subject.name, f"{done}: distance from the branch {where}", found, 1e-6,
+            yield within("singular positions", tested.name, f"{done}: distance from the branch {where}", found, 1e-6,
                          "half of the digits: branches meet quadratically where they cross", "it stays on its branch",
                          "it leaves its branch at the singular position")
     yield from _four_bar(short)
@@ -139,15 +139,15 @@ def _four_bar(short: bool) -> Iterator[Row]:
     second = math.atan2(y, x) + math.acos(r / 2.8)
     third = math.atan2(y, x) - math.acos(r / 2.8)
     system.initial = {q_1: 1.0, q_2: second - 1.0, q_3: third - second, q_1.dot: -6.0}
-    subject = Subject(system)
+    tested = SystemUnderTest(system)
     end = 1.0 if short else 5.0
-    sol = subject.run((0.0, end), rtol=RTOL, max_steps=200_000)
+    sol = tested.run((0.0, end), rtol=RTOL, max_steps=200_000)
     done = f"four-bar with l1 + d = l2 + l3, driven through its change point: {end:g} s, {sol.n_steps} steps"
     if not sol.success:
-        yield _named("singular positions", subject.name, done, sol, ("rank", "gradient", "depend"))
+        yield _named("singular positions", tested.name, done, sol, ("rank", "gradient", "depend"))
         return
     turns = float(np.ptp(sol.q[:, 0])) / (2 * math.pi)
-    yield within("singular positions", subject.name, f"{done}, {turns:.2g} turns of the crank: energy error",
+    yield within("singular positions", tested.name, f"{done}, {turns:.2g} turns of the crank: energy error",
                  sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, PROJECTED,
                  "energy passes the change point")
 
@@ -173,17 +173,17 @@ def _held(system: System, what: str) -> Iterator[Row]:
     try:
         with warnings.catch_warnings():  # that the constraint holds nothing at full reach is what is looked at
             warnings.simplefilter("ignore", ModelWarning)
-            subject = Subject(system)
-        sol = subject.run((0.0, 0.5), rtol=RTOL, max_steps=50_000)
+            tested = SystemUnderTest(system)
+        sol = tested.run((0.0, 0.5), rtol=RTOL, max_steps=50_000)
     except SymdynError as error:
         named = any(word in str(error) for word in ("reach", "rank", "gradient"))
         yield Row("singular positions", system.name, f"{what}: {str(error)[:200]}", None, None, "", DEGRADE if named else FAIL,
                   "it is refused, and the message names the constraint" if named else "the message does not name the constraint")
         return
     if not sol.success:
-        yield _named("singular positions", subject.name, what, sol, ("reach", "rank", "gradient"))
+        yield _named("singular positions", tested.name, what, sol, ("reach", "rank", "gradient"))
         return
-    yield within("singular positions", subject.name, f"{what}: 0.5 s, {sol.n_steps} steps: change of the elbow's angle, rad",
+    yield within("singular positions", tested.name, f"{what}: 0.5 s, {sol.n_steps} steps: change of the elbow's angle, rad",
                  float(np.ptp(sol.q[:, 1])), 1e-4, "the distance from full reach is quadratic in the angle: the root of 1e-8",
                  "the arm turns as one, stretched")
 
@@ -194,7 +194,7 @@ def _held(system: System, what: str) -> Iterator[Row]:
 def redundant(short: bool) -> Iterator[Row]:
     """The same constraints twice and three times, also multiplied: the accelerations are those of one."""
     plain = get("four_bar")
-    first = Subject(plain)
+    first = SystemUnderTest(plain)
     rng = np.random.default_rng(5)
     x = np.array([np.concatenate(first.module.consistent(first.start[:3] + rng.uniform(-0.3, 0.3, 3), rng.uniform(-2, 2, 3)))
                   for _ in range(10)])
@@ -204,20 +204,20 @@ def redundant(short: bool) -> Iterator[Row]:
         last, l_3, d = system.bodies[-1], *(next(s for s in system.defaults if s.name == n) for n in ("l3", "d"))
         for k in range(1, times):
             system.close_loop(Revolute(f"again{k}", system.ground, last, parent_point=[d, 0], child_point=[l_3, 0]))
-        subject = Subject(system)
-        found = np.array([subject.module.rhs(0.0, row) for row in x])
+        tested = SystemUnderTest(system)
+        found = np.array([tested.module.rhs(0.0, row) for row in x])
         size = np.abs(wanted).max()
-        chain = subject.equations.tape("rhs").longest_chain()
+        chain = tested.equations.tape("rhs").longest_chain()
         condition = float(conditions(first, np.zeros(len(x)), x).max())
-        yield within("redundant", subject.name, f"last hinge closed {times} times, 10 states: accelerations against those with "
+        yield within("redundant", tested.name, f"last hinge closed {times} times, 10 states: accelerations against those with "
                      "one, relative", float(np.abs(found - wanted).max() / size), 4 * EPS * chain * condition,
                      f"rounding of {chain} operations in a chain times the condition ({condition:.2g}), of both sides",
                      "redundant constraints change nothing")
-        sol = subject.run((0.0, 1.0 if short else 5.0), rtol=RTOL)
+        sol = tested.run((0.0, 1.0 if short else 5.0), rtol=RTOL)
         if not sol.success:
-            yield _named("redundant", subject.name, f"last hinge closed {times} times", sol, ("rank", "depend"))
+            yield _named("redundant", tested.name, f"last hinge closed {times} times", sol, ("rank", "depend"))
             continue
-        yield within("redundant", subject.name, f"last hinge closed {times} times, {sol.t[-1]:g} s, {sol.n_steps} steps: energy "
+        yield within("redundant", tested.name, f"last hinge closed {times} times, {sol.t[-1]:g} s, {sol.n_steps} steps: energy "
                      "error", sol.energy_error(), sol.n_steps * 2 * math.sqrt(6) * 2 * RTOL * 10, PROJECTED,
                      "energy is kept with redundant constraints")
 
@@ -250,13 +250,13 @@ def user_forces(short: bool) -> Iterator[Row]:
         system.defaults = {m: 1.0}
         system.duration = 1.0
         for backend in ("c", "numpy"):
-            subject = Subject(system)
+            tested = SystemUnderTest(system)
             try:
-                subject.module = subject.equations.compile(backend=backend)
+                tested.module = tested.equations.compile(backend=backend)
             except SymdynError as error:
                 yield Row("user forces", system.name, backend, None, None, "", FAIL, str(error))
                 continue
-            sol = subject.run((0.0, 1.0), rtol=RTOL)
+            sol = tested.run((0.0, 1.0), rtol=RTOL)
             yield stopped("user forces", system.name, f"{backend}: a force of the user is {bad} from t = 0.5 s on", sol, 0.5,
                           ("gust",))
 

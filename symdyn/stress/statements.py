@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from symdyn.functions.tapes import tape_as_derived
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 from symdyn.tape.balance import balance
 from symdyn.tape.node import Node
 from symdyn.tape.passes import Again
@@ -25,12 +25,12 @@ class Statements:
     smooths: bool
 
 
-def emitted(subject: Subject, names: Sequence[str]) -> dict[str, list[Statements]]:
+def emitted(tested: SystemUnderTest, names: Sequence[str]) -> dict[str, list[Statements]]:
     """By name the tapes that functions of one unit run: the usual one, and where there is another for states at which a check
     of it fails, that one. Sums are in the order of generated code; algorithms are written out where `written_out` can."""
-    tapes = {name: tape_as_derived(subject.equations, name) for name in names}
-    if subject.equations.otherwise is not None:
-        others = subject.equations.otherwise
+    tapes = {name: tape_as_derived(tested.equations, name) for name in names}
+    if tested.equations.otherwise is not None:
+        others = tested.equations.otherwise
         for name in names:
             there = tape_as_derived(others, name)
             if _entries(there) != _entries(tapes[name]):

@@ -12,7 +12,7 @@ from symdyn.bench.work import against, resume
 from symdyn.bench.work.against.mechanism import calibrated
 from symdyn.bench.work.against.peer import Failed
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Subject, Comparison
+from symdyn.bench.work.system_under_test import Comparison, SystemUnderTest
 from symdyn.errors import SymdynError
 from symdyn.lab import extended
 from symdyn.lab.loop_cases import REFERENCE
@@ -65,8 +65,8 @@ def test_every_mechanism_has_the_numbers_of_the_library():
 @pytest.fixture(scope="module")
 def swinging():
     """A pendulum over 2 s in its angle, one in x and y, and their motions."""
-    angle, = Subject("swing", {"": systems.get("pendulum")}, 2.0).formulated(["embedding"])[0]
-    plane, = Subject("swing", {"": systems.get("pendulum_absolute")}, 2.0).formulated(["augmented"])[0]
+    angle, = SystemUnderTest("swing", {"": systems.get("pendulum")}, 2.0).formulated(["embedding"])[0]
+    plane, = SystemUnderTest("swing", {"": systems.get("pendulum_absolute")}, 2.0).formulated(["augmented"])[0]
     return {f.name: (f, f.module.simulate(np.r_[0.0, TIMES], rtol=1e-13, atol=1e-14).x[1:]) for f in (angle, plane)}
 
 
@@ -287,7 +287,7 @@ def test_what_a_program_prepares_counts(monkeypatch):
 def test_errors_in_other_coordinates_where_a_state_is_known(swinging):
     # Other programs give the end alone: nothing else is known, and the end is.
     formulation, exact = swinging["embedding"]
-    other, = Subject("swing", {"": systems.get("pendulum")}, 2.0).formulated(["absolute"])[0]
+    other, = SystemUnderTest("swing", {"": systems.get("pendulum")}, 2.0).formulated(["absolute"])[0]
     same = other.module.simulate(np.r_[0.0, TIMES], rtol=1e-12).x[1:]
     comparison = Comparison(Reference("closed form", tuple(TIMES), exact.tolist(), 15.0, ""), formulation, bodies=True)
     alone = np.full_like(same, np.nan)

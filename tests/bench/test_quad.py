@@ -14,7 +14,7 @@ from mpmath import libmp
 import symdyn as sd
 from symdyn.bench import kept
 from symdyn.bench.work import store
-from symdyn.bench.work.cases import subject
+from symdyn.bench.work.cases import named_case
 from symdyn.bench.work.converged import converged, distance
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, EvaluationError
@@ -114,7 +114,7 @@ def test_motions_are_those_of_mpmath():
 
 @needs_quad
 def test_references_are_those_of_mpmath(monkeypatch):
-    first = subject("double_pendulum").first()
+    first = named_case("double_pendulum").first()
     reference, compiled = converged(first, [0.4, 0.8], 18)
     monkeypatch.setattr(quad, "suits", lambda digits: False)
     _, usual = converged(first, [0.4, 0.8], 18)
@@ -155,7 +155,7 @@ def test_without_gcc(monkeypatch, context):
 
 def test_stored_motion_of_the_turbine():
     """It is that of the mechanism as it is, with the digits shown, and a tight run is near, also in the yaw of 1e-10 rad."""
-    about = subject("floating_wind_turbine")
+    about = named_case("floating_wind_turbine")
     first = about.first()
     data = store.stored()[about.name]
     found = store.find(about.name, first, data["times"])

@@ -19,13 +19,13 @@ from symdyn.bench.work.against.apart import TooLong, prepared
 from symdyn.bench.work.against.peer import Failed, Unfit
 from symdyn.bench.work.asked import checked, grid
 from symdyn.bench.work.benchmark import Benchmark, finished, run
-from symdyn.bench.work.cases import CASES, from_maker, subject
+from symdyn.bench.work.cases import CASES, from_maker, named_case
 from symdyn.bench.work.command import nothing
 from symdyn.bench.work.picture import COLORS, styles_of
 from symdyn.bench.work.plan import Job, Walk, spread
 from symdyn.bench.work.record import Reference, Row
 from symdyn.bench.work.reference import agreement
-from symdyn.bench.work.subject import Subject, Comparison
+from symdyn.bench.work.system_under_test import Comparison, SystemUnderTest
 from symdyn.bench.work.timing import Timing, one_pass
 from symdyn.cli import main
 from symdyn.errors import ArgumentError, SymdynError
@@ -38,7 +38,7 @@ ASKED = {"method_names": ["dop853"], "tolerances": [1e-4, 1e-7, 1e-10], "repeats
 def measured(tmp_path_factory):
     """The simple pendulum over 2 s in two formulations, and the folder of the results."""
     folder = tmp_path_factory.mktemp("bench")
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding", "augmented", "absolute"], at=[0.4], **ASKED), folder)
     return result, folder
 
@@ -74,9 +74,9 @@ def test_errors_fall_with_the_tolerance_and_work_rises(measured):
 def test_what_a_mechanism_does_not_have_is_left_out_with_the_reason(measured):
     (skipped,) = measured[0].skipped
     assert skipped.formulation == "augmented" and "has no constraints" in skipped.why
-    (_,), (planar,) = subject("double_pendulum").formulated(["recursive", "absolute:angles"])
+    (_,), (planar,) = named_case("double_pendulum").formulated(["recursive", "absolute:angles"])
     assert "one angle is all there is" in planar.why
-    _, (tied,) = subject("four_bar").formulated(["embedding"])
+    _, (tied,) = named_case("four_bar").formulated(["embedding"])
     assert "takes trees only" in tied.why
 
 
@@ -119,7 +119,7 @@ def test_more_tolerances_to_a_decade_begin_looser():
     assert [f"{v:.0e}" for v in grid(1)] == [f"{10.0**-k:.0e}" for k in range(3, 16)]
     dense = grid(4)
     assert len(dense) == 57 and dense[0] == 0.1 and math.isclose(dense[1] / dense[2], 10**0.25) and math.isclose(dense[-1], 1e-15)
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     assert len(checked([about], per_decade=4).tolerances) == 57
     with pytest.raises(ArgumentError, match="0 tolerances to a decade were asked for; pass a number from 1 to 10"):
         checked([about], per_decade=0)
@@ -148,7 +148,7 @@ def test_files_are_whole_and_stand_alone(measured):
 
 
 def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     asked = checked([about], ["embedding"], **ASKED)
     made, original = [], plan.own
 
@@ -185,7 +185,7 @@ def test_an_unfinished_run_goes_on(tmp_path, monkeypatch, drawn):
 
 
 def test_what_a_run_left_stays_when_the_next_is_stopped_at_once(tmp_path, monkeypatch):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     asked = checked([about], ["embedding"], budget=1e-9, **ASKED)
     run(about, asked, tmp_path)
     data = json.loads((tmp_path / "results.json").read_text())
@@ -202,21 +202,21 @@ def test_what_a_run_left_stays_when_the_next_is_stopped_at_once(tmp_path, monkey
 
 
 def test_results_of_another_motion_are_not_gone_on_with(tmp_path):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     tight = checked([about], ["embedding"], **{**ASKED, "tolerances": [1e-5]}, budget=1e-9)
     assert run(about, tight, tmp_path).rows == []
     data = json.loads((tmp_path / "results.json").read_text())
     data["rows"] = [Row("embedding", "dop853", 1e-5, seconds=1.0).record()]
     (tmp_path / "results.json").write_text(json.dumps(data))
     assert run(about, tight, tmp_path).rows[0].seconds == 1.0
-    other = subject("pendulum", end=2.5)
+    other = named_case("pendulum", end=2.5)
     assert run(other, tight, tmp_path).rows == []
 
 
 @pytest.mark.parametrize("damaged", [{"until": [["x", "y"]]}, {"tolerance": "1e-5"}, {"seconds": "long"}, {"until": [3]},
                                      {"errors": 3}, 3, {"method": None}])
 def test_damaged_results_are_not_there(tmp_path, damaged):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     tight = checked([about], ["embedding"], **{**ASKED, "tolerances": [1e-5]}, budget=1e-9)
     run(about, tight, tmp_path)
     data = json.loads((tmp_path / "results.json").read_text())
@@ -281,7 +281,7 @@ def test_what_was_done_before_a_stop_is_kept(pair, drawn, monkeypatch, capsys):
 
 
 def test_finished_results_that_are_damaged_are_not_there(tmp_path, measured):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     asked = checked([about], ["embedding", "augmented", "absolute"], at=[0.4], **ASKED)
     data = {**measured[0].record(), "command": "this"}
     for change, there in (({}, True), ({"rows": [3]}, False), ({"reference": None}, False), ({"command": "other"}, False),
@@ -311,7 +311,7 @@ def test_code_of_every_method_is_in_the_fingerprint(tmp_path, monkeypatch):
 
 
 def test_a_budget_counts_from_the_beginning(monkeypatch):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     original = benchmark.find_reference
 
     def slow(*given):
@@ -326,13 +326,13 @@ def test_a_budget_counts_from_the_beginning(monkeypatch):
 
 
 def test_two_runs_that_agree_are_all_there_is_time_for():
-    formulation, = subject("pendulum", end=1.0).formulated(["embedding"])[0]
+    formulation, = named_case("pendulum", end=1.0).formulated(["embedding"])[0]
     quick = agreement([formulation], [1.0], "late", 0.0)
     assert quick.how.startswith("embedding with dop853 at 1e-12 and embedding with Radau at 1e-12 differ by ")
 
 
 def test_budget_is_honoured_and_told(tmp_path):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding"], budget=1e-9, **ASKED))
     assert result.rows == [] and result.unfinished.startswith("3 of 3 runs were not made within the budget of 1e-09 s, which ")
     assert "unfinished: 3 of 3 runs" in result.table()
@@ -350,7 +350,7 @@ def test_a_coarse_grid_comes_first():
 
 
 def test_a_method_that_does_not_fit_is_left_out(monkeypatch):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
 
     def unfit(*_):
         raise ArgumentError("pendulum: the method takes no pendulums")
@@ -379,7 +379,7 @@ def test_slow_tolerances_leave_steps_and_slow_steps_leave_tolerances():
 
 
 def test_slow_methods_are_not_asked_for_more(monkeypatch):
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     monkeypatch.setattr(plan, "own", lambda f, m, t, *_: Row(f.name, m, t, seconds=3.0, least=3.0))
     result = run(about, checked([about], ["embedding"], **ASKED))
     assert [r.tolerance for r in result.rows] == [1e-4]
@@ -428,7 +428,7 @@ class _Missing(_Exact):
 def test_other_programs_run_beside(monkeypatch):
     monkeypatch.setattr(against, "names", lambda: ["some"])
     monkeypatch.setattr(against, "peers", lambda name: (_Exact(), _Unfit(), _Broken(), _Missing()))
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding"], peers=["some"], at=[0.4, 2.0], **ASKED))
     assert [r.message for r in result.rows if r.method == "broken"] == ["it broke"] * 3
     rows = [r for r in result.rows if r.method == "exact"]
@@ -474,7 +474,7 @@ def test_a_budget_ends_what_other_programs_prepare(monkeypatch, tmp_path):
     monkeypatch.setattr(against, "names", lambda: ["some"])
     peers = _Slow("slow at once"), _Exact(), _Slow("slow later"), _Broken(), _Dying("dying")
     monkeypatch.setattr(against, "peers", lambda name: peers)
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     begun = time.perf_counter()
     result = run(about, checked([about], ["embedding"], peers=["all"], budget=3.0, **ASKED), tmp_path)
     assert time.perf_counter() - begun < 4.5
@@ -533,7 +533,7 @@ def test_auto_is_measured_and_tells_what_it_chose(tmp_path, drawn):
 
 
 def test_steps_need_a_method_that_has_them():
-    about = subject("pendulum")
+    about = named_case("pendulum")
     with pytest.raises(ArgumentError, match=r"none of the methods dop853, auto has steps of one length; add gauss, or leave"):
         checked([about], method_names=["dop853", "auto"], steps=[0.1])
     assert checked([about], method_names=["dop853", "gauss"], steps=[0.1]).steps == checked([about], steps=[0.1]).steps == (0.1,)
@@ -605,7 +605,7 @@ def test_all_faults_are_told_at_once():
 
 def test_bodies_that_carry_joints_in_absolute_coordinates_do_not_count():
     times = np.array([0.1, 0.2])
-    first, other = subject("slider_crank").formulated(["augmented", "absolute"])[0]
+    first, other = named_case("slider_crank").formulated(["augmented", "absolute"])[0]
     assert len(other.module.metadata.bodies) == 4 > len(first.module.metadata.bodies) == 2
     x, y = (f.module.simulate(np.r_[0.0, times], rtol=1e-11).x[1:] for f in (first, other))
     comparison = Comparison(Reference("agreement", tuple(times), x.tolist(), 11.0, ""), first, bodies=True)
@@ -621,12 +621,12 @@ def test_formulations_none_of_which_fits():
 
 
 def test_mechanisms_of_the_list_and_their_variants():
-    tops = subject("heavy_top")
+    tops = named_case("heavy_top")
     assert tops.names[-3:] == ["embedding:parameters", "recursive:parameters", "augmented:parameters"]
-    assert list(subject("floating_wind_turbine").variants) == ["angles", "parameters"]
-    assert subject("n_link_pendulum(3)").name == "n_link_pendulum_3" and list(subject("four_bar").variants) == [""]
+    assert list(named_case("floating_wind_turbine").variants) == ["angles", "parameters"]
+    assert named_case("n_link_pendulum(3)").name == "n_link_pendulum_3" and list(named_case("four_bar").variants) == [""]
     made = from_maker("own", lambda n=1: sd.systems.get("pendulum"), end=1.0)
-    assert isinstance(made, Subject) and made.end == 1.0 and list(made.variants) == [""]
+    assert isinstance(made, SystemUnderTest) and made.end == 1.0 and list(made.variants) == [""]
 
 
 def test_equations_by_hand():
@@ -685,7 +685,7 @@ def test_reference_prints():
 def test_without_a_compiler_methods_of_scipy_are_taken_and_that_is_told(monkeypatch):
     for module in (methods, benchmark):
         monkeypatch.setattr(module, "find_compiler", lambda: None)
-    about = subject("pendulum", end=1.0)
+    about = named_case("pendulum", end=1.0)
     asked = checked([about], ["embedding"], tolerances=[1e-4], repeats=1)
     assert asked.methods == ("RK45", "DOP853", "Radau", "LSODA")
     result = run(about, asked)
@@ -745,7 +745,7 @@ def test_programs_that_take_bodies_show_no_formulation_of_ours(monkeypatch):
 
     monkeypatch.setattr(against, "names", lambda: ["some"])
     monkeypatch.setattr(against, "peers", lambda name: (Bodies(), _Exact()))
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     result = run(about, checked([about], ["embedding"], peers=["some"], **ASKED))
     assert {(r.formulation, r.method) for r in result.rows if r.peer} == {("bodies", "from bodies"), ("embedding", "exact")}
     assert picture.title("bodies") == "bodies and joints"

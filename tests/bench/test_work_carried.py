@@ -7,7 +7,7 @@ import pytest
 from symdyn.bench.work import plan, resume
 from symdyn.bench.work.asked import checked
 from symdyn.bench.work.benchmark import Benchmark, run
-from symdyn.bench.work.cases import subject
+from symdyn.bench.work.cases import named_case
 from symdyn.bench.work.record import Row
 
 WIDE, NARROW = (1e-4, 1e-7, 1e-10), (1e-5,)
@@ -16,7 +16,7 @@ WIDE, NARROW = (1e-4, 1e-7, 1e-10), (1e-5,)
 @pytest.fixture()
 def bench(tmp_path, monkeypatch):
     """Runs of the simple pendulum into one folder, which give the result and what was measured for it."""
-    about, made, original = subject("pendulum", end=2.0), [], plan.own
+    about, made, original = named_case("pendulum", end=2.0), [], plan.own
 
     def own(formulation, method, tolerance, *others):
         made.append((formulation.name, tolerance))

@@ -6,9 +6,9 @@ import pytest
 
 import symdyn as sd
 from symdyn.bench.work.asked import checked
-from symdyn.bench.work.cases import subject
+from symdyn.bench.work.cases import named_case
 from symdyn.cli import main
-from symdyn.cli.mechanism import find_mechanism, find_subject, is_file, title_of
+from symdyn.cli.mechanism import find_mechanism, find_system_under_test, is_file, title_of
 from symdyn.cli.messages import Stop
 from symdyn.errors import ArgumentError
 
@@ -19,21 +19,21 @@ def test_options_in_names_and_beside_them_are_checked(tmp_path):
                        ("n_four_bar(x)", "option n of n_four_bar must be"), ("pendulum(3)", "pendulum takes no option")):
         with pytest.raises(ArgumentError, match=re.escape(told)):
             sd.bench(name)
-    assert subject("n_link_pendulum", None, {"n": 2}).name == "n_link_pendulum_n_2"
-    assert subject("heavy_top", None, {"orientation": "parameters"}).names[0] == "embedding"
+    assert named_case("n_link_pendulum", None, {"n": 2}).name == "n_link_pendulum_n_2"
+    assert named_case("heavy_top", None, {"orientation": "parameters"}).names[0] == "embedding"
     # What is known of a motion is known of the usual options.
-    assert subject("lagrange_top").closed and subject("lagrange_top", None, {"orientation": "parameters"}).closed is None
-    assert list(subject("lagrange_top", None, {"orientation": "parameters"}).variants) == [""]
+    assert named_case("lagrange_top").closed and named_case("lagrange_top", None, {"orientation": "parameters"}).closed is None
+    assert list(named_case("lagrange_top", None, {"orientation": "parameters"}).variants) == [""]
     for options, told in (({"m": 2}, "has no option 'm'; it has n=5"), ({"n": 1.5}, "must be of the kind int")):
         with pytest.raises(ArgumentError, match=told):
-            subject("n_link_pendulum", None, options)
+            named_case("n_link_pendulum", None, options)
     with pytest.raises(ArgumentError, match=r"the option n is given twice: n_link_pendulum\(3\) and n=2"):
-        subject("n_link_pendulum(3)", None, {"n": 2})
-    assert subject("vehicle_on_rotating_track(False)").name == "vehicle_on_rotating_track_False"
+        named_case("n_link_pendulum(3)", None, {"n": 2})
+    assert named_case("vehicle_on_rotating_track(False)").name == "vehicle_on_rotating_track_False"
 
 
 def test_lists_that_are_empty_are_faults_and_one_name_is_a_list():
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     with pytest.raises(ArgumentError) as caught:
         checked([about], [], [], [], [])
     for what in ("formulations", "methods", "tolerances", "steps"):
@@ -80,13 +80,13 @@ def test_one_resolver_knows_every_name(tmp_path, monkeypatch):
     assert len(find_mechanism("mine.py", {"count": 4}).check().bodies) == 4
     assert find_mechanism("heavy_top", {}).name == "heavy_top"
     assert (title_of("mine.py", {}), title_of("n_link_pendulum(3)", {})) == ("mine", "n_link_pendulum_3")
-    assert find_subject("mine.py", {"count": 2}, 3.0).end == 3.0
+    assert find_system_under_test("mine.py", {"count": 2}, 3.0).end == 3.0
     (tmp_path / "pendulum").write_text("a program")
     assert find_mechanism("pendulum", {}).name == "pendulum" and not is_file("pendulum") and is_file("mine.py")
     for name, options, told in (("heavy_to", {}, r"did you mean heavy_top\?.*; the path of a Python file that defines system"),
                                 ("n_link_pendulum(a)", {}, "must be of the kind int"),
                                 ("none.py", {}, "there is no file none.py"),
                                 ("mine.py", {"size": 1}, "has no option 'size'; it has count=1")):
-        for find in (find_mechanism, find_subject):
+        for find in (find_mechanism, find_system_under_test):
             with pytest.raises(Stop, match=told):
                 find(name, options)

@@ -8,11 +8,11 @@ import pytest
 
 import symdyn as sd
 from symdyn.bench.work import closed_forms, store
-from symdyn.bench.work.cases import CASES, file_name, of_system, subject
+from symdyn.bench.work.cases import CASES, file_name, named_case, of_system
 from symdyn.bench.work.converged import Exact, TooLong, converged, states
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.reference import agreement, default_times, find_reference
-from symdyn.bench.work.subject import Comparison
+from symdyn.bench.work.system_under_test import Comparison
 from symdyn.errors import CompileError, SymdynError
 from symdyn.lab import extended
 
@@ -20,13 +20,13 @@ from symdyn.lab import extended
 @pytest.fixture(scope="module")
 def pendulum():
     """The simple pendulum: what is measured, its formulations."""
-    about = subject("pendulum", end=2.0)
+    about = named_case("pendulum", end=2.0)
     return about, about.formulated(["embedding", "absolute"])[0]
 
 
 @pytest.mark.parametrize(("name", "formulation"), [("lagrange_top", "embedding"), ("torque_free_body", "embedding:parameters")])
 def test_closed_forms_hold_in_angles_and_parameters(name, formulation):
-    about = subject(name)
+    about = named_case(name)
     (made,), _ = about.formulated([formulation])
     times = [0.03 * about.end, 0.1 * about.end]
     first = about.first()
@@ -54,7 +54,7 @@ def test_free_body_turns_as_published_after_its_flip():
 
 
 def test_heavy_top_where_it_is_published():
-    (made,), _ = subject("heavy_top").formulated(["embedding:parameters"])
+    (made,), _ = named_case("heavy_top").formulated(["embedding:parameters"])
     x = made.module.simulate([0.0, 0.2], rtol=1e-12).x[-1]
     known = (-7.08279152974312562e-1, 4.387810881265818973e-1, 5.457283961454176734e-1, 8.939975282400501e-2,
              -2.69159091214340862, 150.0, 4.917260989893994417)
@@ -169,7 +169,7 @@ def test_stored_references_end_where_motions_of_decimal_numbers_end(name):
 @pytest.mark.parametrize("name", ["double_pendulum", "andrews_squeezer"])
 def test_stored_references_are_of_the_mechanisms_as_they_are(name):
     data = store.stored()[name]
-    about = next(s for s in map(subject, CASES) if s.name == name)
+    about = next(s for s in map(named_case, CASES) if s.name == name)
     first = about.first()
     found = store.find(name, first, default_times(about))
     assert found is not None and found.digits == data["digits"]

@@ -11,7 +11,7 @@ from symdyn.bench.work import start
 from symdyn.bench.work.cases import of_equations, of_system
 from symdyn.bench.work.record import Reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
-from symdyn.bench.work.subject import Subject
+from symdyn.bench.work.system_under_test import SystemUnderTest
 from symdyn.errors import SymdynError
 from tests.mechanisms import four_bar_linkage
 
@@ -52,7 +52,7 @@ def test_equations_begin_there_too_and_a_start_that_fits_stays():
 
 
 def test_other_orientations_than_the_first_would_begin_elsewhere():
-    about = Subject("linkage", {"angles": four_bar_linkage(), "parameters": four_bar_linkage()}, 1.0)
+    about = SystemUnderTest("linkage", {"angles": four_bar_linkage(), "parameters": four_bar_linkage()}, 1.0)
     moved, told = on_constraints(about, about.first())
     assert told and list(moved.variants) == ["angles"]
     from symdyn.bench.work.asked import checked

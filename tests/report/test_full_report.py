@@ -30,7 +30,7 @@ from symdyn.runtime.integrating.charts import distances
 from symdyn.stress.record import Row as StressRow
 from symdyn.stress.record import StressReport
 from symdyn.stress.run import stress
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 from tests.helpers import browser
 
 pytest.importorskip("matplotlib")
@@ -75,7 +75,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
         patch.setattr(full_work, "REPEATS", 1)
         patch.setattr(full_condition, "STATES", 201)
         patch.setattr(full_pictures, "mechanism", lambda sol: embedded.mechanism(sol, [("start", 0.0)])[:1])
-        patch.setattr(full, "stress", lambda subject, short: stress(subject, short, checks=["condition", "energy", "inputs"]))
+        patch.setattr(full, "stress", lambda tested, short: stress(tested, short, checks=["condition", "energy", "inputs"]))
         path = full_report("pendulum", tmp_path_factory.mktemp("full") / "new" / "page.html", budget=60, log=told.append)
     return path, told
 
@@ -88,8 +88,8 @@ def text(written: tuple[Path, list[str]]) -> str:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of text alone."""
-    monkeypatch.setattr(full, "stress", lambda subject, short: StressReport())
-    monkeypatch.setattr(full, "_show_condition", lambda part, subject: part.shown.update(
+    monkeypatch.setattr(full, "stress", lambda tested, short: StressReport())
+    monkeypatch.setattr(full, "_show_condition", lambda part, tested: part.shown.update(
         found=SimpleNamespace(warnings=(), places=(), near=False),
         curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
     monkeypatch.setattr(full_work, "measure", lambda *arguments: None)
@@ -141,7 +141,7 @@ def test_work_and_stress_are_shown(text: str) -> None:
 
 def test_verdicts_are_in_order_and_colour(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = [StressRow("a check", "pendulum", f"done {v}", 1.0, 2.0, "reason", v, f"why {v}") for v in ("pass", "degrade", "fail")]
-    monkeypatch.setattr(full, "stress", lambda subject, short: StressReport(made))
+    monkeypatch.setattr(full, "stress", lambda tested, short: StressReport(made))
     page = full_report("pendulum", tmp_path / "page.html", verify=False).read_text(encoding="utf-8")
     assert [row[0] for row in rows(page, "stress")] == ["fail", "degrade", "pass"]
     assert all(f'<td class="verdict {v}">{v}</td>' in page and f"why {v}" in page for v in ("pass", "degrade", "fail"))
@@ -153,7 +153,7 @@ def test_verdicts_are_in_order_and_colour(quick: None, tmp_path: Path, monkeypat
 
 def test_the_condition_is_that_of_the_mass_matrix() -> None:
     equations = sd.systems.get("double_pendulum").embedding()
-    found = full_condition.along(Subject(equations))
+    found = full_condition.along(SystemUnderTest(equations))
     # Of a matrix of two rows with ones on its diagonal it is (1 + |r|) / (1 - |r|), r the other entry.
     M = sd.systems.get("double_pendulum").embedding().lambdify("M_tilde")
     sol = found.solution
@@ -173,12 +173,12 @@ def test_gimbal_lock_is_named(tmp_path: Path) -> None:
     path.write_text(PLATE)
     from symdyn.cli.userfile import from_file
 
-    subject = Subject(from_file(path, {}).embedding())
-    found = full_condition.along(subject)
+    tested = SystemUnderTest(from_file(path, {}).embedding())
+    found = full_condition.along(tested)
     locks = [place for place in found.places if "gimbal lock" in place.text]
     assert len(locks) == 1 and locks[0].near and found.near and "the ZYX angles of joint ball" in locks[0].text
-    dense = subject.run(np.linspace(locks[0].t - 2e-4, locks[0].t + 2e-4, 401), subject.run((0.0, locks[0].t - 2e-4)).x[-1])
-    least = float(np.arcsin(distances(subject.module, dense.x).min()))
+    dense = tested.run(np.linspace(locks[0].t - 2e-4, locks[0].t + 2e-4, 401), tested.run((0.0, locks[0].t - 2e-4)).x[-1])
+    least = float(np.arcsin(distances(tested.module, dense.x).min()))
     assert f"within {least:.2g} rad" in locks[0].text
     # The rates' mass matrix loses rank there as 1/distance^2: I_xx and the moment about the vertical share their direction.
     worst = found.curves["mass matrix, scaled"].max()
@@ -188,7 +188,7 @@ def test_gimbal_lock_is_named(tmp_path: Path) -> None:
 def test_constraints_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(full_condition, "STATES", 101)
     monkeypatch.setattr(full_condition, "NEAR", 20.0)
-    found = full_condition.along(Subject(sd.systems.get("four_bar").augmented()))
+    found = full_condition.along(SystemUnderTest(sd.systems.get("four_bar").augmented()))
     assert list(found.curves)[-1] == "mass matrix with constraints, scaled" and found.near
     assert 1 < len(found.places) <= full_condition.PEAKS and "multiplier of hinge4" in "".join(p.text for p in found.places)
     assert [p.t for p in found.places] == sorted(p.t for p in found.places)
@@ -276,7 +276,7 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Benches of four seconds each: what was asked for, the time, the kind of reference, and what they are called with."""
     found = SimpleNamespace(asked=[], now=0.0, kind="extended", names=("a", "b"))
 
-    def bench(subject: Any, formulations: Any, methods: Any, budget: float, **options: Any) -> Benchmark:
+    def bench(tested: Any, formulations: Any, methods: Any, budget: float, **options: Any) -> Benchmark:
         found.asked.append((formulations, methods))
         assert budget == 10 - found.now
         found.now += 4.0

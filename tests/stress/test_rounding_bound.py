@@ -20,7 +20,7 @@ from symdyn.stress.record import DEGRADE, FAIL, PASS
 from symdyn.stress.reference import exactly_as_written, halves, leaves
 from symdyn.stress.singular import two_points
 from symdyn.stress.statements import emitted, written_out
-from symdyn.stress.subject import EPS, Subject
+from symdyn.stress.system_under_test import EPS, SystemUnderTest
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.floats import evaluate_rows
 from symdyn.tape.kernels import SMOOTHED, Multipliers, Saddle
@@ -37,12 +37,12 @@ class Named:
 
 
 @pytest.fixture(scope="module")
-def crank() -> Subject:
-    return Subject("slider_crank")
+def crank() -> SystemUnderTest:
+    return SystemUnderTest("slider_crank")
 
 
 @pytest.fixture(scope="module")
-def measured(crank: Subject) -> dict[str, rounding.Measured]:
+def measured(crank: SystemUnderTest) -> dict[str, rounding.Measured]:
     """At ordinary states, and along the branch that loses rank where theta = pi/2."""
     rng = np.random.default_rng(7)
     theta = np.concatenate([rng.uniform(0, 1.2, 30), math.pi / 2 + np.array([1e-3, 1e-4, 1e-5, 1e-6, 1e-8])])
@@ -54,7 +54,7 @@ def measured(crank: Subject) -> dict[str, rounding.Measured]:
 
 
 @pytest.fixture(scope="module")
-def source(crank: Subject) -> Any:
+def source(crank: SystemUnderTest) -> Any:
     return emit(crank.equations, "c", NAMES, standalone=False, integrator=False)
 
 
@@ -101,12 +101,12 @@ def test_branches_that_are_not_taken_do_not_count() -> None:
 
 
 def test_errors_of_a_pendulum_are_below_their_bound_and_not_far() -> None:
-    subject = Subject("double_pendulum")
-    where = rounding.states(subject, 60)
+    tested = SystemUnderTest("double_pendulum")
+    where = rounding.states(tested, 60)
     rows = np.column_stack([where.t, where.x, where.inputs, where.ud])
-    tape = emitted(subject, ["rhs", "energy"])["rhs"][0].tape
-    hi, lo = halves(exactly_as_written(subject, tape, rows), 4)
-    values = leaves(subject, rows)
+    tape = emitted(tested, ["rhs", "energy"])["rhs"][0].tape
+    hi, lo = halves(exactly_as_written(tested, tape, rows), 4)
+    values = leaves(tested, rows)
     errors = np.abs(hi - evaluate_rows(tape, values, 60)["rhs"] + lo)
     bound = first_order(tape, values, 60).of("numpy")
     with np.errstate(invalid="ignore"):
@@ -141,11 +141,11 @@ def test_algorithms_are_written_out_as_they_are(rank: int) -> None:
 
 
 def test_results_of_other_algorithms_have_no_bound() -> None:
-    subject = Subject("floating_crane")
-    where = rounding.states(subject, 2)
+    tested = SystemUnderTest("floating_crane")
+    where = rounding.states(tested, 2)
     rows = np.column_stack([where.t, where.x, where.inputs, where.ud])
-    tape = emitted(subject, ["F_tilde"])["F_tilde"][0].tape
-    bound = first_order(tape, leaves(subject, rows), 2).of("c")
+    tape = emitted(tested, ["F_tilde"])["F_tilde"][0].tape
+    bound = first_order(tape, leaves(tested, rows), 2).of("c")
     assert np.isinf(bound).any(axis=1).all() and np.isfinite(bound).any(axis=1).all()  # buoyancy, weights
 
 
@@ -182,7 +182,7 @@ def test_faults_next_to_lost_rank_are_found_there(measured: dict, source: Any, o
     assert near.verdict == FAIL and "not the solution" in near.why and "rhs" in near.done
 
 
-def test_accelerations_that_miss_their_equations_are_found(crank: Subject, measured: dict) -> None:
+def test_accelerations_that_miss_their_equations_are_found(crank: SystemUnderTest, measured: dict) -> None:
     one = measured["rhs"]
     x, n = one.where.x, len(one.where.x)
     rows = np.column_stack([np.zeros(n), x, np.zeros((n, 2))])
@@ -196,7 +196,7 @@ def test_accelerations_that_miss_their_equations_are_found(crank: Subject, measu
 
 
 def test_towards_gimbal_lock_the_bound_holds_until_states_are_refused() -> None:
-    turning = Subject(attitude.free_body("angles"))
+    turning = SystemUnderTest(attitude.free_body("angles"))
     x = np.zeros((5, 6))
     x[:, 0], x[:, 1], x[:, 2], x[:, 3:] = 0.3, math.pi / 2 - np.array([1e-9, 1e-7, 2e-7, 1e-6, 1.2]), 0.7, [0.3, 0.4, 0.5]
     where = rounding.States(np.zeros(5), x, np.zeros((5, 0)), np.zeros((5, 3)))
@@ -214,7 +214,7 @@ def test_towards_gimbal_lock_the_bound_holds_until_states_are_refused() -> None:
 
 def test_towards_a_stretched_arm_first_the_bound_ends_and_then_all_digits() -> None:
     """The upper rod is given the mass 0 only when the code runs, so that its pivot is compared with 0 and rounding passes."""
-    arm = Subject(two_points())
+    arm = SystemUnderTest(two_points())
     arm.params = arm.module.parameters({"m_1": 0.0, "l": 0.7})
     x = np.zeros((4, 4))
     x[:, 0], x[:, 1], x[:, 2:] = 0.3, [5e-8, 1e-7, 1e-6, 1.2], [0.3, 0.4]
@@ -233,12 +233,12 @@ def test_towards_a_stretched_arm_first_the_bound_ends_and_then_all_digits() -> N
 
 
 @needs_c
-def test_states_close_to_lost_rank_are_sought(crank: Subject) -> None:
+def test_states_close_to_lost_rank_are_sought(crank: SystemUnderTest) -> None:
     where = rounding.states(crank, 300)
     closer = rounding.towards_lost_rank(crank, where)
     assert closer.closer == len(closer.x) - 300 >= 6 and np.array_equal(closer.x[:300], where.x)
     assert np.abs(crank.evaluate("C", closer.t, closer.x)).max() < 1e-6
-    tied = Subject("pendulum_absolute")
+    tied = SystemUnderTest("pendulum_absolute")
     assert rounding.towards_lost_rank(tied, rounding.states(tied, 20)).closer == 0
 
 

@@ -17,35 +17,35 @@ from symdyn.stress import attitude, chains, extremes, long_runs, motion, referen
 from symdyn.stress.finding import Finding, judged
 from symdyn.stress.record import FAIL, PASS, NotApplicable, Row
 from symdyn.stress.run import CHECKS
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
 @pytest.fixture(scope="module")
-def double() -> Subject:
-    return Subject("double_pendulum")
+def double() -> SystemUnderTest:
+    return SystemUnderTest("double_pendulum")
 
 
 @pytest.fixture(scope="module")
-def tied() -> Subject:
-    return Subject("pendulum_absolute")
+def tied() -> SystemUnderTest:
+    return SystemUnderTest("pendulum_absolute")
 
 
 def verdicts(rows: Any) -> list[str]:
     return [row.verdict for row in rows]
 
 
-def altered(subject: Subject, monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, tuple, dict], Any]) -> None:
-    """Have the subject's runs changed: change(solution, arguments, options)."""
-    run = subject.run
+def altered(tested: SystemUnderTest, monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, tuple, dict], Any]) -> None:
+    """Have the runs changed: change(solution, arguments, options)."""
+    run = tested.run
 
     def changed(*arguments: Any, **options: Any) -> Any:
         sol = run(*arguments, **options)
         change(sol, arguments, options)
         return sol
 
-    monkeypatch.setattr(subject, "run", changed)
+    monkeypatch.setattr(tested, "run", changed)
 
 
 # -- of any mechanism
@@ -65,14 +65,14 @@ def test_short_form_has_no_failures() -> None:
 @pytest.mark.parametrize("wrong", [lambda v: v * (1 + 1e-13), lambda v: v * np.where(np.arange(v.shape[1]) == 0, -1.0, 1.0)],
                          ids=["noise", "sign"])
 @needs_c
-def test_rounding_finds_noise_and_a_wrong_sign(double: Subject, monkeypatch: pytest.MonkeyPatch, wrong: Callable) -> None:
+def test_rounding_finds_noise_and_a_wrong_sign(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch, wrong: Callable) -> None:
     original = rounding.evaluated
     monkeypatch.setattr(rounding, "evaluated", lambda *given: wrong(original(*given)))
     assert FAIL in verdicts(rounding.rounding(double, True))
 
 
 @needs_c
-def test_noise_in_one_entry_of_one_function_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_in_one_entry_of_one_function_is_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     original, names = rounding.evaluated, []
 
     def wrong(evaluator: Any, *given: Any) -> np.ndarray:
@@ -98,19 +98,19 @@ def test_every_function_is_judged_and_the_worst_verdict_counts() -> None:
 
 @needs_c
 def test_only_states_next_to_lost_rank_or_singular_ones_are_set_aside() -> None:
-    crank = Subject("slider_crank")
+    crank = SystemUnderTest("slider_crank")
     theta = math.pi / 2 + np.array([1e-9, 1e-5, 1e-2, 0.5, 0.8, 1.1, 1.4])
     x = np.column_stack([theta, -2 * theta, *np.zeros((2, 7))])  # its second branch, which meets the first where theta = pi / 2
     assert reference.smoothed(crank, "lam", np.zeros(7), x).tolist() == [True, True, *[False] * 5]
     assert not reference.smoothed(crank, "J", np.zeros(7), x).any()
-    turning = Subject(attitude.free_body("angles"))
+    turning = SystemUnderTest(attitude.free_body("angles"))
     x = np.zeros((2, 6))
     x[:, 1] = [math.pi / 2, math.pi / 2 - 1e-3]
     where = rounding.States(np.zeros(2), x, np.zeros((2, 0)), np.zeros((2, 3)))
     assert rounding.Measured(turning, "rhs", where).singular.tolist() == [True, False]
 
 
-def test_corrections_are_looked_at_beside_the_constraints(tied: Subject) -> None:
+def test_corrections_are_looked_at_beside_the_constraints(tied: SystemUnderTest) -> None:
     where = rounding.states(tied, 40)
     off = rounding.beside(tied, where)
     sizes = [np.abs(tied.evaluate("C", w.t, w.x)[:, 0]) for w in (where, off)]
@@ -121,7 +121,7 @@ def test_corrections_are_looked_at_beside_the_constraints(tied: Subject) -> None
 
 
 @needs_c
-def test_refused_states_must_be_singular(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_states_must_be_singular(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     original = rounding.evaluated
 
     def refuses(*given: Any) -> np.ndarray:
@@ -135,7 +135,7 @@ def test_refused_states_must_be_singular(double: Subject, monkeypatch: pytest.Mo
 
 
 @needs_c
-def test_energy_that_leaks_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_energy_that_leaks_is_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     def leak(sol: Any, arguments: tuple, options: dict) -> None:
         sol.x *= 1 + 1e-5 * np.linspace(0, 1, len(sol.t))[:, None]
 
@@ -144,7 +144,7 @@ def test_energy_that_leaks_is_found(double: Subject, monkeypatch: pytest.MonkeyP
 
 
 @needs_c
-def test_violated_constraints_are_found(tied: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_violated_constraints_are_found(tied: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     def off(sol: Any, arguments: tuple, options: dict) -> None:
         sol.x[:] = sol.x * (1 + 1e-9)
 
@@ -153,7 +153,7 @@ def test_violated_constraints_are_found(tied: Subject, monkeypatch: pytest.Monke
 
 
 @needs_c
-def test_constraints_do_not_count_in_metres(tied: Subject) -> None:
+def test_constraints_do_not_count_in_metres(tied: SystemUnderTest) -> None:
     """A pendulum in x and y takes the same steps, and keeps its rod to rounding, whatever its size."""
     steps = set()
     for l in (1.0, 1e-3, 1e-6, 1e6):
@@ -164,7 +164,7 @@ def test_constraints_do_not_count_in_metres(tied: Subject) -> None:
 
 
 @needs_c
-def test_another_way_back_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_way_back_is_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     run = double.run
 
     def heavier(t: Any, x: Any = None, params: Any = None, **options: Any) -> Any:
@@ -176,7 +176,7 @@ def test_another_way_back_is_found(double: Subject, monkeypatch: pytest.MonkeyPa
 
 
 @needs_c
-def test_wrong_jacobian_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_jacobian_is_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = double.evaluate
 
     def wrong(name: str, *given: Any, **options: Any) -> np.ndarray:
@@ -195,13 +195,14 @@ def test_ill_conditioned_mechanism_degrades() -> None:
     system.defaults[next(s for s in system.defaults if s.name == "m_1")] = 1e-9
     system.initial[next(s for s in system.initial if s.name == "q2")] = 1e-4
     system.duration = 1e-6
-    (row,) = motion.condition(Subject(system), False)
+    (row,) = motion.condition(SystemUnderTest(system), False)
     assert row.verdict == "degrade" and "ill-conditioned" in row.why and row.figure > 1e-8
 
 
 @pytest.mark.parametrize(("size", "verdict"), [(1e-13, "degrade"), (1e-3, FAIL)])
 @needs_c
-def test_thresholds_with_units_are_found(double: Subject, monkeypatch: pytest.MonkeyPatch, size: float, verdict: str) -> None:
+def test_thresholds_with_units_are_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch, size: float,
+                                         verdict: str) -> None:
     def shift(sol: Any, arguments: tuple, options: dict) -> None:
         sol.x[-1] += size  # as many of whatever unit
 
@@ -225,11 +226,11 @@ def test_numbers_with_units_are_not_scaled() -> None:
     system.add_joint(sd.Revolute("hinge", system.ground, rod, q))
     system.defaults = {m: 1.0}
     with pytest.raises(NotApplicable, match="holds numbers that have units"):
-        list(units.units(Subject(system), True))
+        list(units.units(SystemUnderTest(system), True))
 
 
 @needs_c
-def test_end_that_depends_on_the_first_step_is_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_end_that_depends_on_the_first_step_is_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     def late(sol: Any, arguments: tuple, options: dict) -> None:
         if options.get("first_step") == 1e-300:
             sol.x[-1] += 1e-2
@@ -241,13 +242,13 @@ def test_end_that_depends_on_the_first_step_is_found(double: Subject, monkeypatc
 
 
 @pytest.mark.parametrize("first", [1e-300, 5e-324, 1e9])
-def test_first_steps_that_cannot_be_are_mended_without_c_too(double: Subject, first: float) -> None:
+def test_first_steps_that_cannot_be_are_mended_without_c_too(double: SystemUnderTest, first: float) -> None:
     usual, odd = (double.module.simulate((0, 1), method="DOP853", rtol=1e-8, **given) for given in ({}, {"first_step": first}))
     assert odd.success and odd.n_steps < usual.n_steps + 60 and np.allclose(odd.x[-1], usual.x[-1], rtol=0, atol=1e-6)
 
 
 @needs_c
-def test_denormals_that_matter_are_found(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_denormals_that_matter_are_found(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     def jump(sol: Any, arguments: tuple, options: dict) -> None:
         if (np.abs(arguments[1]) == 5e-324).any():
             sol.x[-1] += 1e-9
@@ -257,7 +258,7 @@ def test_denormals_that_matter_are_found(double: Subject, monkeypatch: pytest.Mo
 
 
 @needs_c
-def test_mass_ratios_find_noise(double: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mass_ratios_find_noise(double: SystemUnderTest, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = double.evaluate
     noise = np.random.default_rng(4)
 
@@ -297,7 +298,7 @@ def test_stops_must_tell_all(change: dict[str, Any], told: str) -> None:
 # -- mechanisms of their own
 
 
-class Leaky(Subject):
+class Leaky(SystemUnderTest):
     """A mechanism whose runs are a little wrong at the end, but for those at the finest tolerances."""
 
     finest = 0.0
@@ -319,13 +320,13 @@ class LeakyUnlessFine(Leaky):
                                             (singular, "massless"), (chains, "chaos")])
 @needs_c
 def test_wrong_motions_are_found(home: Any, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(home, "Subject", LeakyUnlessFine if name == "chaos" else Leaky)
+    monkeypatch.setattr(home, "SystemUnderTest", LeakyUnlessFine if name == "chaos" else Leaky)
     if hasattr(home, "local_error"):  # that errors of steps are measured rightly leaves the end wrong
         monkeypatch.setattr(home, "local_error", lambda *given: 1e-15)
     assert FAIL in verdicts(getattr(home, name)(True))
 
 
-class Branching(Subject):
+class Branching(SystemUnderTest):
     """A mechanism whose second coordinate goes another way at the end."""
 
     def run(self, *arguments: Any, **options: Any) -> Any:
@@ -337,7 +338,7 @@ class Branching(Subject):
 @pytest.mark.parametrize("wrong", [Leaky, Branching])
 @needs_c
 def test_wrong_motions_past_singular_positions_are_found(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(singular, "Subject", wrong)
+    monkeypatch.setattr(singular, "SystemUnderTest", wrong)
     energy, branch = islice(singular.configurations(True), 2)
     assert energy.verdict == FAIL and "energy" in energy.done
     # All of a motion larger by the same factor stays on the branch phi = -2 theta.
@@ -372,7 +373,7 @@ def test_redundant_constraints_that_change_something_are_found(monkeypatch: pyte
             values = super().evaluate(name, *given, **options)
             return values * (1 + 1e-11) if name == "rhs" else values
 
-    monkeypatch.setattr(singular, "Subject", Off)
+    monkeypatch.setattr(singular, "SystemUnderTest", Off)
     accelerations, energy = islice(singular.redundant(True), 2)
     assert (accelerations.verdict, energy.verdict) == (FAIL, FAIL) and accelerations.figure < 1e-10
 
@@ -381,14 +382,14 @@ def test_redundant_constraints_that_change_something_are_found(monkeypatch: pyte
                                               "is not finite; the state there: x = 1, x_dot = 0"}, "does not name gust")])
 @needs_c
 def test_failing_forces_that_are_not_told_are_found(change: dict[str, Any], told: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Silent(Subject):
+    class Silent(SystemUnderTest):
         def run(self, *arguments: Any, **options: Any) -> Any:
             sol = super().run(*arguments, **options)
             for name, value in change.items():
                 setattr(sol, name, value)
             return sol
 
-    monkeypatch.setattr(singular, "Subject", Silent)
+    monkeypatch.setattr(singular, "SystemUnderTest", Silent)
     rows = list(islice(singular.user_forces(True), 2))
     assert [row.verdict for row in rows] == [FAIL, FAIL] and all(told in row.why for row in rows)
 
@@ -404,26 +405,26 @@ def test_long_chains_find_noise_and_leaks(monkeypatch: pytest.MonkeyPatch) -> No
             # After what the bound is made of: the last values are those that are judged.
             return values * (1 + 1e-6) if name == "rhs" and Noisy.calls > 1 + rounding.TRIALS else values
 
-    monkeypatch.setattr(chains, "Subject", Noisy)
+    monkeypatch.setattr(chains, "SystemUnderTest", Noisy)
     assert [(row.check, row.verdict) for row in chains.long_chains(True)] == [
         ("long chains", FAIL), ("first order", FAIL), ("long chains", FAIL)]
 
 
-def test_lost_digits_at_gimbal_lock_must_be_told() -> None:
+def test_lost_digits_at_gimbal_lock_must_be_reported() -> None:
     truth = np.tile(np.eye(3).ravel(), (2, 1))
 
     class Near(Stopped):
-        success, n_steps, n_rejected, told = True, 500, 10, ()
+        success, n_steps, n_rejected, warned = True, 500, 10, ()
         frames = np.concatenate([np.zeros((2, 3)), truth + 1e-3], axis=1)[:, None]
 
-    subject = type("Named", (), {"name": "body"})
-    silent = attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9)
+    tested = type("Named", (), {"name": "body"})
+    silent = attitude._angles(tested, "angles", 1e-6, Near, truth, 20, 1e-9)
     assert silent.verdict == FAIL and "without a word" in silent.why
-    Near.told = ("near gimbal lock of the ZYX angles",)
-    assert attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9).verdict == "degrade"
+    Near.warned = ("near gimbal lock of the ZYX angles",)
+    assert attitude._angles(tested, "angles", 1e-6, Near, truth, 20, 1e-9).verdict == "degrade"
     Near.success = False
-    Near.told = ()
-    assert "without naming gimbal lock" in attitude._angles(subject, "angles", 1e-6, Near, truth, 20, 1e-9).why
+    Near.warned = ()
+    assert "without naming gimbal lock" in attitude._angles(tested, "angles", 1e-6, Near, truth, 20, 1e-9).why
 
 
 def test_every_check_says_what_it_does() -> None:

@@ -14,7 +14,7 @@ from symdyn.stress.extremes import masses
 from symdyn.stress.flow import stands_still
 from symdyn.stress.record import DEGRADE, FAIL, PASS, NotApplicable, StandsStill
 from symdyn.stress.start import start
-from symdyn.stress.subject import Subject
+from symdyn.stress.system_under_test import SystemUnderTest
 
 needs_c = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -101,14 +101,14 @@ def test_a_description_with_faults_is_told_before_anything_is_run() -> None:
 
 def test_a_start_beside_the_constraints_is_moved_and_told() -> None:
     system = sd.systems.four_bar()
-    kept = Subject(system)
+    kept = SystemUnderTest(system)
     assert list(start(kept)) == []
     q1 = next(s for s in system.initial if s.name == "q1")
     system.initial = {**system.initial, q1: system.initial[q1] + 0.05}
-    subject = Subject(system)
-    (row,) = start(subject)
+    tested = SystemUnderTest(system)
+    (row,) = start(tested)
     assert row.verdict == PASS and "system.initial violates constraints" in row.done and "simulate --consistent" in row.why
-    moved = subject.start - subject.given
+    moved = tested.start - tested.given
     assert row.figure == np.abs(moved).max() > 1e-3
     assert all(f"{name} by {moved[k]:.3g} rad" in row.done for k, name in enumerate(("q1", "q2", "q3")))
     assert sd.stress(system, short=True, checks="condition").rows[0] == row
@@ -127,19 +127,19 @@ def test_checks_of_a_motion_that_stands_still_are_left_out_and_told() -> None:
 
 @pytest.mark.parametrize("name", ["floating_crane", "floating_wind_turbine"])
 def test_what_the_catalogue_has_in_equilibrium_is_moved(name: str) -> None:
-    subject = Subject(name)
-    assert not stands_still(subject, subject.run((0.0, subject.duration / 5)).x)
-    resting = Subject(sd.systems.get(name))
+    tested = SystemUnderTest(name)
+    assert not stands_still(tested, tested.run((0.0, tested.duration / 5)).x)
+    resting = SystemUnderTest(sd.systems.get(name))
     assert stands_still(resting, resting.run((0.0, resting.duration / 5)).x)
 
 
 def test_rounding_is_no_motion_and_a_small_motion_is_one() -> None:
     # sin and cos of -pi/2 leave 1e-16 of the weight as a moment.
     for angle, still in ((math.pi, True), (math.pi + 1e-6, False), (0.0, True)):
-        subject = Subject(crane(theta=angle))
-        sol = subject.run((0.0, 1.0), rtol=1e-6)
-        assert stands_still(subject, sol.x) is still
-    turning = Subject(crane(x_dot=1e-6))
+        tested = SystemUnderTest(crane(theta=angle))
+        sol = tested.run((0.0, 1.0), rtol=1e-6)
+        assert stands_still(tested, sol.x) is still
+    turning = SystemUnderTest(crane(x_dot=1e-6))
     assert not stands_still(turning, turning.run((0.0, 1.0)).x)
 
 
@@ -149,18 +149,18 @@ def test_lengths_count_against_those_of_the_mechanism() -> None:
     large = crane(x_dot=1e-9)
     large.defaults = {p: v * 1e6 if str(p) == "l" else v for p, v in large.defaults.items()}
     for system, still in ((small, False), (large, True)):
-        subject = Subject(system)
-        assert stands_still(subject, subject.run((0.0, 1.0)).x) is still
+        tested = SystemUnderTest(system)
+        assert stands_still(tested, tested.run((0.0, 1.0)).x) is still
 
 
 def test_the_report_says_that_nothing_moves(tmp_path: Any) -> None:
     from symdyn.overview import page as full
 
     part = full.Part("Condition")
-    full._show_condition(part, Subject(crane()))
+    full._show_condition(part, SystemUnderTest(crane()))
     assert part.notes[:1] == [full.STILL]
     part = full.Part("Condition")
-    full._show_condition(part, Subject(crane(theta=0.5)))
+    full._show_condition(part, SystemUnderTest(crane(theta=0.5)))
     assert full.STILL not in part.notes
 
 
@@ -169,31 +169,31 @@ def test_the_report_says_that_nothing_moves(tmp_path: Any) -> None:
 
 @needs_c
 def test_extreme_ratios_of_masses_are_run_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    subject = Subject(crane(theta=0.5))
-    rows = [row for row in masses(subject, True) if row.done.startswith("motion with 1 masses and inertias times 1e")]
+    tested = SystemUnderTest(crane(theta=0.5))
+    rows = [row for row in masses(tested, True) if row.done.startswith("motion with 1 masses and inertias times 1e")]
     assert [row.verdict for row in rows] == [PASS, PASS] and "1e-08" in rows[0].done and "1e+08" in rows[1].done
-    run = Subject.run
+    run = SystemUnderTest.run
 
-    def leaks(self: Subject, *given: Any, **options: Any) -> Any:
+    def leaks(self: SystemUnderTest, *given: Any, **options: Any) -> Any:
         sol = run(self, *given, **options)
         sol.x *= 1 + 1e-3 * np.linspace(0, 1, len(sol.t))[:, None]
         return sol
 
-    monkeypatch.setattr(Subject, "run", leaks)
+    monkeypatch.setattr(SystemUnderTest, "run", leaks)
     monkeypatch.setattr("symdyn.stress.flow.local_error", lambda *given: 1e-13)
-    rows = [row for row in masses(subject, True) if row.done.startswith("motion with")]
+    rows = [row for row in masses(tested, True) if row.done.startswith("motion with")]
     assert [row.verdict for row in rows] == [FAIL, FAIL]
 
 
 @needs_c
 def test_light_parts_on_dampers_are_run_by_an_implicit_method() -> None:
     """At 1e-8 of the mass an explicit method would take steps of 1e-11 s."""
-    rows = [row for row in masses(Subject("flyball_governor"), True) if row.done.startswith("motion with")]
+    rows = [row for row in masses(SystemUnderTest("flyball_governor"), True) if row.done.startswith("motion with")]
     assert [row.verdict for row in rows] == [PASS, PASS] and "1 s in" in rows[0].done
 
 
 def test_ratios_of_what_stands_still_are_left_out() -> None:
-    found = masses(Subject(crane()), True)
+    found = masses(SystemUnderTest(crane()), True)
     with pytest.raises(NotApplicable, match="of motions: the motion stands still"):
         rows = []
         for row in found:

@@ -1,7 +1,7 @@
 """Work against error: what a motion costs at every accuracy, by formulation, method and tolerance (`symdyn bench`, `sd.bench`).
 
     cases, bodies, closed_forms   the mechanisms of --all, and how a name becomes what is measured
-    subject                       its formulations, and errors of motions in any coordinates
+    system_under_test             its formulations, and errors of motions in any coordinates
     start                         where motions begin, and whether anything moves
     reference, converged, store   what errors are measured by: closed forms, runs with more digits, runs that agree
     methods, asked                what can be asked for, checked
@@ -64,13 +64,13 @@ def bench(system: Any, formulations: Sequence[str] | None = None, methods: Seque
 
     if end is not None and (isinstance(end, bool) or not isinstance(end, (int, float))):
         raise ArgumentError(f"the end is {end!r}; pass a time, s")
-    subject = taken(system, end)
-    asked = checked([subject], formulations, methods, tolerances, steps, repeats, against, budget, at,
+    tested = taken(system, end)
+    asked = checked([tested], formulations, methods, tolerances, steps, repeats, against, budget, at,
                     per_decade)
     place = None if folder is None else as_path(folder, "of the folder", "generated/bench/arm")
     if place is not None:
         check_writable(place, FILES)
-    result = run(subject, asked, place, progress)
+    result = run(tested, asked, place, progress)
     if folder is not None:
         result.save(folder)
     return result

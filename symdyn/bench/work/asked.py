@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from symdyn.bench.work import against, methods
-from symdyn.bench.work.subject import Subject
+from symdyn.bench.work.system_under_test import SystemUnderTest
 from symdyn.errors import ArgumentError, no_value
 
 # Of the usual grid, and the most to a decade.
@@ -36,18 +36,18 @@ class Asked:
     at: tuple[float, ...]
 
 
-def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
+def faults_of(systems: Sequence[SystemUnderTest], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
               steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (),
               per_decade: Any = 1) -> list[str]:
     """Everything that is wrong with what is asked for, a sentence each."""
-    known = list(dict.fromkeys(name for subject in subjects for name in subject.names))
+    known = list(dict.fromkeys(name for tested in systems for name in tested.names))
     # Where nothing was found that could be measured, nothing is known of its formulations.
     faults = [*(_unknown(formulations, known, "formulation") if known else ()),
               *_unknown(method_names, methods.names(), "method"), *_unknown(peers, [*against.names(), against.ALL], "peer")]
     for value in tolerances or ():
         if not (_is_number(value) and TIGHTEST <= value <= LARGEST):
             faults.append(f"the tolerance {value!r} does not lie between {TIGHTEST:g} and {LARGEST:g}")
-    shortest = min((s.end for s in subjects), default=math.inf)
+    shortest = min((s.end for s in systems), default=math.inf)
     if steps and method_names and set(method_names) <= set(methods.names()) - set(methods.FIXED):
         faults.append(f"steps are named, but none of the methods {', '.join(method_names)} has steps of one length; add "
                       f"{' or '.join(methods.FIXED)}, or leave the steps out")
@@ -65,24 +65,24 @@ def faults_of(subjects: Sequence[Subject], formulations: Any = None, method_name
         faults.append(f"tolerances are named and {per_decade} to a decade are asked for; pass one of both")
     if budget is not None and not (_is_number(budget) and budget > 0):
         faults.append(f"the budget {budget!r} must be a positive number of seconds")
-    for subject in subjects:
-        if not (math.isfinite(subject.end) and subject.end > 0):
-            faults.append(f"the end {subject.end!r} of {subject.name} must be a positive time, s")
-        lacking = subject.lacking
+    for tested in systems:
+        if not (math.isfinite(tested.end) and tested.end > 0):
+            faults.append(f"the end {tested.end!r} of {tested.name} must be a positive time, s")
+        lacking = tested.lacking
         if lacking:
-            faults.append(f"{subject.name}: parameters: {no_value(lacking)}; give every parameter a number in the system's "
+            faults.append(f"{tested.name}: parameters: {no_value(lacking)}; give every parameter a number in the system's "
                           "`defaults`")
     return faults
 
 
-def checked(subjects: Sequence[Subject], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
+def checked(systems: Sequence[SystemUnderTest], formulations: Any = None, method_names: Any = None, tolerances: Any = None,
             steps: Any = None, repeats: Any = 5, peers: Any = (), budget: Any = None, at: Any = (), per_decade: Any = 1) -> Asked:
     """What is asked for. Raises ArgumentError that lists everything that is wrong with it."""
     formulations, method_names, peers = _listed(formulations), _listed(method_names), _listed(peers)
     tolerances, steps, at = _listed(tolerances), _listed(steps), _listed(at)
     faults = [f"no {what} are named; name some, or leave them out for the usual ones" for what, values in (
         ("formulations", formulations), ("methods", method_names), ("tolerances", tolerances), ("steps", steps)) if values == []]
-    faults += faults_of(subjects, formulations, method_names, tolerances, steps, repeats, peers, budget, at, per_decade)
+    faults += faults_of(systems, formulations, method_names, tolerances, steps, repeats, peers, budget, at, per_decade)
     if faults:
         raise ArgumentError("the bench cannot run: " + (faults[0] if len(faults) == 1 else
                                                         f"{len(faults)} faults:\n  - " + "\n  - ".join(faults)))

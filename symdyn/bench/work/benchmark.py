@@ -19,7 +19,7 @@ from symdyn.bench.work.plan import Peers, Walk, jobs_of
 from symdyn.bench.work.record import Key, Reference, Row, Skipped
 from symdyn.bench.work.reference import PATIENCE, find_reference
 from symdyn.bench.work.start import ELSEWHERE, STILL, on_constraints, stands_still
-from symdyn.bench.work.subject import Formulation, Subject, Comparison
+from symdyn.bench.work.system_under_test import Comparison, Formulation, SystemUnderTest
 from symdyn.bench.work.timing import PASSES
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.pipeline import emit
@@ -143,7 +143,7 @@ class Benchmark:
         return self.table()
 
 
-def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bool = False,
+def run(tested: SystemUnderTest, asked: Asked, folder: Path | None = None, progress: bool = False,
         log: Callable[[str], None] = lambda text: None, command: str = "", share: float | None = None,
         begun: float | None = None) -> Benchmark:
     """Measure a mechanism.
@@ -155,30 +155,30 @@ def run(subject: Subject, asked: Asked, folder: Path | None = None, progress: bo
     Raises SymdynError where nothing can be measured.
     """
     begun = clock.perf_counter() if begun is None else begun
-    subject = replace(subject, at=asked.at)
-    formulations, skipped, first, moved = _formulated(subject, asked)
+    tested = replace(tested, at=asked.at)
+    formulations, skipped, first, moved = _formulated(tested, asked)
     budget = math.inf if asked.budget is None else asked.budget if share is None else share
     now = clock.perf_counter()
-    reference = find_reference(subject, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), log,
+    reference = find_reference(tested, _leading(first, formulations), min(PATIENCE, begun + budget * _OF_BUDGET - now), log,
                                begun + budget * _AT_MOST)
     bodies = _differ(first, formulations)
-    motion = _motion(subject, first)
+    motion = _motion(tested, first)
     notes = [*filter(None, [moved]), *[STILL] * stands_still(reference, first), *[NO_COMPILER] * (find_compiler() is None)]
     for note in notes:
-        log(f"{subject.name}: {note}")
+        log(f"{tested.name}: {note}")
     waited = clock.perf_counter() - begun
-    result = Benchmark(subject.name, subject.end, [], skipped, reference, asked.at,
+    result = Benchmark(tested.name, tested.end, [], skipped, reference, asked.at,
                        {f.name: f.operations for f in formulations}, resume.about(), "it was interrupted",
                        _fingerprint(motion, reference, bodies), BODIES if bodies else STATE, resume.now(), command,
                        tuple(notes), motion=motion)
     result = replace(result, carried=carried(folder and folder / RESULTS, result.motion, result.fingerprint))
     deadline = begun + budget
     with contextlib.ExitStack() as stack:
-        peers = Peers(formulations, asked, subject, deadline, stack)
+        peers = Peers(formulations, asked, tested, deadline, stack)
         jobs = list(jobs_of(formulations, asked, Comparison(reference, first, bodies), peers))
         result = replace(result, asked=tuple(job.key for job in jobs))
         kept = result.carried.kept(result.fingerprint, result.asked)
-        bar = progress_bar(desc=subject.name, total=len(jobs) * PASSES, unit="run", leave=False) if progress else None
+        bar = progress_bar(desc=tested.name, total=len(jobs) * PASSES, unit="run", leave=False) if progress else None
         if bar is not None:
             stack.callback(bar.close)
         walked = Walk(jobs, result.rows, kept, deadline, bar)
@@ -207,35 +207,35 @@ def _unfinished(left: int, total: int, late: Sequence[str], budget: float | None
     return f"{' and '.join(missing)} within the budget of {budget:.4g} s{part}{why}"
 
 
-def finished(subject: Subject, asked: Asked, folder: Path, command: str) -> Benchmark | None:
+def finished(tested: SystemUnderTest, asked: Asked, folder: Path, command: str) -> Benchmark | None:
     """What an earlier run of the same command left in a folder, if it was done and the motion is the same; else None."""
     data = resume.whole(folder / RESULTS, command)
-    subject = replace(subject, at=asked.at)
+    tested = replace(tested, at=asked.at)
     with contextlib.suppress(*DAMAGED, SymdynError):  # damaged, or nothing can be derived
         found = Benchmark.of(data)
-        formulations, _, first, _ = _formulated(subject, asked)
-        if found.fingerprint == _fingerprint(_motion(subject, first), found.reference, _differ(first, formulations)):
+        formulations, _, first, _ = _formulated(tested, asked)
+        if found.fingerprint == _fingerprint(_motion(tested, first), found.reference, _differ(first, formulations)):
             return found
     return None
 
 
-def _formulated(subject: Subject, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation, str]:
+def _formulated(tested: SystemUnderTest, asked: Asked) -> tuple[list[Formulation], list[Skipped], Formulation, str]:
     """Formulations, those left out, the first there is, whatever was asked for: errors are measured by its motion; and what was
     changed in the start, if it was not on the constraints, else nothing.
 
     Raises SymdynError if there is none.
     """
-    formulations, skipped = subject.formulated(asked.formulations)
+    formulations, skipped = tested.formulated(asked.formulations)
     if not formulations:
-        raise SymdynError(f"{subject.name}: none of the formulations that were asked for fits:\n  - "
+        raise SymdynError(f"{tested.name}: none of the formulations that were asked for fits:\n  - "
                           + "\n  - ".join(map(str, skipped)))
-    first = formulations[0] if asked.formulations is None else subject.first()
-    moved, note = on_constraints(subject, first)
+    first = formulations[0] if asked.formulations is None else tested.first()
+    moved, note = on_constraints(tested, first)
     if note:
         names = [f.name for f in formulations if f.name in moved.names]
         skipped += [Skipped(f.name, "", ELSEWHERE) for f in formulations if f.name not in names]
         if not names:
-            raise SymdynError(f"{subject.name}: {ELSEWHERE}")
+            raise SymdynError(f"{tested.name}: {ELSEWHERE}")
         formulations = moved.formulated(names)[0]
         first = next((f for f in formulations if f.name == first.name), None) or moved.formulated([first.name])[0][0]
     return formulations, skipped, first, note
@@ -262,10 +262,10 @@ def _sorted(rows: Sequence[Row], formulations: Sequence[Formulation], asked: Ask
     return sorted(rows, key=place)
 
 
-def _motion(subject: Subject, first: Formulation) -> str:
+def _motion(tested: SystemUnderTest, first: Formulation) -> str:
     """What rows depend on besides their own names and what errors are of: numbers, and the code that runs."""
     text = "".join(emit(first.equations, "c", ("rhs",), standalone=False).files.values())
-    return resume.fingerprint(subject.name, subject.end, first.x0.tolist(), first.module.default_parameters.tolist(),
+    return resume.fingerprint(tested.name, tested.end, first.x0.tolist(), first.module.default_parameters.tolist(),
                               resume.about(), resume.code(), text)
 
 

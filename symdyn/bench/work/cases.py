@@ -12,7 +12,7 @@ from typing import Any
 from symdyn import systems
 from symdyn.bench.work import closed_forms
 from symdyn.bench.work.bodies import free_body, heavy_top, lagrange_top
-from symdyn.bench.work.subject import Subject
+from symdyn.bench.work.system_under_test import SystemUnderTest
 from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
@@ -116,14 +116,14 @@ def title(name: str, options: Mapping[str, Any] | None = None) -> str:
     return file_name("_".join((name, *(f"{key}_{value}" for key, value in (options or {}).items()))))
 
 
-def subject(name: str, end: float | None = None, options: Mapping[str, Any] | None = None) -> Subject:
+def named_case(name: str, end: float | None = None, options: Mapping[str, Any] | None = None) -> SystemUnderTest:
     """What is measured under a name; name, options and errors as of `named`."""
     case = named(name, options)
     made = from_maker(title(name, options), case.maker(), case.end if end is None else end, case.options)
     return replace(made, closed=case.closed, source=case.source)
 
 
-def taken(system: Any, end: float | None = None) -> Subject:
+def taken(system: Any, end: float | None = None) -> SystemUnderTest:
     """What is measured of a system, of equations or under a name.
 
     Raises ArgumentError for anything else.
@@ -131,7 +131,7 @@ def taken(system: Any, end: float | None = None) -> Subject:
     if isinstance(system, str):
         if system.endswith(".py"):
             raise ArgumentError(f"{system} is the name of a file; pass the System that its function system() returns")
-        return subject(system, end)
+        return named_case(system, end)
     if isinstance(system, System):
         return of_system(system, end)
     if isinstance(system, Equations):
@@ -140,24 +140,25 @@ def taken(system: Any, end: float | None = None) -> Subject:
 
 
 def from_maker(name: str, make: Callable[..., System], end: float | None = None,
-               options: Mapping[str, Any] | None = None) -> Subject:
+               options: Mapping[str, Any] | None = None) -> SystemUnderTest:
     """What is measured of the systems that a function makes: if it has an option `orientation`, with Euler angles and with
     Euler parameters."""
     options = dict(options or {})
     takes = {p.name: p.default for p in inspect.signature(make).parameters.values()}
     both = _ORIENTATION in takes and takes[_ORIENTATION] in _ORIENTATIONS and _ORIENTATION not in options
     variants = {v: make(**options, **({_ORIENTATION: v} if both else {})) for v in (_ORIENTATIONS if both else ("",))}
-    return Subject(name, variants, float(next(iter(variants.values())).duration if end is None else end))
+    return SystemUnderTest(name, variants, float(next(iter(variants.values())).duration if end is None else end))
 
 
-def of_system(system: System, end: float | None = None) -> Subject:
+def of_system(system: System, end: float | None = None) -> SystemUnderTest:
     """What is measured of one system."""
-    return Subject(file_name(system.name), {"": system}, float(system.duration if end is None else end))
+    return SystemUnderTest(file_name(system.name), {"": system}, float(system.duration if end is None else end))
 
 
-def of_equations(equations: Equations, end: float | None = None) -> Subject:
+def of_equations(equations: Equations, end: float | None = None) -> SystemUnderTest:
     """What is measured of equations, such as those of sd.embedding."""
-    return Subject(file_name(equations.name), {}, float(equations.symbols.duration if end is None else end), given=equations)
+    return SystemUnderTest(file_name(equations.name), {}, float(equations.symbols.duration if end is None else end),
+                           given=equations)
 
 
 def file_name(name: str) -> str:

@@ -15,14 +15,14 @@ from symdyn.bench.work.benchmark import RESULTS, Benchmark, finished
 from symdyn.bench.work.benchmark import run as run_one
 from symdyn.bench.work.cases import CASES
 from symdyn.bench.work.page import write_page
-from symdyn.bench.work.subject import Subject
+from symdyn.bench.work.system_under_test import SystemUnderTest
 from symdyn.errors import ArgumentError, MissingExtra, SymdynError
 
 FOLDER = Path("generated") / "bench"
 FILES = (RESULTS, "work_precision.png", "work_precision.svg", "report.html")
 
 
-def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
+def run(arguments: argparse.Namespace, find: Callable[[str], SystemUnderTest]) -> int:
     """Measure what was asked for; returns how many mechanisms could not be measured, and at least 1 if nothing was.
 
     find   what is measured under a name; raises SymdynError for one that there is not
@@ -30,30 +30,30 @@ def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
     """
     begun = clock.perf_counter()
     names = list(dict.fromkeys([*arguments.systems, *(CASES if arguments.all else ())]))
-    subjects, faults = _subjects(names, find)
+    systems, faults = _systems(names, find)
     if not names:
         faults.append(f"nothing is named; name mechanisms such as {', '.join(list(CASES)[:3])}, a Python file, or pass --all")
     options = {"formulations": arguments.formulations, "method_names": arguments.methods, "tolerances": arguments.rtol,
                "steps": arguments.steps, "repeats": arguments.repeats, "peers": arguments.against or (),
                "budget": arguments.budget, "at": arguments.at or (), "per_decade": arguments.per_decade}
     try:
-        asked = checked(subjects, **options)
+        asked = checked(systems, **options)
     except ArgumentError as error:
         faults.append(str(error))
     folder = arguments.output or FOLDER
-    places = dict.fromkeys((folder, *(_place(folder, one, subjects) for one in subjects)))
+    places = dict.fromkeys((folder, *(_place(folder, one, systems) for one in systems)))
     faults += list(dict.fromkeys(why for place in places if (why := resume.unwritable(place, FILES))))
     if faults:
         raise ArgumentError("\n".join(faults))
     results: list[Benchmark] = []
     pictures: list[Path] = []
     failed = measured = 0
-    command = _fingerprint(subjects, asked)
-    done = [one for one in subjects if resume.whole(_place(folder, one, subjects) / RESULTS, command)]
-    done = done if len(done) < len(subjects) else []  # all of it was done: it begins again
+    command = _fingerprint(systems, asked)
+    done = [one for one in systems if resume.whole(_place(folder, one, systems) / RESULTS, command)]
+    done = done if len(done) < len(systems) else []  # all of it was done: it begins again
     late: list[str] = []
-    for k, one in enumerate(subjects):
-        share, place = None, _place(folder, one, subjects)
+    for k, one in enumerate(systems):
+        share, place = None, _place(folder, one, systems)
         earlier = finished(one, asked, place, command) if one in done else None
         if earlier is not None:
             print(f"{earlier.table()}\n  all of it was measured in an earlier run, of {earlier.timed}; to have it measured again "
@@ -66,9 +66,9 @@ def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
             if left <= 0:
                 late.append(one.name)
                 continue
-            share = left / sum(other is one or other not in done for other in subjects[k:]) if len(subjects) > 1 else None
+            share = left / sum(other is one or other not in done for other in systems[k:]) if len(systems) > 1 else None
         try:
-            result = run_one(one, asked, place, arguments.progress, _tell, command, share, begun if len(subjects) == 1 else None)
+            result = run_one(one, asked, place, arguments.progress, _tell, command, share, begun if len(systems) == 1 else None)
         except (ArgumentError, MissingExtra):
             raise
         except SymdynError as error:
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace, find: Callable[[str], Subject]) -> int:
     if late:
         _tell(f"the budget of {asked.budget:g} s is used up: {', '.join(late)} {'was' if len(late) == 1 else 'were'} not begun; "
               "run it again with the same output folder to go on")
-    if len(subjects) > 1 and results:
+    if len(systems) > 1 and results:
         print(f"wrote {write_page(results, pictures, folder / 'report.html')}")
     return failed or int(not measured)
 
@@ -101,11 +101,11 @@ def _save(result: Benchmark, place: Path, results: list[Benchmark], pictures: li
     pictures.append(next(path for path in written if path.suffix == ".svg"))
 
 
-def _fingerprint(subjects: Sequence[Subject], asked: Asked) -> str:
+def _fingerprint(systems: Sequence[SystemUnderTest], asked: Asked) -> str:
     """What distinguishes commands that measure several mechanisms; empty of one."""
     plain = asdict(replace(asked, budget=None))
-    return resume.fingerprint(sorted(one.name for one in subjects), plain, resume.installed(asked.against)) if len(
-        subjects) > 1 else ""
+    return resume.fingerprint(sorted(one.name for one in systems), plain, resume.installed(asked.against)) if len(
+        systems) > 1 else ""
 
 
 def nothing(result: Benchmark) -> str:
@@ -116,7 +116,7 @@ def nothing(result: Benchmark) -> str:
     return "nothing was measured, everything was left out or stopped:\n  - " + "\n  - ".join(why)
 
 
-def _subjects(names: Sequence[str], find: Callable[[str], Subject]) -> tuple[list[Subject], list[str]]:
+def _systems(names: Sequence[str], find: Callable[[str], SystemUnderTest]) -> tuple[list[SystemUnderTest], list[str]]:
     """What is measured, and what is wrong with the names."""
     found, faults = [], []
     for name in names:
@@ -127,9 +127,9 @@ def _subjects(names: Sequence[str], find: Callable[[str], Subject]) -> tuple[lis
     return found, faults
 
 
-def _place(folder: Path, one: Subject, subjects: Sequence[Subject]) -> Path:
+def _place(folder: Path, one: SystemUnderTest, systems: Sequence[SystemUnderTest]) -> Path:
     """Of several mechanisms, and under the usual folder, each has a folder of its own."""
-    return folder / one.name if len(subjects) > 1 or folder == FOLDER else folder
+    return folder / one.name if len(systems) > 1 or folder == FOLDER else folder
 
 
 def _tell(text: str) -> None:

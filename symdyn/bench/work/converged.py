@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Formulation
+from symdyn.bench.work.system_under_test import Formulation
 from symdyn.errors import SymdynError
 from symdyn.precision import quad
 from symdyn.precision.extrapolation import integrate

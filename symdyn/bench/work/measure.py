@@ -14,7 +14,7 @@ from symdyn.bench.work.against.apart import Prepared, TooLong
 from symdyn.bench.work.against.peer import Peer, taken_as
 from symdyn.bench.work.methods import AUTO, SERIES
 from symdyn.bench.work.record import NAN, Row
-from symdyn.bench.work.subject import Formulation, Comparison
+from symdyn.bench.work.system_under_test import Comparison, Formulation
 from symdyn.bench.work.timing import Timing, one_pass, seconds_of
 from symdyn.errors import ArgumentError, SimulationWarning, SymdynError
 

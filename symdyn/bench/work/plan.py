@@ -14,7 +14,7 @@ from symdyn.bench.work.against.peer import Peer, taken_as
 from symdyn.bench.work.asked import Asked
 from symdyn.bench.work.measure import own, peer_row
 from symdyn.bench.work.record import Key, Row, Skipped
-from symdyn.bench.work.subject import Formulation, Subject, Comparison
+from symdyn.bench.work.system_under_test import Comparison, Formulation, SystemUnderTest
 from symdyn.bench.work.timing import PASSES, Timing
 from symdyn.errors import ArgumentError, SymdynError
 
@@ -147,7 +147,7 @@ class Peers:
 
     formulations: Sequence[Formulation]
     asked: Asked
-    subject: Subject
+    tested: SystemUnderTest
     deadline: float
     stack: contextlib.ExitStack
     skipped: list[Skipped] = field(default_factory=list)
@@ -156,7 +156,7 @@ class Peers:
     @property
     def ends(self) -> list[float]:
         """Times until which they run, s."""
-        end = float(self.subject.end)
+        end = float(self.tested.end)
         return [*[t for t in self.asked.at if t < end], end]
 
     def prepare(self) -> Iterator[tuple[Peer, Formulation, Prepared]]:

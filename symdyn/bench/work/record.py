@@ -27,7 +27,7 @@ class Row:
     evaluations, steps    of the right-hand side; accepted ones. 0 where a peer does not tell
     operations            evaluations times the operations of the right-hand side's tape; 0 of peers, and of taylor, whose
                           evaluations are orders of series
-    error                 at the end, norm-wise relative: the larger of error_q and error_u (see `subject.Comparison`)
+    error                 at the end, norm-wise relative: the larger of error_q and error_u (see `system_under_test.Comparison`)
     error_q, error_u      of coordinates and of speeds, or of poses and velocities of all bodies
     errors                of the state at each time of the reference; worst: the largest of them
     until                 time inside the integrator, s, and evaluations of runs that end at each time of the reference; not

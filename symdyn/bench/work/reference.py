@@ -13,7 +13,7 @@ import numpy as np
 from symdyn.bench.work import store
 from symdyn.bench.work.converged import converged, expected_seconds
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Formulation, Subject, Comparison
+from symdyn.bench.work.system_under_test import Comparison, Formulation, SystemUnderTest
 from symdyn.errors import CompileError, SimulationWarning, SymdynError
 
 # Seconds that a run with more digits may take where no budget is given.
@@ -28,13 +28,13 @@ _SECONDS_OF_SCIPY = 20.0
 _SHOWN = 160
 
 
-def default_times(subject: Subject) -> list[float]:
+def default_times(tested: SystemUnderTest) -> list[float]:
     """Ten times, evenly over the motion, the last of them its end, and those that are asked for, s."""
-    even = [subject.end * k / N_TIMES for k in range(1, N_TIMES + 1)]
-    return sorted({*even, *[float(t) for t in subject.at]})
+    even = [tested.end * k / N_TIMES for k in range(1, N_TIMES + 1)]
+    return sorted({*even, *[float(t) for t in tested.at]})
 
 
-def find_reference(subject: Subject, formulations: Sequence[Formulation], seconds: float = PATIENCE,
+def find_reference(tested: SystemUnderTest, formulations: Sequence[Formulation], seconds: float = PATIENCE,
                    log: Callable[[str], None] = lambda text: None, until: float = math.inf) -> Reference:
     """The best reference that there is, or that can be made within about so many seconds.
 
@@ -42,15 +42,15 @@ def find_reference(subject: Subject, formulations: Sequence[Formulation], second
     log   called with one line at each stage
     Raises SymdynError where nothing gives a reference.
     """
-    first, times = formulations[0], default_times(subject)
-    if subject.closed is not None:
-        return Reference("closed form", tuple(times), subject.closed(times), 15.9, subject.source, first.coordinates)
-    found = store.find(subject.name, first, times)
+    first, times = formulations[0], default_times(tested)
+    if tested.closed is not None:
+        return Reference("closed form", tuple(times), tested.closed(times), 15.9, tested.source, first.coordinates)
+    found = store.find(tested.name, first, times)
     if found is not None:
         return found
     why = ""
     try:
-        expected = expected_seconds(first, subject.end)
+        expected = expected_seconds(first, tested.end)
         if expected > seconds:
             why = f"a run with more digits would take about {expected:.0f} s"
         else:

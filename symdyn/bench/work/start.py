@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Formulation, Subject
+from symdyn.bench.work.system_under_test import Formulation, SystemUnderTest
 from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
@@ -29,7 +29,7 @@ ELSEWHERE = ("the initial state violates the constraints, and the nearest one th
              "coordinates; set system.initial to a state that fulfils them")
 
 
-def on_constraints(subject: Subject, first: Formulation) -> tuple[Subject, str]:
+def on_constraints(tested: SystemUnderTest, first: Formulation) -> tuple[SystemUnderTest, str]:
     """The mechanism with a start that fulfils its constraints, the nearest one, and a sentence on what that changed; itself and
     no sentence where it does already.
 
@@ -39,7 +39,7 @@ def on_constraints(subject: Subject, first: Formulation) -> tuple[Subject, str]:
     module, x = first.module, first.x0
     try:
         check_start(module, 0.0, x, module.default_parameters)
-        return subject, ""
+        return tested, ""
     except ArgumentError:
         pass
     n_q, n_u = module.metadata.sizes.q, module.metadata.sizes.u
@@ -49,12 +49,12 @@ def on_constraints(subject: Subject, first: Formulation) -> tuple[Subject, str]:
     changed = [f"{symbol.name} from {before:.6g} to {after:.6g}" for (symbol, after), before in zip(
         start.items(), map(float, x), strict=False) if abs(after - before) > _CHANGED * max(1.0, abs(before))]
     note = f"the initial state violates the constraints; the motion begins at the nearest one that does not: {', '.join(changed)}"
-    if subject.given is not None:
-        return replace(subject, given=_beginning(subject.given, start)), note
-    kind, system = next(iter(subject.variants.items()))
+    if tested.given is not None:
+        return replace(tested, given=_beginning(tested.given, start)), note
+    kind, system = next(iter(tested.variants.items()))
     moved = copy.copy(system)
     moved.initial = _with(system, start)
-    return replace(subject, variants={kind: moved}), note
+    return replace(tested, variants={kind: moved}), note
 
 
 def _with(system: System, start: Mapping[sp.Symbol, float]) -> dict[Any, float]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from symdyn.bench import kept
 from symdyn.bench.work.record import Reference
-from symdyn.bench.work.subject import Formulation
+from symdyn.bench.work.system_under_test import Formulation
 from symdyn.errors import ArgumentError, EvaluationError, SymdynError
 from symdyn.runtime.building.cache import cache_dir
 
@@ -107,14 +107,14 @@ def run(names: Sequence[str] = (), digits: int | None = None, file: Path | None 
     names   of the list of `symdyn bench --all` (default: all); digits: of the local errors (default: as many as usual)
     file    to store them in next to what it holds (default: the package's)
     """
-    from symdyn.bench.work.cases import CASES, subject
+    from symdyn.bench.work.cases import CASES, named_case
     from symdyn.bench.work.converged import DIGITS, converged
     from symdyn.bench.work.reference import default_times
 
     if digits is not None and digits < 1:
         raise ArgumentError(f"{digits} digits were asked for; pass 1 or more")
-    failed, subjects, file = 0, [subject(name) for name in names or CASES], kept.writable(file, STORE)
-    for about in subjects:
+    failed, systems, file = 0, [named_case(name) for name in names or CASES], kept.writable(file, STORE)
+    for about in systems:
         begun = clock.perf_counter()
         first = about.first()
         try:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ellipj, ellipk
 
-from symdyn.bench.work.subject import Formulation, Subject
+from symdyn.bench.work.system_under_test import Formulation, SystemUnderTest
 from symdyn.errors import SymdynError
 from symdyn.lab.extended import known
 from symdyn.model.system import System
@@ -68,7 +68,7 @@ class Case:
         """Derived; raises SymdynError where one does not fit."""
         found = []
         for name, make in self.systems.items():
-            made, skipped = Subject(self.name, {"": make()}, self.end).formulated([name])
+            made, skipped = SystemUnderTest(self.name, {"": make()}, self.end).formulated([name])
             if skipped:
                 raise SymdynError(str(skipped[0]))
             found += made

@@ -14,7 +14,7 @@ import numpy as np
 from symdyn.bench.work import against
 from symdyn.bench.work.against.apart import TooLong, prepared
 from symdyn.bench.work.against.peer import taken_as
-from symdyn.bench.work.subject import Formulation
+from symdyn.bench.work.system_under_test import Formulation
 from symdyn.bench.work.timing import ENOUGH, PASSES, one_pass, seconds_of
 from symdyn.errors import SymdynError
 from symdyn.lab.published.cases import Case

@@ -77,11 +77,11 @@ class ShortSteps:
         k, length, jump = found
         names, n = self.module.metadata.x, self.request.n_state
         state = ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, x[:n], strict=True))
-        message = (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter than "
-                   f"the motion itself needs there: the rate of {names[k]} goes to and fro by {jump:.3g} a second from step to "
-                   f"step, as behind a jump or noise in a load, an input or a function of the user; the state there: {state}. "
-                   "Make that smooth, or write a jump as an expression (sign, Piecewise), so that a motion along it is stopped "
-                   "with its name")
+        message = (f"{self.module.name}: steps have shrunk to {length:.2g} s at t = {t:.9g} s, over a thousand times shorter "
+                   f"than the motion itself needs there: the rate of {names[k]} goes to and fro by {jump:.3g} a second from "
+                   "step to step, as behind a jump or noise in a load, an input or a function of the user; the state there: "
+                   f"{state}. Make that smooth, or write a jump as an expression (sign, Piecewise), so that a motion along it "
+                   "is stopped with its name")
         return message, False
 
     def _entry(self, found: Outcome) -> tuple[int, float, float] | None:

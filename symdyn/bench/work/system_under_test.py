@@ -56,7 +56,7 @@ class Formulation:
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class SystemUnderTest:
     """A mechanism.
 
     name         of files and titles; end: s

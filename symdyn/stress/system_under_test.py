@@ -46,7 +46,7 @@ def named(name: str) -> System:
     return case.maker()(**case.options)
 
 
-class Subject:
+class SystemUnderTest:
     """A mechanism with its usual parameters, start and duration.
 
     system   a System, Equations, or a name as of `named`
@@ -125,7 +125,7 @@ class Subject:
             x[:n_q + n_u] = np.concatenate([q, u])
         return x
 
-    def changed(self, params: np.ndarray, method: str) -> Subject:
+    def changed(self, params: np.ndarray, method: str) -> SystemUnderTest:
         """The same mechanism with other parameters (n_p,), by the same code, run by a method; its start is this one's."""
         other = copy.copy(self)
         other.__dict__.update(params=params, start=self.start)
