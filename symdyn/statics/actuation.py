@@ -27,7 +27,7 @@ from symdyn.runtime.masses import real_parameters
 from symdyn.shown import name_of
 from symdyn.statics.manifold import natural_length, natural_scales
 from symdyn.statics.selection import listed as named
-from symdyn.statics.terms import Place, coordinate_names
+from symdyn.statics.terms import OperatingPoint, coordinate_names
 from symdyn.turning import force_unit
 
 if TYPE_CHECKING:
@@ -144,15 +144,15 @@ def actuation(module: Module, t: float, q: Any, u: Any, ud: Any, params: Any, in
         x = closest(module, time, x, p, kept) if names(module) else x
     else:
         _demand_consistent(module, time, x, p)
-    place = Place(module, time, x, p, values, rates, np.zeros(len(names(module))))
-    gaps = place.balance[place.parts["C_ddot"]] * place.scale
+    point = OperatingPoint(module, time, x, p, values, rates, np.zeros(len(names(module))))
+    gaps = point.balance[point.parts["C_ddot"]] * point.scale
     if project and len(gaps):
-        place = place.at(ud=smallest_acceleration(module, time, x, p, rates, -gaps, kept))
+        point = point.at(ud=smallest_acceleration(module, time, x, p, rates, -gaps, kept))
     else:
-        _demand_accelerations(place, gaps)
+        _demand_accelerations(point, gaps)
     motions = motion_inputs(metadata)
     free = [k for k, n in enumerate(metadata.inputs) if n not in {*given, *motions}]
-    return _Balance(place, free).solved((*given, *motions))
+    return _Balance(point, free).solved((*given, *motions))
 
 
 def input_matrix(module: Module, t: Any, x: Any, params: Any, inputs: Any) -> Labelled:
@@ -185,75 +185,75 @@ def _demand_consistent(module: Module, t: float, x: np.ndarray, p: np.ndarray) -
                             "project=True, which moves q, u and ud by as little as possible onto the constraints") from None
 
 
-def _demand_accelerations(place: Place, gaps: np.ndarray) -> None:
+def _demand_accelerations(point: OperatingPoint, gaps: np.ndarray) -> None:
     """Raises ArgumentError for accelerations that violate the constraints; gaps: C_ddot as lengths, m/s^2."""
     if not len(gaps):
         return
-    sizes = np.abs(place.C_r) @ np.abs(place.ud) + np.abs(place.evaluate("F_d") * place.scale)
+    sizes = np.abs(point.C_r) @ np.abs(point.ud) + np.abs(point.evaluate("F_d") * point.scale)
     size = float(sizes.max(initial=0.0))
     if size > 0 and (np.abs(gaps) > CONSISTENT * size).any():
-        raise ArgumentError(f"{place.module.name}: the accelerations ud violate {listed(place.module, gaps, CONSISTENT * size)} "
+        raise ArgumentError(f"{point.module.name}: the accelerations ud violate {listed(point.module, gaps, CONSISTENT * size)} "
                             "(m/s^2); no forces make such a motion: differentiate one that fulfils the constraints, or pass "
                             "project=True, which moves q, u and ud by as little as possible onto the constraints")
 
 
 class _Balance:
-    """M u_dot + k - F + C_r^T lam along natural directions, for inputs that are sought at the places `free`."""
+    """M u_dot + k - F + C_r^T lam along natural directions, for inputs that are sought at the indices `free`."""
 
-    def __init__(self, place: Place, free: Sequence[int]) -> None:
-        self.place, self.free = place, list(free)
-        self.scales = natural_scales(place)
+    def __init__(self, point: OperatingPoint, free: Sequence[int]) -> None:
+        self.point, self.free = point, list(free)
+        self.scales = natural_scales(point)
         self.most = 0  # freedoms that the sought inputs drive at some of the values tried
-        U, values, Vt = np.linalg.svd(place.C_r * self.scales)
+        U, values, Vt = np.linalg.svd(point.C_r * self.scales)
         r = int(counted(values).sum()) if values.size else 0
         self.U, self.values, self.V = U[:, :r], values[:r], Vt[:r].T
         self.Z = Vt[r:].T  # (n_u, freedoms), of naturally scaled speeds
-        inertia = np.abs(place.M) @ np.abs(place.ud)
-        acting = inertia + np.abs(place.at(ud=np.zeros_like(place.ud)).forces) + np.abs(self.forces(place))
+        inertia = np.abs(point.M) @ np.abs(point.ud)
+        acting = inertia + np.abs(point.at(ud=np.zeros_like(point.ud)).forces) + np.abs(self.forces(point))
         self.least = float((acting * self.scales).max(initial=0.0))
 
-    def forces(self, place: Place) -> np.ndarray:
+    def forces(self, point: OperatingPoint) -> np.ndarray:
         """What the sought inputs, as they are, contribute, if linear; (n_u,)."""
-        found: np.ndarray = self.matrix(place) @ place.inputs[self.free]
+        found: np.ndarray = self.matrix(point) @ point.inputs[self.free]
         return found
 
-    def matrix(self, place: Place) -> np.ndarray:
+    def matrix(self, point: OperatingPoint) -> np.ndarray:
         """Derivative of the generalized forces by the sought inputs, (n_u, n)."""
-        found: np.ndarray = place.evaluate("input_matrix")[:, self.free] if self.free else np.zeros((len(place.u), 0))
+        found: np.ndarray = point.evaluate("input_matrix")[:, self.free] if self.free else np.zeros((len(point.u), 0))
         return found
 
-    def left(self, place: Place) -> np.ndarray:
+    def left(self, point: OperatingPoint) -> np.ndarray:
         """Forces along the freedoms, (freedoms,), N."""
-        found: np.ndarray = self.Z.T @ (self.scales * place.forces)
+        found: np.ndarray = self.Z.T @ (self.scales * point.forces)
         return found
 
     def solved(self, kept: tuple[str, ...]) -> Actuation:
         """The inputs that make the motion, and what belongs to them. Raises ArgumentError where there are none."""
-        place = self._searched()
-        drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(place)))
+        point = self._searched()
+        drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(point)))
         _demand_linear(self, drive)
-        tau = place.forces
-        lam = place.scale * (self.U @ ((self.V.T @ (-self.scales * tau)) / self.values))
-        place = place.at(lam=lam)
-        module = place.module
+        tau = point.forces
+        lam = point.scale * (self.U @ ((self.V.T @ (-self.scales * tau)) / self.values))
+        point = point.at(lam=lam)
+        module = point.module
         metadata, rows = module.metadata, names(module)
-        sure = unique(module, place.t, place.x, place.p) if rows else ()
-        return Actuation(module, place.t, place.q, place.u, place.ud,
-                         Labelled(place.inputs, metadata.inputs, units=metadata.units), kept, Labelled(lam, rows),
+        sure = unique(module, point.t, point.x, point.p) if rows else ()
+        return Actuation(module, point.t, point.q, point.u, point.ud,
+                         Labelled(point.inputs, metadata.inputs, units=metadata.units), kept, Labelled(lam, rows),
                          tuple(n for n, known in zip(rows, sure, strict=True) if known),
-                         Labelled(place.forces, metadata.u, units={u: force_unit(metadata.units.get(u, ""))
+                         Labelled(point.forces, metadata.u, units={u: force_unit(metadata.units.get(u, ""))
                                                                       for u in metadata.u}),
                          self.Z.shape[1], drive.rank, drive.condition)
 
-    def _searched(self) -> Place:
+    def _searched(self) -> OperatingPoint:
         """The inputs at which nothing is left along the freedoms."""
-        best, least = self.place, np.inf
+        best, least = self.point, np.inf
         for value in (None, *STARTS) if self.nonlinear else (None,):
-            place = self.place
+            point = self.point
             if value is not None:
-                place = place.at(inputs=np.where(np.isin(np.arange(len(place.inputs)), self.free), value, place.inputs))
+                point = point.at(inputs=np.where(np.isin(np.arange(len(point.inputs)), self.free), value, point.inputs))
             try:
-                found = self._newton(place)
+                found = self._newton(point)
                 size, level = float(np.abs(self.left(found)).max(initial=0.0)), self.level(found)
             except EvaluationError:
                 if value is None:
@@ -265,31 +265,31 @@ class _Balance:
                 best, least = found, size
         return self._raise(best)
 
-    def level(self, place: Place) -> float:
+    def level(self, point: OperatingPoint) -> float:
         """Size of the single terms of the balance, N."""
-        return max(self.least, float((np.abs(self.forces(place)) * self.scales).max(initial=0.0)))
+        return max(self.least, float((np.abs(self.forces(point)) * self.scales).max(initial=0.0)))
 
     @property
     def nonlinear(self) -> bool:
         """Whether the derivative by the inputs depends on inputs."""
-        module = self.place.module
+        module = self.point.module
         return bool(self.free) and "inputs" in module.unit("input_matrix").metadata.arguments["input_matrix"]
 
-    def _newton(self, place: Place) -> Place:
+    def _newton(self, point: OperatingPoint) -> OperatingPoint:
         """Newton's method with steps of least norm; linear equations take one step, and one for its rounding."""
-        left = self.left(place)
+        left = self.left(point)
         for _ in range(ROUNDS if self.free else 0):
             size = float(np.linalg.norm(left))
             if size == 0.0:
                 break
-            drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(place)))
+            drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(point)))
             self.most = max(self.most, drive.rank)
             step = drive.least(left)
             share, improved = 1.0, None
             while share >= SMALLEST_STEP:
-                values = place.inputs.copy()
+                values = point.inputs.copy()
                 values[self.free] += share * step
-                trial = place.at(inputs=values)
+                trial = point.at(inputs=values)
                 try:
                     now = self.left(trial)
                 except EvaluationError:  # out of what the loads are defined for
@@ -301,19 +301,19 @@ class _Balance:
                 share /= 2
             if improved is None:
                 break
-            place, left = improved, now
-        return place
+            point, left = improved, now
+        return point
 
-    def _raise(self, place: Place) -> NoReturn:
+    def _raise(self, point: OperatingPoint) -> NoReturn:
         """Raises ArgumentError with the direction in which no input works."""
-        metadata, owner = place.module.metadata, place.module.name
+        metadata, owner = point.module.metadata, point.module.name
         sought = [metadata.inputs[k] for k in self.free]
-        left = self.left(place)
-        drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(place)))
+        left = self.left(point)
+        drive = _Drive(self.Z.T @ (self.scales[:, None] * self.matrix(point)))
         missing = drive.outside(left)
-        if np.linalg.norm(missing) <= MADE * self.level(place) or drive.rank < self.most:
+        if np.linalg.norm(missing) <= MADE * self.level(point) or drive.rank < self.most:
             raise ArgumentError(f"{owner}: no values of {', '.join(sought)} were found that make this motion: Newton's method "
-                                f"leaves {np.linalg.norm(left):.6g} N at {_values(place, sought)}; pass a guess in "
+                                f"leaves {np.linalg.norm(left):.6g} N at {_values(point, sought)}; pass a guess in "
                                 "start={...}, or check whether the loads can reach the forces that it needs")
         direction = self.Z @ (missing / np.linalg.norm(missing))
         labels = coordinate_names(metadata)
@@ -325,7 +325,7 @@ class _Balance:
             unit = force_unit(metadata.units.get(metadata.u[along[0]], ""))
             amount = f"{np.linalg.norm(missing) / self.scales[along[0]]:.6g} {unit}".rstrip()
         else:
-            amount = f"{np.linalg.norm(missing):.6g} N (moments divided by {natural_length(place):.3g} m)"
+            amount = f"{np.linalg.norm(missing):.6g} N (moments divided by {natural_length(point):.3g} m)"
         which = (f"no input works along {directions}" if not sought else
                  f"{', '.join(sought)} cannot work along {directions}") if metadata.inputs else \
             f"the system has no inputs, so nothing works along {directions}"
@@ -339,16 +339,16 @@ def _demand_linear(balance: _Balance, drive: _Drive) -> None:
     """Raises ArgumentError where more inputs than freedoms enter nonlinearly: Newton's method does not find the least ones."""
     if not balance.nonlinear or drive.rank == len(balance.free):
         return
-    place = balance.place
-    known = place.module.metadata.inputs
-    base = balance.matrix(place)
+    point = balance.point
+    known = point.module.metadata.inputs
+    base = balance.matrix(point)
     bent = []
     for k in balance.free:
-        values = place.inputs.copy()
+        values = point.inputs.copy()
         values[k] += 1.0 + abs(values[k])
-        if not np.array_equal(balance.matrix(place.at(inputs=values)), base):
+        if not np.array_equal(balance.matrix(point.at(inputs=values)), base):
             bent.append(known[k])
-    raise ArgumentError(f"{place.module.name}: {len(balance.free)} inputs are sought for {drive.rank} freedoms, but "
+    raise ArgumentError(f"{point.module.name}: {len(balance.free)} inputs are sought for {drive.rank} freedoms, but "
                         f"{', '.join(bent)} {'enter' if len(bent) > 1 else 'enters'} the forces nonlinearly, so that the least "
                         "ones are not known; pass values of some of them in inputs={...}")
 
@@ -381,6 +381,6 @@ class _Drive:
         return found
 
 
-def _values(place: Place, sought: Sequence[str]) -> str:
-    known = place.module.metadata.inputs
-    return ", ".join(f"{n} = {place.inputs[known.index(n)]:.6g}" for n in sought)
+def _values(point: OperatingPoint, sought: Sequence[str]) -> str:
+    known = point.module.metadata.inputs
+    return ", ".join(f"{n} = {point.inputs[known.index(n)]:.6g}" for n in sought)

@@ -118,7 +118,7 @@ def shapes_of(manifold: Manifold) -> Shapes:
     displaced = (manifold.Z_v, manifold.labels)
     if manifold.Z_u is manifold.Z_v:
         return Shapes(manifold.M, manifold.Z_v, sizes, manifold.labels, manifold.state_labels, displaced)
-    names = coordinate_names(manifold.place.module.metadata)
+    names = coordinate_names(manifold.point.module.metadata)
     return Shapes(manifold.M, manifold.Z_u, sizes, tuple(names[k] for k in manifold.speeds), manifold.state_labels, displaced,
                   by_speeds=True)
 
@@ -130,9 +130,9 @@ def decade(error: float) -> str:
 
 def unit_note(manifold: Manifold) -> list[str]:
     """A line with the units of what shapes of modes consist of."""
-    units = manifold.place.module.metadata.units
+    units = manifold.point.module.metadata.units
     by_unit: dict[str, list[str]] = {}
-    speeds = manifold.place.module.metadata.u
+    speeds = manifold.point.module.metadata.u
     for label, k in zip(manifold.labels, manifold.displacements, strict=True):
         own = units.get(label, "") if label != speeds[k] else units.get(label, "").removesuffix("/s")
         by_unit.setdefault(own or "1", []).append(label)

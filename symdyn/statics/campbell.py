@@ -26,7 +26,7 @@ from symdyn.statics.multiblade import Averaged, Steady, rotor_of, steady
 from symdyn.statics.selection import Selection, listed, select
 from symdyn.statics.spectrum import Unknown, spectrum
 from symdyn.statics.stability import of_manifold
-from symdyn.statics.terms import Place
+from symdyn.statics.terms import OperatingPoint
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -139,14 +139,14 @@ def campbell(module: Module, speed: Any, values: Any, free: Any = None, fixed: A
     last: Any = start
     for value in numbers:
         selection = select(module, free, {**prescribed, name: value}, None)
-        place = begin(module, selection, None if isinstance(last, (Steady, dict)) else last, params, t, inputs)
-        selection = settled(place, selection)
+        point = begin(module, selection, None if isinstance(last, (Steady, dict)) else last, params, t, inputs)
+        selection = settled(point, selection)
         title = f"{owner} at {name} = {value:g}"
         if groups:
             assert turned is not None
-            each = _of_blades(module, place, selection, (name, turned, groups), int(azimuths), last, title, averaged)
+            each = _of_blades(module, point, selection, (name, turned, groups), int(azimuths), last, title, averaged)
         else:
-            each = _of_rotor(place, selection, limit, frame, title)
+            each = _of_rotor(point, selection, limit, frame, title)
         result.append(each)
         last = each.start
     sets = [each.modes for each in result]
@@ -172,22 +172,23 @@ class _Found:
     varies: float = 0.0
 
 
-def _of_rotor(place: Place, selection: Selection, limit: int, frame: str, title: str) -> _Found:
+def _of_rotor(point: OperatingPoint, selection: Selection, limit: int, frame: str, title: str) -> _Found:
     """Without named blades."""
     start: Any
     try:
-        about: Any = find(place, selection, limit)
-        manifold, start = Manifold(in_motion(about.place, selection), selection), about
+        about: Any = find(point, selection, limit)
+        manifold, start = Manifold(in_motion(about.point, selection), selection), about
     except NoEquilibrium as error:
         if "module.stability" not in str(error):
             raise
-        about, start, manifold = None, None, Manifold(in_motion(place, selection), selection)
+        about, start, manifold = None, None, Manifold(in_motion(point, selection), selection)
     result = of_manifold(manifold, rotating=frame == "rotating")
     return _Found(Modes(title, result.modes, result.modes.notes), manifold.inertia, about or result, start)
 
 
-def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[str, str, list[list[str]]], azimuths: int,
-               last: Any, title: str, averaged: bool) -> _Found:
+def _of_blades(module: Module, point: OperatingPoint, selection: Selection, names: tuple[str, str, list[list[str]]],
+               azimuths: int, last: Any,
+               title: str, averaged: bool) -> _Found:
     speed, azimuth, groups = names
     rotor = rotor_of(module, selection, speed, azimuth, groups)
     if azimuths < 1:
@@ -196,12 +197,12 @@ def _of_blades(module: Module, place: Place, selection: Selection, names: tuple[
     at = 2 * np.pi * np.arange(azimuths) / azimuths
     omega = float(selection.values[speed])
     if isinstance(last, Steady):
-        begun = Steady(rotor, place.at(x=last.place.x), last.a, omega, at)
+        begun = Steady(rotor, point.at(x=last.point.x), last.a, omega, at)
     else:
-        T = rotor.transform(float(place.x[rotor.azimuth]))[0]
+        T = rotor.transform(float(point.x[rotor.azimuth]))[0]
         q = np.zeros(len(rotor.free))
-        q[rotor.rows] = place.x[list(rotor.coordinates)]
-        begun = Steady(rotor, place, np.linalg.solve(T, q), omega, at)
+        q[rotor.rows] = point.x[list(rotor.coordinates)]
+        begun = Steady(rotor, point, np.linalg.solve(T, q), omega, at)
     about, linear = steady(begun)
     size = _scaled_size(linear)
     varies = float(size.max(initial=0.0))
@@ -239,17 +240,17 @@ def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
     best, order = size, tuple(range(count))
     for tail in itertools.permutations(range(1, count)):
         other = (0, *tail)
-        rotor = rotor_of(about.rotor.module, _selection_of(about), about.place.module.metadata.u[about.rotor.speed],
-                         about.place.module.metadata.q[about.rotor.azimuth], [[g[k] for k in other] for g in groups])
+        rotor = rotor_of(about.rotor.module, _selection_of(about), about.point.module.metadata.u[about.rotor.speed],
+                         about.point.module.metadata.q[about.rotor.azimuth], [[g[k] for k in other] for g in groups])
         T = about.rotor.transform(0.0)[0]
         q = T @ about.a
-        turned = Steady(rotor, about.place, np.linalg.solve(rotor.transform(0.0)[0], q), about.omega, about.azimuths)
+        turned = Steady(rotor, about.point, np.linalg.solve(rotor.transform(0.0)[0], q), about.omega, about.azimuths)
         result = float(_scaled_size(turned.averages()[1]).max(initial=0.0))
         if result < 0.1 * best:
             best, order = result, other
     if order != tuple(range(count)):
         right = [tuple(g[k] for k in order) for g in groups]
-        raise ArgumentError(f"{about.place.module.name}: blades: in this order multi-blade coordinates do not make the "
+        raise ArgumentError(f"{about.point.module.name}: blades: in this order multi-blade coordinates do not make the "
                             f"equations constant "
                             f"(entries differ by {size:.2g} of the largest over a turn); in the order {right} they differ by "
                             f"{best:.2g}: name the blades as they lie ahead of each other in the sense of the azimuth")
@@ -257,8 +258,8 @@ def _demand_order(about: Steady, size: float, groups: list[list[str]]) -> None:
 
 def _selection_of(about: Steady) -> Selection:
     """A selection with the coordinates of a rotor free."""
-    module = about.place.module
-    free = {about.place.module.metadata.u[k] for k in about.rotor.free}
+    module = about.point.module
+    free = {about.point.module.metadata.u[k] for k in about.rotor.free}
     kept = tuple(u for u in module.metadata.u if u not in free)
     return Selection(module, kept, {})
 
@@ -290,7 +291,7 @@ def _values(values: Any, owner: str) -> np.ndarray:
 
 
 def follow(sets: Sequence[Modes], inertias: Sequence[np.ndarray], values: np.ndarray) -> list[dict[int, Mode]]:
-    """Tracks, each place among the values -> mode: every mode goes on in the one most like it, all of them taken together.
+    """Tracks, each index among the values -> mode: every mode goes on in the one most like it, all of them taken together.
 
     A track ends, or begins, where the number of modes changes: a pair of eigenvalues becomes real.
     """

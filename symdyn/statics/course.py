@@ -27,7 +27,7 @@ from symdyn.statics.manifold import (
     natural_scales,
 )
 from symdyn.statics.steady import depends_on_time
-from symdyn.statics.terms import Place, coordinate_names, rest
+from symdyn.statics.terms import OperatingPoint, coordinate_names, rest
 
 # Numbers of steps that are tried; the highest harmonics must be this part of all.
 STEPS, SMOOTH = (16, 32, 64, 128), 1e-11
@@ -66,7 +66,7 @@ class Course:
 
     period: float
     nodes: tuple[Manifold, ...]
-    last: Place
+    last: OperatingPoint
     closed: bool = True
     bundled: bool = False
 
@@ -113,7 +113,7 @@ class Course:
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of displacements, speeds and extra states among the variables."""
         first = self.first
-        n_u = first.place.sizes[1]
+        n_u = first.point.sizes[1]
         return (n_u, n_u, len(first.states)) if self.bundled else (first.n_d, first.n_s, len(first.states))
 
     @cached_property
@@ -170,24 +170,24 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
     closed   whether these must be the same after a period: raises ArgumentError if they are not
     precise  relative error of the motion
     """
-    place = start.place
+    point = start.point
     found: Course | None = None
-    motion = _motion(place, start, period, precise)
+    motion = _motion(point, start, period, precise)
     partition: tuple[list[int], list[int]] | None = None
-    places: list[Place] = []
+    points: list[OperatingPoint] = []
     nodes: tuple[Manifold, ...] = ()
     for n in STEPS if closed else (OPEN_STEPS,):
         # Every second position is one of those before.
-        places = [places[k // 2] if places and k % 2 == 0 else motion(period * k / n) for k in range(n)]
+        points = [points[k // 2] if points and k % 2 == 0 else motion(period * k / n) for k in range(n)]
         if not nodes:
-            partition = common_partition(start, places[1::max(1, n // 16)])
+            partition = common_partition(start, points[1::max(1, n // 16)])
         try:
-            nodes = _nodes(start, places, partition, nodes)
+            nodes = _nodes(start, points, partition, nodes)
         except ArgumentError:  # the choice fails between the positions that it was compared at
             if partition is None:
                 raise
             partition = None
-            nodes = _nodes(start, places, None, ())
+            nodes = _nodes(start, points, None, ())
         found = Course(period, nodes, motion(period), closed, partition is None)
         if found.tail <= SMOOTH:
             break
@@ -198,39 +198,39 @@ def follow(start: Manifold, period: float, closed: bool = True, precise: float =
         gap = np.abs(found.after - found.A[0]) * into
         if gap.max(initial=0.0) > REPEATS * (np.abs(found.A) * into).max(initial=0.0):
             i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
-            raise ArgumentError(f"{place.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
+            raise ArgumentError(f"{point.module.name}: the linear equations do not repeat after {period:.6g} s: the entry "
                                 f"[{i}, {j}] of A is {found.A[0][i, j]:.6g} at the start and {found.after[i, j]:.6g} then; "
                                 "pass the period of the motion as period=...")
     if closed:
         _demand_repetition(found)
     if closed and found.tail > RESOLVED:
-        raise ArgumentError(f"{place.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
+        raise ArgumentError(f"{point.module.name}: the linear equations along the motion are not smooth: {STEPS[-1]} steps a "
                             f"period "
                             "do not resolve them; loads with kinks (tables, Piecewise) have no monodromy matrix of this kind")
     return found
 
 
-def _nodes(start: Manifold, places: Sequence[Place], partition: tuple[list[int], list[int]] | None,
+def _nodes(start: Manifold, points: Sequence[OperatingPoint], partition: tuple[list[int], list[int]] | None,
            before: Sequence[Manifold]) -> tuple[Manifold, ...]:
     """Manifolds at positions along a motion; `before`: those at every second one, () if none."""
     return tuple(before[k // 2] if before and k % 2 == 0 else
                  Manifold(each, start.selection, partition=partition or (None if k else start.partition))
-                 for k, each in enumerate(places))
+                 for k, each in enumerate(points))
 
 
-def _motion(place: Place, manifold: Manifold, period: float, precise: float) -> Callable[[float], Place]:
-    """The motion from a place on as a function of the time since."""
-    selection, module = manifold.selection, place.module
-    n_q, n_u, *_ = place.sizes
+def _motion(point: OperatingPoint, manifold: Manifold, period: float, precise: float) -> Callable[[float], OperatingPoint]:
+    """The motion from a point on as a function of the time since."""
+    selection, module = manifold.selection, point.module
+    n_q, n_u, *_ = point.sizes
     states = [n_q + n_u + k for k in manifold.states]
 
-    held = _held_rates(place, selection.held)
+    held = _held_rates(point, selection.held)
     free = [k for k in range(n_u) if k not in set(held or ())]
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         if not selection.held:
-            return np.asarray(module.rhs(place.t + t, x, place.p, place.inputs))
-        here = rest(module, place.t + t, x, place.p, place.inputs)
+            return np.asarray(module.rhs(point.t + t, x, point.p, point.inputs))
+        here = rest(module, point.t + t, x, point.p, point.inputs)
         found = np.zeros(len(x))
         if held is None:
             found[n_q:n_q + n_u] = in_motion(here, selection).ud
@@ -240,29 +240,29 @@ def _motion(place: Place, manifold: Manifold, period: float, precise: float) -> 
         found[states] = here.rates_z[manifold.states]
         return found
 
-    size = np.maximum(np.abs(place.x), 1.0)
-    found = scipy.integrate.solve_ivp(rates, (0.0, period), place.x, "DOP853", dense_output=True, rtol=precise,
+    size = np.maximum(np.abs(point.x), 1.0)
+    found = scipy.integrate.solve_ivp(rates, (0.0, period), point.x, "DOP853", dense_output=True, rtol=precise,
                                       atol=precise * size)
     if not found.success:
         raise NoEquilibrium(f"{module.name}: the motion cannot be followed over its period: {found.message}")
 
-    def at(t: float) -> Place:
-        return in_motion(place.at(t=place.t + t, x=found.sol(t) if t else place.x), selection)
+    def at(t: float) -> OperatingPoint:
+        return in_motion(point.at(t=point.t + t, x=found.sol(t) if t else point.x), selection)
 
     return at
 
 
-def _held_rates(place: Place, held: Sequence[str]) -> list[int] | None:
-    """Places of the speeds that are held, if each of them is the rate of a coordinate and nothing else is constrained."""
-    metadata = place.module.metadata
+def _held_rates(point: OperatingPoint, held: Sequence[str]) -> list[int] | None:
+    """Indices of the speeds that are held, if each of them is the rate of a coordinate and nothing else is constrained."""
+    metadata = point.module.metadata
     labels = coordinate_names(metadata)
     found = []
     for name in held:
-        places = [k for k, (label, u) in enumerate(zip(labels, metadata.u, strict=True)) if name in (label, u)
-                  and label in metadata.q]
-        if place.sizes[3] or not (places or name in metadata.z):
+        indices = [k for k, (label, u) in enumerate(zip(labels, metadata.u, strict=True)) if name in (label, u)
+                   and label in metadata.q]
+        if point.sizes[3] or not (indices or name in metadata.z):
             return None
-        found += places
+        found += indices
     return found
 
 
@@ -293,11 +293,11 @@ def closed_course(start: Manifold, period: float, monodromy: Callable[[Course], 
 
 def autonomous(manifold: Manifold) -> bool:
     """Whether nothing but the motion itself sets the time: t does not appear in the equations, and what is held stands still."""
-    place = manifold.place
-    if depends_on_time(place):
+    point = manifold.point
+    if depends_on_time(point):
         return False
-    coordinates, speeds = held_indices(place, manifold.selection)
-    return not (place.balance[place.parts["q_dot"]][coordinates].any() or place.u[speeds].any())
+    coordinates, speeds = held_indices(point, manifold.selection)
+    return not (point.balance[point.parts["q_dot"]][coordinates].any() or point.u[speeds].any())
 
 
 def _shot(course: Course, monodromy: Callable[[Course], np.ndarray], precise: float, free: bool) -> Course:
@@ -307,7 +307,7 @@ def _shot(course: Course, monodromy: Callable[[Course], np.ndarray], precise: fl
            the states along a closed motion, which all come back, the nearest one is found
     """
     manifold, period, guess = course.first, course.period, course.period
-    owner = manifold.place.module.name
+    owner = manifold.point.module.name
     try:
         for step in range(ITERATIONS):
             course = course if not step else follow(manifold, period, closed=False, precise=precise)
@@ -324,8 +324,8 @@ def _shot(course: Course, monodromy: Callable[[Course], np.ndarray], precise: fl
             inner = scale[counted]
             J, right = J * inner / inner[:, None], residual[counted] / inner
             if free:  # columns: states and period; the last row is the phase condition
-                before, after = (period * _flow(course.first, place)[counted] / inner
-                                 for place in (course.first.place, course.last))
+                before, after = (period * _flow(course.first, point)[counted] / inner
+                                 for point in (course.first.point, course.last))
                 J, right = np.block([[J, after[:, None]], [before, 0.0]]), np.append(right, 0.0)
             newton = -np.linalg.lstsq(J, right, rcond=1e-9)[0]
             change[counted] = inner * newton[:len(counted)]
@@ -355,19 +355,19 @@ def _shot(course: Course, monodromy: Callable[[Course], np.ndarray], precise: fl
 
 def _demand_repetition(course: Course) -> None:
     """Raises ArgumentError where forces that depend on time are others a period later, at the same positions."""
-    if not depends_on_time(course.first.place):
+    if not depends_on_time(course.first.point):
         return
-    owner, n = course.first.place.module.name, len(course.nodes)
+    owner, n = course.first.point.module.name, len(course.nodes)
     for k in sorted({int(part * n) for part in LOOKS}):
         node = course.nodes[k]
-        later = in_motion(node.place.at(t=node.place.t + course.period), node.selection)
+        later = in_motion(node.point.at(t=node.point.t + course.period), node.selection)
         sizes = natural_scales(later) * (2 * np.pi / course.period) ** 2
-        gap = np.abs(later.ud - node.place.ud) / np.maximum(np.abs(node.place.ud), sizes)
+        gap = np.abs(later.ud - node.point.ud) / np.maximum(np.abs(node.point.ud), sizes)
         other = Manifold(later, node.selection, partition=node.partition).matrices[0]
         mine = node.matrices[0]
         if (gap > REPEATS).any() or np.abs(other - mine).max(initial=0.0) > REPEATS * np.abs(mine).max(initial=0.0):
             raise ArgumentError(f"{owner}: the linear equations do not repeat after {course.period:.6g} s: forces at t = "
-                                f"{node.place.t:.4g} s and at t = {later.t:.4g} s differ at the same position; pass the period "
+                                f"{node.point.t:.4g} s and at t = {later.t:.4g} s differ at the same position; pass the period "
                                 "of the motion as period=...")
 
 
@@ -378,9 +378,9 @@ def comes_back(course: Course) -> bool:
     return bool((np.abs(left[counted]) <= 100 * CLOSED * scale[counted]).all())
 
 
-def _flow(manifold: Manifold, place: Place) -> np.ndarray:
+def _flow(manifold: Manifold, point: OperatingPoint) -> np.ndarray:
     """Rates of the coordinates of a manifold along the motion at a state, (m,)."""
-    return np.concatenate([place.u[manifold.displacements], place.ud[manifold.speeds], place.rates_z[manifold.states]])
+    return np.concatenate([point.u[manifold.displacements], point.ud[manifold.speeds], point.rates_z[manifold.states]])
 
 
 def _cyclic(course: Course) -> np.ndarray:
@@ -396,16 +396,16 @@ def _cyclic(course: Course) -> np.ndarray:
 
 def _left_open(course: Course) -> np.ndarray:
     """The change of the state over a period in the coordinates of the manifold, whole turns left out, (m,)."""
-    manifold, before, after = course.first, course.first.place, course.last
+    manifold, before, after = course.first, course.first.point, course.last
     metadata = before.module.metadata
     gap = after.q - before.q
     for k, name in enumerate(metadata.q):
         if metadata.units.get(name) == "rad":
             gap[k] = np.remainder(gap[k] + np.pi, 2 * np.pi) - np.pi
     for group in metadata.unit_groups:
-        places = [metadata.q.index(n) for n in group]
-        if after.q[places] @ before.q[places] < 0:
-            gap[places] = -after.q[places] - before.q[places]
+        indices = [metadata.q.index(n) for n in group]
+        if after.q[indices] @ before.q[indices] < 0:
+            gap[indices] = -after.q[indices] - before.q[indices]
     v = np.linalg.lstsq(before.N, gap, rcond=None)[0]
     return np.concatenate([v[manifold.displacements], (after.u - before.u)[manifold.speeds],
                            (after.z - before.z)[manifold.states]])
@@ -414,20 +414,20 @@ def _left_open(course: Course) -> np.ndarray:
 def _sizes(course: Course) -> np.ndarray:
     """What changes of the coordinates of the manifold are compared with: 1 rad or the natural length, by the period, (m,)."""
     manifold = course.first
-    sizes = natural_scales(manifold.place) * natural_length(manifold.place)
+    sizes = natural_scales(manifold.point) * natural_length(manifold.point)
     return np.concatenate([sizes[manifold.displacements], sizes[manifold.speeds] * 2 * np.pi / course.period,
-                           np.maximum(np.abs(manifold.place.z[manifold.states]), 1.0)])
+                           np.maximum(np.abs(manifold.point.z[manifold.states]), 1.0)])
 
 
 def _shifted(manifold: Manifold, change: np.ndarray) -> Manifold:
     """The manifold at a state moved along its coordinates, back on the constraints."""
-    place = manifold.place
-    n_q = place.sizes[0]
+    point = manifold.point
+    n_q = point.sizes[0]
     along = manifold.tangent() @ change
     v = manifold.Z_v @ change[:manifold.n_d]
-    x = place.x + along
-    x[:n_q] = place.moved(v)
-    if place.sizes[3]:
-        x = closest(place.bound, place.t, x, place.p)
-    moved = in_motion(place.at(x=x), manifold.selection)
+    x = point.x + along
+    x[:n_q] = point.moved(v)
+    if point.sizes[3]:
+        x = closest(point.bound, point.t, x, point.p)
+    moved = in_motion(point.at(x=x), manifold.selection)
     return Manifold(moved, manifold.selection, partition=manifold.partition)

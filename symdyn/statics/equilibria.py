@@ -17,7 +17,7 @@ from symdyn.shown import shown
 from symdyn.statics.equilibrium import Equilibrium, begin, find, settled, steps
 from symdyn.statics.manifold import natural_length
 from symdyn.statics.selection import Selection, listed, select
-from symdyn.statics.terms import Place, coordinate_names
+from symdyn.statics.terms import OperatingPoint, coordinate_names
 from symdyn.turning import turns
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
         if not 0 < starts <= MOST:
             size = f", {MOST} at most: their states alone take {in_bytes(int(starts) * first.x.nbytes)}" if starts > MOST else ""
             raise ArgumentError(f"{module.name}: {shown(starts)} starts requested; at least 1 is needed{size}")
-        places = _random(first, selection, int(starts), ranges, seed)
+        points = _random(first, selection, int(starts), ranges, seed)
     else:
         if ranges is not None:
             raise ArgumentError(f"{module.name}: ranges are given, but so are the starts themselves; leave one of them out")
@@ -93,18 +93,18 @@ def equilibria(module: Module, starts: Any = 100, ranges: Any = None, seed: int 
             raise ArgumentError(f"{module.name}: starts must be a number of them, or a list of starts, found {shown(starts)}")
         if length_of(starts) == 0:
             raise ArgumentError(f"{module.name}: no starts are given; pass a number of them, or a list of one at least")
-        places = [begin(module, selection, each, params, t, inputs) for each in starts]
+        points = [begin(module, selection, each, params, t, inputs) for each in starts]
     distinct: list[Equilibrium] = []
     counts: list[int] = []
     iterations: list[int] = []
     failures: list[tuple[np.ndarray, str]] = []
-    for place in places:
+    for point in points:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore" if distinct else "default")  # validity checks warn once
-                new = find(place, selection, limit)
+                new = find(point, selection, limit)
         except (NoEquilibrium, EvaluationError, ArgumentError) as error:  # also from a start where nothing can be evaluated
-            failures.append((place.x, str(error)))
+            failures.append((point.x, str(error)))
             iterations.append(-1)
             continue
         iterations.append(new.iterations)
@@ -127,9 +127,9 @@ def same(a: Equilibrium, b: Equilibrium) -> bool:
     names = metadata.q
     gap, there = a.q - b.q, np.ones(len(names), dtype=bool)
     for group in metadata.unit_groups:
-        places = [names.index(n) for n in group]
-        there[places] = False
-        if min(np.abs(a.q[places] - b.q[places]).max(), np.abs(a.q[places] + b.q[places]).max()) > APART:
+        indices = [names.index(n) for n in group]
+        there[indices] = False
+        if min(np.abs(a.q[indices] - b.q[indices]).max(), np.abs(a.q[indices] + b.q[indices]).max()) > APART:
             return False
     gap = np.array([_turned(g) if metadata.units.get(n) == "rad" else g for g, n in zip(gap, names, strict=True)])
     more = [a.z - b.z, [a[n] - b[n] for n in a.selection.unknown]]
@@ -143,7 +143,7 @@ def _turned(angle: float) -> float:
     return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
-def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: Any) -> list[Place]:
+def _random(first: OperatingPoint, selection: Selection, count: int, ranges: Any, seed: Any) -> list[OperatingPoint]:
     """Starts around the first one."""
     module, metadata = first.module, first.module.metadata
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
@@ -153,18 +153,18 @@ def _random(first: Place, selection: Selection, count: int, ranges: Any, seed: A
     direct = [n for n in spans if n not in labels and n not in selection.kept]
     stream = np.random.default_rng(seed)
     B = selection.directions(first)
-    places = []
+    points = []
     for _ in range(count):
         v = np.array([stream.uniform(*spans[label]) for label in labels])
         x = first.x.copy()
         x[:len(first.q)] = first.moved(B @ (np.linalg.pinv(B) @ v))
         for name in direct:
             x[metadata.q.index(name)] += stream.uniform(*spans[name])
-        places.append(first.at(x=selection.apply(x)))
-    return places
+        points.append(first.at(x=selection.apply(x)))
+    return points
 
 
-def _spans(first: Place, ranges: Any) -> dict[str, tuple[float, float]]:
+def _spans(first: OperatingPoint, ranges: Any) -> dict[str, tuple[float, float]]:
     """Of what moves along each speed; and of coordinates whose rates are no speeds, where they are named."""
     module = first.module
     metadata = module.metadata
@@ -204,7 +204,7 @@ def _named(distinct: list[Equilibrium]) -> list[Equilibrium]:
     metadata = distinct[0].module.metadata
     turned = [[metadata.q.index(n) for n in group] for group in metadata.unit_groups]
     single = [k for k in range(len(metadata.q)) if not any(k in group for group in turned)]
-    sizes = np.where([metadata.units.get(metadata.q[k]) == "m" for k in single], natural_length(distinct[0].place), 1.0)
+    sizes = np.where([metadata.units.get(metadata.q[k]) == "m" for k in single], natural_length(distinct[0].point), 1.0)
     columns = [np.array([e.q[single] / sizes for e in distinct])]
     columns += [np.array([_attitude(e.q[group]) for e in distinct]) for group in turned]
     # Each entry a column, an attitude three in one.

@@ -25,7 +25,7 @@ from symdyn.statics.search import Search, Trial
 from symdyn.statics.selection import Selection, select
 from symdyn.statics.singular import singular_configuration
 from symdyn.statics.steady import accelerating, further_on, steadiness
-from symdyn.statics.terms import Place, coordinate_names, rest
+from symdyn.statics.terms import OperatingPoint, coordinate_names, rest
 from symdyn.statics.uniqueness import demand_stiffness
 from symdyn.turning import force_unit
 
@@ -56,7 +56,7 @@ class Judged:
 def judge(manifold: Manifold) -> Judged:
     """What small disturbances of a steady state do; raises nothing."""
     try:
-        singular = singular_configuration(manifold.place, manifold.selection)
+        singular = singular_configuration(manifold.point, manifold.selection)
         if singular:
             return Judged("not decided", singular, None)
         steady = steadiness(manifold)
@@ -75,13 +75,13 @@ def judge(manifold: Manifold) -> Judged:
 class Equilibrium:
     """A state of rest, or of steady motion with prescribed speeds.
 
-    place, selection   the state with all that belongs to it, and what was kept
+    point, selection   the state with all that belongs to it, and what was kept
     residual           of forces that are left, by the speed they work along, N or N m
     iterations         steps tried
     name               distinguishes it from others (see Module.equilibria)
     """
 
-    place: Place
+    point: OperatingPoint
     selection: Selection
     residual: Mapping[str, float]
     iterations: int
@@ -89,42 +89,42 @@ class Equilibrium:
 
     @property
     def module(self) -> Module:
-        return self.place.module
+        return self.point.module
 
     @property
     def t(self) -> float:
-        return self.place.t
+        return self.point.t
 
     @property
     def x(self) -> np.ndarray:
         """[q; u; z], (n_x,)."""
-        return self.place.x
+        return self.point.x
 
     @property
     def q(self) -> np.ndarray:
-        return self.place.q
+        return self.point.q
 
     @property
     def u(self) -> np.ndarray:
-        return self.place.u
+        return self.point.u
 
     @property
     def z(self) -> np.ndarray:
-        return self.place.z
+        return self.point.z
 
     @property
     def lam(self) -> np.ndarray:
         """Multipliers, (n_c,); where constraints depend on each other those of least norm after scaling."""
-        return self.place.lam
+        return self.point.lam
 
     @property
     def params(self) -> np.ndarray:
         """Parameters in order, with those that were solved for, (n_p,)."""
-        return self.place.p
+        return self.point.p
 
     @property
     def inputs(self) -> np.ndarray:
-        return self.place.inputs
+        return self.point.inputs
 
     @property
     def residual_norm(self) -> float:
@@ -143,7 +143,7 @@ class Equilibrium:
 
     @cached_property
     def _manifold(self) -> Manifold:
-        return Manifold(in_motion(self.place, self.selection), self.selection)
+        return Manifold(in_motion(self.point, self.selection), self.selection)
 
     @cached_property
     def _judged(self) -> Judged:
@@ -240,8 +240,8 @@ def equilibrium(module: Module, free: Any = None, fixed: Any = None, start: Any 
                 inputs: Any = None, unknown_params: Any = None, max_iterations: int = 100) -> Equilibrium:
     """See Module.equilibrium."""
     selection = select(module, free, fixed, unknown_params)
-    place = begin(module, selection, start, params, t, inputs)
-    return find(place, settled(place, selection), steps(max_iterations, module.name))
+    point = begin(module, selection, start, params, t, inputs)
+    return find(point, settled(point, selection), steps(max_iterations, module.name))
 
 
 def steps(limit: Any, owner: str) -> int:
@@ -251,26 +251,26 @@ def steps(limit: Any, owner: str) -> int:
     return int(limit)
 
 
-def settled(place: Place, selection: Selection) -> Selection:
+def settled(point: OperatingPoint, selection: Selection) -> Selection:
     """With the conditions among more candidates than are needed: those on whose forces what is solved for has an effect."""
     if not selection.candidates:
         return selection
-    metadata, labels = place.module.metadata, coordinate_names(place.module.metadata)
-    columns = np.sqrt(1 / np.maximum(np.abs(np.diag(place.M)), 1e-300))
-    by = np.abs(place.by(selection.unknown)[:len(labels)]) * columns[:, None]
+    metadata, labels = point.module.metadata, coordinate_names(point.module.metadata)
+    columns = np.sqrt(1 / np.maximum(np.abs(np.diag(point.M)), 1e-300))
+    by = np.abs(point.by(selection.unknown)[:len(labels)]) * columns[:, None]
     effective = by > 1e-9 * by.max(axis=0, initial=0.0)
     result = [n for n in selection.candidates if n in labels and effective[labels.index(n)].any()]
     if len(result) != len(selection.unknown):
         free = [*[n for n in metadata.q if n not in selection.kept], *selection.candidates[:len(selection.unknown)]]
         raise ArgumentError(
-            f"{place.module.name}: {len(selection.unknown)} values are to be found ({', '.join(selection.unknown)}), which takes "
+            f"{point.module.name}: {len(selection.unknown)} values are to be found ({', '.join(selection.unknown)}), which takes "
             f"as many conditions, but fixed gives {len(selection.values)} ({', '.join(selection.values)}); name in free the "
             "conditions among them, and the coordinates that are found, too, such as "
             f"free=[{', '.join(repr(n) for n in [*free, *selection.unknown])}]")
     return replace(selection, conditions=tuple(result), candidates=())
 
 
-def begin(module: Module, selection: Selection, start: Any, params: Any, t: float, inputs: Any) -> Place:
+def begin(module: Module, selection: Selection, start: Any, params: Any, t: float, inputs: Any) -> OperatingPoint:
     """Where the search begins. A start may name inputs and parameters that are solved for, too: guesses of them."""
     metadata = module.metadata
     start, params, inputs = _guesses(module, selection, start, params, inputs)
@@ -290,12 +290,12 @@ def begin(module: Module, selection: Selection, start: Any, params: Any, t: floa
         passed = {name_of(k) for k in params}
         known = dict(zip(metadata.parameters, metadata.defaults, strict=True))
         params = {**dict.fromkeys([n for n in selection.parameters if n not in passed and known[n] is None], 0.0), **params}
-    place = rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
-    if place.motion_rates:
-        rates = ", ".join(f"{name} = {value:g}" for name, value in place.motion_rates.items())
+    point = rest(module, time, x, real_parameters(module, params), given_inputs(module, inputs))
+    if point.motion_rates:
+        rates = ", ".join(f"{name} = {value:g}" for name, value in point.motion_rates.items())
         raise ArgumentError(f"{module.name}: an equilibrium was requested with {rates} among the inputs; at rest a motion has no "
                             "rate and no acceleration: give its value alone")
-    return place
+    return point
 
 
 def _guesses(module: Module, selection: Selection, start: Any, params: Any, inputs: Any) -> tuple[Any, Any, Any]:
@@ -328,11 +328,11 @@ def given_inputs(module: Module, inputs: Any) -> np.ndarray:
                 {n: module.metadata.initial.get(n, 0.0) for n in names}, module.name)
 
 
-def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
+def find(point: OperatingPoint, selection: Selection, limit: int) -> Equilibrium:
     """The equilibrium from a start. Raises NoEquilibrium, EquilibriumNotUnique, ArgumentError."""
-    owner = place.module.name
+    owner = point.module.name
     try:
-        search = Search(place, selection)
+        search = Search(point, selection)
     except EvaluationError as error:
         raise NoEquilibrium(f"{owner}: the search cannot begin: {str(error).removeprefix(f'{owner}: ')}; begin elsewhere, with "
                             "start={...}") from error
@@ -343,7 +343,7 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     trial = search.best
     if not good:
         _raise_without_balance(search, reason)
-    locked = lock(trial.place)
+    locked = lock(trial.point)
     if locked:
         raise NoEquilibrium(f"{owner}: no equilibrium found: the state reached is at gimbal lock: {locked}; {AT_GIMBAL_LOCK}")
     _demand_effect(search)
@@ -351,13 +351,13 @@ def find(place: Place, selection: Selection, limit: int) -> Equilibrium:
     _demand_steady(trial)
     _demand_lasting(trial)
     _warn_of_validity(search)
-    return Equilibrium(trial.place, selection, _left(trial), search.steps)
+    return Equilibrium(trial.point, selection, _left(trial), search.steps)
 
 
 def _left(trial: Trial) -> dict[str, float]:
     """Forces that are left, by the coordinate they work along; what is kept bears anything."""
-    labels = coordinate_names(trial.place.module.metadata)
-    return {name: float(v) for name, v in zip(labels, _along(trial, trial.place.forces), strict=True)}
+    labels = coordinate_names(trial.point.module.metadata)
+    return {name: float(v) for name, v in zip(labels, _along(trial, trial.point.forces), strict=True)}
 
 
 def _raise_without_balance(search: Search, reason: str) -> NoReturn:
@@ -372,11 +372,11 @@ def _raise_without_balance(search: Search, reason: str) -> NoReturn:
     left = ", ".join(f"{forces[labels[k]]:.6g} {force_unit(metadata.units.get(metadata.u[k], ''))}".strip()
                      + f" along {labels[k]}" for k in order)
     where = ", ".join(f"{n} = {v:.6g}" for n, v in zip([*metadata.q, *metadata.z, *trial.selection.unknown],
-                                                       [*trial.place.q, *trial.place.z, *trial.selection.amounts(trial.place)],
+                                                       [*trial.point.q, *trial.point.z, *trial.selection.amounts(trial.point)],
                                                        strict=True))
-    rates = ", ".join(f"{metadata.z[k]} by {trial.place.rates_z[k]:.3g} a second" for k in trial.selection.states
-                      if abs(trial.place.rates_z[k]) > 1e-9)
-    gaps = trial.place.C * trial.place.scale
+    rates = ", ".join(f"{metadata.z[k]} by {trial.point.rates_z[k]:.3g} a second" for k in trial.selection.states
+                      if abs(trial.point.rates_z[k]) > 1e-9)
+    gaps = trial.point.C * trial.point.scale
     names = metadata.constraints
     open_ = ", ".join(f"{n} by {g:.3g} m" for n, g in zip(names, gaps, strict=True) if abs(g) > 1e-9)
     loose = [f"nothing holds {name}: it has no stiffness there, so it sinks, rises or turns away"
@@ -385,7 +385,7 @@ def _raise_without_balance(search: Search, reason: str) -> NoReturn:
     parts += [f"forces left are {left}"] if left else []
     parts += [f"constraints are open: {open_}"] if open_ else []
     parts += [f"extra states change: {rates}"] if rates else []
-    locked = lock(trial.place)
+    locked = lock(trial.point)
     parts += [f"the last state is at gimbal lock: {locked}; {AT_GIMBAL_LOCK}"] if locked else []
     advice = "check the weight and the loads: another start hardly helps" if loose else \
         "begin elsewhere with start={...}, or check the loads"
@@ -395,7 +395,7 @@ def _raise_without_balance(search: Search, reason: str) -> NoReturn:
 
 def _slack(trial: Trial, k: int, columns: np.ndarray) -> bool:
     """Whether a force along speed k meets (almost) no stiffness."""
-    K = trial.place.by_v[:trial.place.sizes[1]] * np.outer(columns, columns)
+    K = trial.point.by_v[:trial.point.sizes[1]] * np.outer(columns, columns)
     return bool(np.abs(K[k]).max(initial=0.0) <= 1e-6 * np.abs(K).max(initial=0.0) or not K.any())
 
 
@@ -405,9 +405,9 @@ def _demand_effect(search: Search) -> None:
     if not unknown:
         return
     labels = coordinate_names(search.module.metadata)
-    allowed, n_u = search.allowed(trial), trial.place.sizes[1]
+    allowed, n_u = search.allowed(trial), trial.point.sizes[1]
     idle = []
-    for name, value, column in zip(unknown, search.selection.amounts(trial.place), trial.by_unknown(), strict=True):
+    for name, value, column in zip(unknown, search.selection.amounts(trial.point), trial.by_unknown(), strict=True):
         along = np.abs(_along(trial, column[:n_u])) * max(abs(value), 1.0)
         if not column[n_u:].any() and (along <= 1e-6 * allowed).all():
             idle.append(name)
@@ -419,33 +419,33 @@ def _demand_effect(search: Search) -> None:
 
 def _demand_steady(trial: Trial) -> None:
     """Raises NoEquilibrium if constraints do not let the prescribed speeds stay."""
-    place = trial.place
-    if not place.sizes[3]:
+    point = trial.point
+    if not point.sizes[3]:
         return
-    names = place.module.metadata.constraints
-    speed = max(float(np.abs(place.u).max(initial=0.0)), 1e-300)
-    rates, demanded = place.evaluate("C_dot") * place.scale, place.evaluate("F_d") * place.scale
+    names = point.module.metadata.constraints
+    speed = max(float(np.abs(point.u).max(initial=0.0)), 1e-300)
+    rates, demanded = point.evaluate("C_dot") * point.scale, point.evaluate("F_d") * point.scale
     for what, values, size in (("move with", rates, speed), ("demand accelerations of", demanded, speed * max(speed, 1.0))):
         k = int(np.argmax(np.abs(values)))
         if abs(values[k]) > STEADY * max(size, 1e-3):
-            raise NoEquilibrium(f"{place.module.name}: at t = {place.t:g} s the constraints {what} {values[k]:.6g} m/s"
+            raise NoEquilibrium(f"{point.module.name}: at t = {point.t:g} s the constraints {what} {values[k]:.6g} m/s"
                                 f"{'^2' if values is demanded else ''} ({names[k]}) at the prescribed speeds: there is no "
                                 "rest there; give speeds that fit them, or simulate the motion")
 
 
 def _demand_lasting(trial: Trial) -> None:
     """Raises NoEquilibrium where forces change along the steady motion, such as weight in the plane of a rotor."""
-    place = trial.place
-    if not place.u.any():
+    point = trial.point
+    if not point.u.any():
         return
     try:
-        manifold = Manifold(in_motion(place, trial.selection), trial.selection)
-        for later in further_on(manifold.place, manifold):
+        manifold = Manifold(in_motion(point, trial.selection), trial.selection)
+        for later in further_on(manifold.point, manifold):
             changed = accelerating(later, manifold)
             if changed:
                 raise NoEquilibrium(
-                    f"{place.module.name}: no steady motion: the forces balance at this position, but not further on: after "
-                    f"{later.t - place.t:.4g} s {changed}. The motion with the prescribed speeds is periodic at best: "
+                    f"{point.module.name}: no steady motion: the forces balance at this position, but not further on: after "
+                    f"{later.t - point.t:.4g} s {changed}. The motion with the prescribed speeds is periodic at best: "
                     "module.stability(fixed={...}) finds it and judges it")
     except (EvaluationError, ArgumentError):  # a position further on that the mechanism cannot reach is reported by the verdict
         return
@@ -454,20 +454,20 @@ def _demand_lasting(trial: Trial) -> None:
 def _warn_of_validity(search: Search) -> None:
     """Warn where validity checks of elements fail, and of forces that depend on time."""
     trial = search.best
-    place, name = trial.place, trial.place.module.name
-    if place.module.metadata.watches:
-        warn(place.module, place.evaluate(WATCHES), "in equilibrium", 5)
-    if "t" not in place.module.unit("balance").metadata.arguments.get("balance", ()):
+    point, name = trial.point, trial.point.module.name
+    if point.module.metadata.watches:
+        warn(point.module, point.evaluate(WATCHES), "in equilibrium", 5)
+    if "t" not in point.module.unit("balance").metadata.arguments.get("balance", ()):
         return
-    labels, allowed = coordinate_names(place.module.metadata), search.allowed(trial)
+    labels, allowed = coordinate_names(point.module.metadata), search.allowed(trial)
     try:
-        changes = np.array([_along(trial, trial.place.at(t=place.t + later).forces - place.forces) for later in LATER])
+        changes = np.array([_along(trial, trial.point.at(t=point.t + later).forces - point.forces) for later in LATER])
     except EvaluationError:
         return
     k = int(np.argmax((np.abs(changes) / np.maximum(allowed, 1e-300)).max(axis=0)))
     if (np.abs(changes[:, k]) > allowed[k]).any():
-        unit = force_unit(place.module.metadata.units.get(place.module.metadata.u[k], ""))
-        warnings.warn(f"{name}: in equilibrium: forces depend on time, which stands still at t = {place.t:g} s: that along "
+        unit = force_unit(point.module.metadata.units.get(point.module.metadata.u[k], ""))
+        warnings.warn(f"{name}: in equilibrium: forces depend on time, which stands still at t = {point.t:g} s: that along "
                       f"{labels[k]} changes by {np.abs(changes[:, k]).max():.3g} {unit}".rstrip() + f" within {LATER[-1]:g} s; "
                       "this is no state that lasts", SimulationWarning, stacklevel=5)
 

@@ -56,7 +56,7 @@ def fundamental(course: Course) -> Fundamental:
         before = end
     scale = scales(course)
     speed = float((np.abs(course.A[0]) * (scale / scale[:, None])).max(initial=0.0))
-    motion = MOTION if any(node.place.ud.any() for node in course.nodes) else 0.0
+    motion = MOTION if any(node.point.ud.any() for node in course.nodes) else 0.0
     E = SAFETY * change + (LEAST + motion + course.tail * speed * course.period) * size
     return Fundamental(values[:-1:steps // len(course.nodes)], end, E)
 

@@ -127,7 +127,7 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
                 loose: np.ndarray) -> list[np.ndarray]:
     """S in the order in which they are tried: first those that leave displacements of bodies in fixed axes, J e^(St), as constant
     as can be: of bodies that do not spin before those of the others."""
-    if not loose.shape[1] or "J" not in course.first.place.module.functions:
+    if not loose.shape[1] or "J" not in course.first.point.module.functions:
         return [s]
     n_d, n = course.sizes[0], len(course.nodes)
     fields = displacements(course) * scale[:n_d]
@@ -162,35 +162,35 @@ def _candidates(course: Course, patterns: list[list[tuple[int, int]]], scale: np
 def _rows_that_do_not_spin(manifold: Manifold) -> np.ndarray:
     """Which rows of J belong to bodies that do not spin."""
     speeds = spinning(manifold)
-    per_body = 3 if manifold.place.module.metadata.planar else 6
+    per_body = 3 if manifold.point.module.metadata.planar else 6
     return np.asarray(np.repeat(speeds <= 1e-9 * max(float(speeds.max(initial=0.0)), 1e-300), per_body))
 
 
 def displacements(course: Course) -> np.ndarray:
     """Displacements of all bodies in fixed axes by those among the variables, (nodes, rows of J, n_d), turns times the natural
     length."""
-    place = course.first.place
-    per_body = 3 if place.module.metadata.planar else 6
-    fields = np.array([node.place.evaluate("J") @ course.displaced(node) for node in course.nodes])
+    point = course.first.point
+    per_body = 3 if point.module.metadata.planar else 6
+    fields = np.array([node.point.evaluate("J") @ course.displaced(node) for node in course.nodes])
     turns = np.tile(np.arange(per_body) >= (2 if per_body == 3 else 3), fields.shape[1] // per_body)
-    return np.where(turns, natural_length(place), 1.0)[:, None] * fields
+    return np.where(turns, natural_length(point), 1.0)[:, None] * fields
 
 
 def spinning(manifold: Manifold) -> np.ndarray:
     """Angular speed of every body, rad/s, (n_b,)."""
-    place = manifold.place
-    if "J" not in place.module.functions:
+    point = manifold.point
+    if "J" not in point.module.functions:
         return np.zeros(0)
-    per_body = 3 if place.module.metadata.planar else 6
-    velocities = (place.evaluate("J") @ place.u).reshape(-1, per_body)
+    per_body = 3 if point.module.metadata.planar else 6
+    velocities = (point.evaluate("J") @ point.u).reshape(-1, per_body)
     return np.asarray(np.linalg.norm(velocities[:, (2 if per_body == 3 else 3):], axis=1))
 
 
 def axis(course: Course) -> np.ndarray:
     """Direction of the rotation, that of the body that spins fastest at the start, n-frame, (3,), with the sense of the spin."""
-    place = course.first.place
-    per_body = 3 if place.module.metadata.planar else 6
-    velocities = (place.evaluate("J") @ place.u).reshape(-1, per_body)
+    point = course.first.point
+    per_body = 3 if point.module.metadata.planar else 6
+    velocities = (point.evaluate("J") @ point.u).reshape(-1, per_body)
     turns = velocities[:, 3:] if per_body == 6 else np.hstack([np.zeros((len(velocities), 2)), velocities[:, 2:]])
     sizes = np.linalg.norm(turns, axis=1)
     return np.asarray(turns[int(np.argmax(sizes))] / max(float(sizes.max(initial=0.0)), 1e-300))
@@ -212,12 +212,12 @@ class Observer:
 
     def __init__(self, course: Course, rotating: bool = False) -> None:
         self.course = course
-        self.blind = "J" not in course.first.place.module.functions
+        self.blind = "J" not in course.first.point.module.functions
         self.rotating = False
         if self.blind:
             return
         self.fields = displacements(course)
-        self.per_body = 3 if course.first.place.module.metadata.planar else 6
+        self.per_body = 3 if course.first.point.module.metadata.planar else 6
         self.still = _rows_that_do_not_spin(course.first)
         self.turning = bool(not self.still.all())
         self.axis = axis(course) if self.turning else np.array([0.0, 0.0, 1.0])

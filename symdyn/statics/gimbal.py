@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.statics.terms import Place
+from symdyn.statics.terms import OperatingPoint
 
 REMEDY = ("use Euler parameters (orientation='parameters' of a catalogued system, orientation=EulerParameters() of a joint), or "
           "another order of the angles")
@@ -19,35 +19,35 @@ LOST = 1e-8
 TURN = 0.4
 
 
-def lock(place: Place) -> str:
+def lock(point: OperatingPoint) -> str:
     """The coordinate whose value brings gimbal lock, as "theta = 90 deg"; "" where there is none."""
-    metadata = place.module.metadata
+    metadata = point.module.metadata
     angles = [k for k, n in enumerate(metadata.q) if metadata.units.get(n) == "rad"]
     if not angles:
         return ""
-    here = independence(place)
+    here = independence(point)
     if here > LOST:
         return ""
-    turned = [independence(place.at(x=_turned(place.x, k))) for k in angles]
+    turned = [independence(point.at(x=_turned(point.x, k))) for k in angles]
     if max(turned) * LOST <= here:
         return ""
     name = metadata.q[angles[int(np.argmax(turned))]]
-    return f"{name} = {np.degrees(place.q[metadata.q.index(name)]):.6g} deg"
+    return f"{name} = {np.degrees(point.q[metadata.q.index(name)]):.6g} deg"
 
 
-def demand_no_lock(place: Place, what: str) -> None:
+def demand_no_lock(point: OperatingPoint, what: str) -> None:
     """Raises ArgumentError at gimbal lock; what: the request, as "modes were"."""
-    locked = lock(place)
+    locked = lock(point)
     if locked:
-        raise ArgumentError(f"{place.module.name}: {what} requested at gimbal lock: {locked}; small changes of its angles do not "
+        raise ArgumentError(f"{point.module.name}: {what} requested at gimbal lock: {locked}; small changes of its angles do not "
                             f"give all small motions there; {REMEDY}")
 
 
-def independence(place: Place) -> float:
+def independence(point: OperatingPoint) -> float:
     """How independent the motions are that coordinates bring about, from 0 to 1: by the mass matrix scaled to a diagonal of ones,
     without what has no mass, and by the reciprocal condition of N with unit columns."""
     try:
-        M, N = place.evaluate("mass_matrix"), place.evaluate("N")
+        M, N = point.evaluate("mass_matrix"), point.evaluate("N")
     except EvaluationError:
         return 0.0
     masses = np.diag(M)

@@ -22,7 +22,7 @@ from symdyn.statics.selection import Selection, holding, listed, select
 from symdyn.statics.sensitivity import Sensitivity, of_eigenvalue, shift
 from symdyn.statics.singular import singular_configuration
 from symdyn.statics.steady import Steadiness, steadiness
-from symdyn.statics.terms import Place, coordinate_names, rest
+from symdyn.statics.terms import OperatingPoint, coordinate_names, rest
 
 if TYPE_CHECKING:
     from control import StateSpace as ControlStateSpace
@@ -65,10 +65,10 @@ class Linearization:
         self._manifold = manifold
         self._analysis = Analysis(manifold)
         self.equilibrium = equilibrium
-        place = manifold.place
-        self.module = place.module
-        self.t, self.x, self.params, self.inputs = place.t, place.x, place.p, place.inputs
-        self.ud, self.lam = place.ud, place.lam
+        point = manifold.point
+        self.module = point.module
+        self.t, self.x, self.params, self.inputs = point.t, point.x, point.p, point.inputs
+        self.ud, self.lam = point.ud, point.lam
         self.M, self.C, self.K, self.G = manifold.M, manifold.C, manifold.K, manifold.G
         self.F_in, self.Z = manifold.F_in, manifold.Z_v
         self.coordinates = manifold.labels
@@ -129,10 +129,10 @@ class Linearization:
 
     def _demand_steady(self, what: str) -> None:
         """Raises ArgumentError where eigenvalues decide nothing."""
-        singular = singular_configuration(self._manifold.place, self._manifold.selection)
+        singular = singular_configuration(self._manifold.point, self._manifold.selection)
         if singular:
             raise ArgumentError(f"{self.module.name}: {what} requested at a {singular}; move the mechanism away from it")
-        demand_no_lock(self._manifold.place, what)
+        demand_no_lock(self._manifold.point, what)
         if not self.steadiness.kind:
             raise ArgumentError(f"{self.module.name}: {what} requested at a state that is neither at rest nor in steady motion: "
                                 f"{self.steadiness.reason}. Eigenvalues decide nothing there; linearize at an equilibrium, or "
@@ -200,20 +200,20 @@ class Linearization:
         At rest the motion is the state itself; along steady motion coordinates go on at constant rates. Raises ArgumentError
         where they do not (a wheel that rolls in a circle).
         """
-        place, manifold = self._manifold.place, self._manifold
+        point, manifold = self._manifold.point, self._manifold
         metadata = self.module.metadata
         state = take(x, metadata.x, "x", metadata.initial_values("x"), self.module.name)
-        n_q, n_u, *_ = place.sizes
-        rates = place.balance[place.parts["q_dot"]]
+        n_q, n_u, *_ = point.sizes
+        rates = point.balance[point.parts["q_dot"]]
         if rates.any():
-            bent = place.balance[place.parts["q_ddot"]]
+            bent = point.balance[point.parts["q_ddot"]]
             k = int(np.argmax(np.abs(bent)))
             if abs(bent[k]) > 1e-9 * float(np.abs(rates).max()) * max(1.0, float(np.abs(rates).max())):
                 raise ArgumentError(f"{self.module.name}: the motion linearized about is no straight one: {metadata.q[k]} "
                                     f"accelerates by {bent[k]:.4g} a second; apply the gain K to changes of your own")
-        off = state - place.x
+        off = state - point.x
         off[:n_q] -= rates * (t - self.t)
-        v = np.linalg.lstsq(place.N, off[:n_q], rcond=None)[0]
+        v = np.linalg.lstsq(point.N, off[:n_q], rcond=None)[0]
         return np.concatenate([v[manifold.displacements], off[n_q:n_q + n_u][manifold.speeds], off[n_q + n_u:][manifold.states]])
 
     def to_scipy(self) -> ScipyStateSpace:
@@ -248,7 +248,7 @@ class Linearization:
         motion under constraints, part of an orientation that is kept.
         """
         manifold = self._manifold
-        place, selection = manifold.place, manifold.selection
+        point, selection = manifold.point, manifold.selection
         owner = self.module.name
         named = listed(parameter, self.module.metadata.parameters, "parameter", owner)
         if len(named) != 1:
@@ -268,7 +268,7 @@ class Linearization:
                                 "hold at a state of rest")
         changes = {name: 1.0}
         if self.equilibrium is not None:
-            changes |= shift(place, selection, name)
+            changes |= shift(point, selection, name)
         return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
 
     def _labelled_states(self) -> tuple[str, ...]:
@@ -311,7 +311,7 @@ class Linearization:
         except ArgumentError as error:  # no linear equations by the inputs
             lines.append(str(error).removeprefix(f"{self.module.name}: "))
         lines += held_note(self._manifold)
-        singular = singular_configuration(self._manifold.place, self._manifold.selection)
+        singular = singular_configuration(self._manifold.point, self._manifold.selection)
         if singular:
             return "\n".join([*lines, singular])
         if self.steadiness.kind:
@@ -343,37 +343,37 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
                                 "out, or pass at=equilibrium.x")
         if at.module is not module:
             raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; linearize with its own")
-        place = at.place if hold is None else in_motion(at.place, holding(at.selection, hold))
-        return Linearization(Manifold(place, holding(at.selection, hold), _independent(module, coordinates)), at)
-    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
-    return Linearization(Manifold(place, selection, _independent(module, coordinates)), None)
+        point = at.point if hold is None else in_motion(at.point, holding(at.selection, hold))
+        return Linearization(Manifold(point, holding(at.selection, hold), _independent(module, coordinates)), at)
+    point, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    return Linearization(Manifold(point, selection, _independent(module, coordinates)), None)
 
 
 def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,
-             hold: Any, guess: bool = False) -> tuple[Place, Selection]:
+             hold: Any, guess: bool = False) -> tuple[OperatingPoint, Selection]:
     """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints.
 
     guess   the state may be moved onto the constraints
     """
-    place = _place(module, at, params, t, inputs)
+    point = _place(module, at, params, t, inputs)
     selection = holding(select(module, free, fixed, None), hold)
-    x = selection.apply(place.x)
-    if guess and place.sizes[3]:
+    x = selection.apply(point.x)
+    if guess and point.sizes[3]:
         kept = [n for n in selection.values if n in module.metadata.q or n in module.metadata.u]
-        n_q, n_u, *_ = place.sizes
-        q, u = consistent(place.bound, x[:n_q], x[n_q:n_q + n_u], place.p, place.t, kept)
+        n_q, n_u, *_ = point.sizes
+        q, u = consistent(point.bound, x[:n_q], x[n_q:n_q + n_u], point.p, point.t, kept)
         x = np.concatenate([q, u, x[len(q) + len(u):]])
     try:
-        check_start(place.bound, place.t, x, place.p)
+        check_start(point.bound, point.t, x, point.p)
     except NotConsistent as error:
         result = error.found.replace("the initial positions", "the positions").replace("the initial speeds", "the speeds")
         raise ArgumentError(f"{result}; linear equations exist at states that fulfil the constraints: take "
                             "q, u = module.consistent(q, u, params), and pass (q, u)") from None
-    return in_motion(place.at(x=x), selection), selection
+    return in_motion(point.at(x=x), selection), selection
 
 
 def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int] | tuple[list[int], list[int]] | None:
-    """Places of independent displacements; where rates are named, too, of independent displacements and speeds."""
+    """Indices of independent displacements; where rates are named, too, of independent displacements and speeds."""
     if coordinates is None:
         return None
     labels, speeds = list(coordinate_names(module.metadata)), list(module.metadata.u)
@@ -383,7 +383,7 @@ def _independent(module: Module, coordinates: Sequence[Any] | None) -> list[int]
     return (displaced, rates) if displaced and rates else displaced or rates
 
 
-def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
+def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> OperatingPoint:
     """The state that `at` stands for; without accelerations."""
     metadata = module.metadata
     if hasattr(at, "t") and hasattr(at, "x") and np.ndim(at.t) == 1:
@@ -399,7 +399,7 @@ def _place(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -
     return rest(module, time, normalised(module, x), real_parameters(module, params), free)
 
 
-def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> Place:
+def _of_solution(module: Module, at: Any, params: Any, t: float | None, inputs: Any) -> OperatingPoint:
     if t is None or params is not None or inputs is not None:
         raise ArgumentError(f"{module.name}: at a solution pass the time t alone; parameters and inputs are those of the motion")
     time = number(t, "a finite number of seconds as t", module.name)

@@ -216,7 +216,7 @@ def sense_of(whirl: float, whirls: tuple[float, float]) -> str:
 
 
 def ordered(values: np.ndarray) -> np.ndarray:
-    """Places of eigenvalues by size, those of one size by frequency, growing ones before decaying ones."""
+    """Indices of eigenvalues by size, those of one size by frequency, growing ones before decaying ones."""
     sizes = np.abs(values)
     with np.errstate(divide="ignore"):
         steps = np.where(sizes > 0, np.round(np.log(sizes), 9), -np.inf)
@@ -252,7 +252,7 @@ def _parted(values: np.ndarray, right: np.ndarray, left: np.ndarray, shapes: Sha
 
 
 def _paired(modes: list[Mode]) -> list[Mode]:
-    """A zero eigenvalue comes twice, once for the place and once for the speed: listed once."""
+    """A zero eigenvalue comes twice, once for the position and once for the speed: listed once."""
     kept: list[Mode] = []
     for mode in modes:
         twin = [m for m in kept if mode.kind == m.kind == "zero" and abs(np.vdot(m.shape, mode.shape)) >

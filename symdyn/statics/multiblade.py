@@ -25,7 +25,7 @@ from symdyn.runtime.constraints import turning
 from symdyn.statics.modes import Shapes
 from symdyn.statics.search import LARGEST_TURN
 from symdyn.statics.selection import Selection
-from symdyn.statics.terms import Place, coordinate_names
+from symdyn.statics.terms import OperatingPoint, coordinate_names
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -39,7 +39,7 @@ SOLVED = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class Rotor:
-    """A rotor of a module, by places.
+    """A rotor of a module, by indices of its states.
 
     speed, azimuth   among the speeds and the coordinates; free: speeds that are free
     blades           among the speeds, set by set; coordinates: those of all of these among the coordinates
@@ -59,7 +59,7 @@ class Rotor:
 
     @property
     def rows(self) -> list[int]:
-        """Places of the blades among what is free."""
+        """Indices of the blades among what is free."""
         return [self.free.index(k) for k in self.moving]
 
     @cached_property
@@ -67,8 +67,8 @@ class Rotor:
         """Names of the free coordinates in the fixed frame."""
         names = list(coordinate_names(self.module.metadata))
         for group in self.blades:
-            for place, name in zip(group, _harmonics(len(group)), strict=True):
-                names[place] = f"{coordinate_names(self.module.metadata)[group[0]]} {name}"
+            for point, name in zip(group, _harmonics(len(group)), strict=True):
+                names[point] = f"{coordinate_names(self.module.metadata)[group[0]]} {name}"
         return tuple(names[k] for k in self.free)
 
     def transform(self, psi: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,7 +77,7 @@ class Rotor:
         T, first, second = np.eye(n), np.zeros((n, n)), np.zeros((n, n))
         for group in self.blades:
             count = len(group)
-            places = [self.free.index(k) for k in group]
+            indices = [self.free.index(k) for k in group]
             angles = psi + 2 * np.pi * np.arange(count) / count
             columns: list[tuple[np.ndarray, ...]] = [(np.ones(count), np.zeros(count), np.zeros(count))]
             for j in range(1, (count - 1) // 2 + 1):
@@ -86,7 +86,7 @@ class Rotor:
             if count % 2 == 0:
                 columns.append(((-1.0) ** np.arange(count), np.zeros(count), np.zeros(count)))
             for matrix, which in ((T, 0), (first, 1), (second, 2)):
-                matrix[np.ix_(places, places)] = np.array([column[which] for column in columns]).T
+                matrix[np.ix_(indices, indices)] = np.array([column[which] for column in columns]).T
         return T, first, second
 
 
@@ -131,23 +131,23 @@ class Steady:
     """A steadily turning rotor: coordinates of all but the blades, a of the free ones (blades: multi-blade coordinates)."""
 
     rotor: Rotor
-    place: Place
+    point: OperatingPoint
     a: np.ndarray
     omega: float
     azimuths: np.ndarray
     iterations: int = 0
 
-    def at(self, psi: float) -> tuple[Place, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def at(self, psi: float) -> tuple[OperatingPoint, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """The state with the rotor at an azimuth, and the transformation there."""
-        rotor, place = self.rotor, self.place
+        rotor, point = self.rotor, self.point
         transform = rotor.transform(psi)
-        n_q = place.sizes[0]
-        x, ud = place.x.copy(), place.ud.copy()
+        n_q = point.sizes[0]
+        x, ud = point.x.copy(), point.ud.copy()
         x[list(rotor.coordinates)], x[[n_q + k for k in rotor.moving]], ud[rotor.moving] = (
             (self.omega**order * matrix @ self.a)[rotor.rows] for order, matrix in enumerate(transform))
         x[rotor.azimuth] = psi
         x[n_q + rotor.speed] = self.omega
-        return place.at(x=x, ud=ud), transform
+        return point.at(x=x, ud=ud), transform
 
     def averages(self) -> tuple[np.ndarray, Averaged]:
         """Forces and matrices in the fixed frame."""
@@ -156,9 +156,9 @@ class Steady:
         free = list(self.rotor.free)
         result = []
         for psi in self.azimuths:
-            place, (T, first, second) = self.at(float(psi))
-            m, c, k = place.M[index], place.by_u[index], place.by_v[index]
-            result.append((T.T @ place.forces[free], T.T @ m @ T, T.T @ (2 * omega * m @ first + c @ T),
+            point, (T, first, second) = self.at(float(psi))
+            m, c, k = point.M[index], point.by_u[index], point.by_v[index]
+            result.append((T.T @ point.forces[free], T.T @ m @ T, T.T @ (2 * omega * m @ first + c @ T),
                           T.T @ (omega**2 * m @ second + omega * c @ first + k @ T)))
         r, M, C, K = (np.mean([each[i] for each in result], axis=0) for i in range(4))
         mean = _state_matrix(M, C, K)
@@ -167,25 +167,25 @@ class Steady:
 
     def stepped(self, step: np.ndarray, iterations: int) -> Steady:
         """After a change of a; coordinates other than the blades' move along their speeds."""
-        place, rotor = self.place, self.rotor
-        v = np.zeros(place.sizes[1])
+        point, rotor = self.point, self.rotor
+        v = np.zeros(point.sizes[1])
         v[list(rotor.free)] = step
         v[rotor.moving] = 0.0
-        x = place.x.copy()
-        x[:place.sizes[0]] = place.moved(v)
-        return Steady(rotor, place.at(x=x), self.a + step, self.omega, self.azimuths, iterations)
+        x = point.x.copy()
+        x[:point.sizes[0]] = point.moved(v)
+        return Steady(rotor, point.at(x=x), self.a + step, self.omega, self.azimuths, iterations)
 
 
 def demand_equal_blades(state: Steady) -> None:
     """Raises ArgumentError for a set whose members do not have the same inertia and stiffness."""
-    rotor, name = state.rotor, state.place.module.name
+    rotor, name = state.rotor, state.point.module.name
     if len(state.azimuths) < LEAST_AZIMUTHS:
         return
-    places = [state.at(float(psi))[0] for psi in state.azimuths]
-    M = np.mean([np.diag(place.M) for place in places], axis=0)
-    K = np.mean([np.diag(place.by_v[:len(M)]) for place in places], axis=0)
+    points = [state.at(float(psi))[0] for psi in state.azimuths]
+    M = np.mean([np.diag(point.M) for point in points], axis=0)
+    K = np.mean([np.diag(point.by_v[:len(M)]) for point in points], axis=0)
     size = np.abs(K) + state.omega**2 * M
-    labels = coordinate_names(state.place.module.metadata)
+    labels = coordinate_names(state.point.module.metadata)
     for group in (list(g) for g in rotor.blades):
         for what, values, sizes in (("inertia", M[group], M[group]), ("stiffness", K[group], size[group])):
             if np.ptp(values) > EQUAL * sizes.max():
@@ -198,7 +198,7 @@ def demand_equal_blades(state: Steady) -> None:
 def steady(start: Steady) -> tuple[Steady, Averaged]:
     """The steady state near a start, by Newton's method. Raises NoEquilibrium, ArgumentError."""
     demand_equal_blades(start)
-    name, turns = start.place.module.name, turning(start.place.module)[list(start.rotor.free)]
+    name, turns = start.point.module.name, turning(start.point.module)[list(start.rotor.free)]
     result = start
     try:
         for k in range(ITERATIONS):

@@ -16,7 +16,7 @@ import scipy.sparse.csgraph
 
 from symdyn.statics.manifold import Manifold, in_motion, natural_length, natural_scales
 from symdyn.statics.spectrum import Unknown
-from symdyn.statics.terms import Place
+from symdyn.statics.terms import OperatingPoint
 
 # Sets of data; the largest change among them is multiplied by this, for the directions that none of them took.
 SAMPLES, SAFETY = 4, 4.0
@@ -42,8 +42,8 @@ def noise(manifold: Manifold) -> Noise:
     found = [np.zeros_like(each) for each in mine]
     stream = np.random.default_rng(7)
     for _ in range(SAMPLES):
-        place = in_motion(rounded(manifold.place, stream), manifold.selection)
-        other = _matrices(Manifold(place, manifold.selection, partition=manifold.partition))
+        point = in_motion(rounded(manifold.point, stream), manifold.selection)
+        other = _matrices(Manifold(point, manifold.selection, partition=manifold.partition))
         found = [np.maximum(most, np.abs(b - a)) for most, a, b in zip(found, mine, other, strict=True)]
     A, M, C, K, K_z = (SAFETY * most + ENTRIES * EPSILON * np.abs(a) for most, a in zip(found, mine, strict=True))
     of_K, of_C, of_z = _of_sums(manifold)
@@ -74,7 +74,7 @@ def _floor(manifold: Manifold, rounding: np.ndarray) -> np.ndarray:
     n_d, n_s = manifold.n_d, manifold.n_s
     if not A.size:
         return A
-    lengths = natural_scales(manifold.place) * natural_length(manifold.place)
+    lengths = natural_scales(manifold.point) * natural_length(manifold.point)
     sizes = np.concatenate([lengths[manifold.displacements], lengths[manifold.speeds], np.ones(len(manifold.states))])
     scaled = A * sizes / sizes[:, None]
     rates = np.zeros(len(A), dtype=bool)
@@ -95,18 +95,18 @@ def _floor(manifold: Manifold, rounding: np.ndarray) -> np.ndarray:
 
 def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rounding of K, C and K_z as sums of products, Z^T F Z: terms that cancel leave that of the largest of them."""
-    place = manifold.place
-    forces = place.parts["forces"]
-    weights = np.sqrt(np.where(place.M.diagonal() > 0, place.M.diagonal(), 1.0))
-    F_v, F_u = (_entries(F, weights, weights) for F in (place.by_v[forces], place.by_u[forces]))
-    F_z = _entries(place.by_z[forces][:, manifold.states], weights, np.ones(len(manifold.states)))
-    inner, M = np.abs(manifold.Z_u.T), np.abs(place.M)
+    point = manifold.point
+    forces = point.parts["forces"]
+    weights = np.sqrt(np.where(point.M.diagonal() > 0, point.M.diagonal(), 1.0))
+    F_v, F_u = (_entries(F, weights, weights) for F in (point.by_v[forces], point.by_u[forces]))
+    F_z = _entries(point.by_z[forces][:, manifold.states], weights, np.ones(len(manifold.states)))
+    inner, M = np.abs(manifold.Z_u.T), np.abs(point.M)
     Z_v, Z_u, W, W_z = (np.abs(each) for each in (manifold.Z_v, manifold.Z_u, manifold.W, manifold.W_z))
     demanded = [ENTRIES * EPSILON * M @ np.abs(each) for each in manifold.demanded]
     # What is not known of the bases enters from both sides.
     of_v, of_u, of_W, of_W_z = _of_bases(manifold)
-    full_v, full_u = np.abs(place.by_v[forces]), np.abs(place.by_u[forces])
-    full_z = np.abs(place.by_z[forces][:, manifold.states])
+    full_v, full_u = np.abs(point.by_v[forces]), np.abs(point.by_u[forces])
+    full_z = np.abs(point.by_z[forces][:, manifold.states])
     moved = (full_v @ Z_v + full_u @ W, full_u @ Z_u, full_z + full_u @ W_z)
     from_bases = (full_v @ of_v + full_u @ of_W, full_u @ of_u, full_u @ of_W_z)
     from_terms = (F_v @ Z_v + F_u @ W, F_u @ Z_u, F_z + F_u @ W_z)
@@ -117,7 +117,7 @@ def _of_sums(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _of_bases(manifold: Manifold) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rounding of Z_v, Z_u, W and W_z: dependent changes are solved for, with errors of the size of the largest of them."""
-    scales = natural_scales(manifold.place)
+    scales = natural_scales(manifold.point)
     found = []
     for values, independent in ((manifold.Z_v, manifold.displacements), (manifold.Z_u, manifold.speeds),
                                 (manifold.W, manifold.speeds), (manifold.W_z, manifold.speeds)):
@@ -138,18 +138,18 @@ def _entries(F: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray
     return np.asarray(EPSILON * (ENTRIES * np.abs(F) + smaller * np.outer(rows, columns)))
 
 
-def rounded(place: Place, stream: np.random.Generator) -> Place:
-    """The place with data that differ in their last digit; coordinates that are not exactly zero also by rounding of 1 rad, or of
+def rounded(point: OperatingPoint, stream: np.random.Generator) -> OperatingPoint:
+    """The operating point with data that differ in their last digit; coordinates that are not exactly zero also by rounding of 1 rad, or of
     the natural length: a search ends there, and leaves 1e-18 where zero is meant."""
     def near(values: np.ndarray) -> np.ndarray:
         return np.asarray(values * (1 + DATA * EPSILON * stream.uniform(-1, 1, len(values))))
 
-    x = near(place.x)
-    q = place.q
-    units = [place.module.metadata.units.get(n) for n in place.module.metadata.q]
-    sizes = np.where([unit == "m" for unit in units], natural_length(place), 1.0)
+    x = near(point.x)
+    q = point.q
+    units = [point.module.metadata.units.get(n) for n in point.module.metadata.q]
+    sizes = np.where([unit == "m" for unit in units], natural_length(point), 1.0)
     x[:len(q)] += np.where(q != 0, sizes, 0.0) * EPSILON * stream.uniform(-1, 1, len(q))
-    return place.at(x=x, p=near(place.p), inputs=near(place.inputs))
+    return point.at(x=x, p=near(point.p), inputs=near(point.inputs))
 
 
 def _matrices(manifold: Manifold) -> Sequence[np.ndarray]:

@@ -79,18 +79,18 @@ class PeriodicMotion:
         if asked not in parameters:
             raise ArgumentError(f"{self.module.name}: a periodic motion was to be followed over {shown(asked)}, which is no "
                                 f"parameter; there are {', '.join(parameters)}")
-        place = parameters.index(asked)
+        point = parameters.index(asked)
         found, motion = [], self
         for value in real_of(values, self.module.name, "the values of the parameter must be numbers").ravel():
             problem = motion._problem
-            change = problem.derivative(motion.x, motion.period, asked) * (value - motion.params[place])
+            change = problem.derivative(motion.x, motion.period, asked) * (value - motion.params[point])
             p = motion.params.copy()
-            p[place] = value
+            p[point] = value
             try:
                 motion = replace(problem, p=p).solve(motion.x + change[:-1], motion.period + change[-1])
             except NoEquilibrium as error:
                 raise NoEquilibrium(f"{error}; at {asked} = {value:g}, followed from {asked} = "
-                                    f"{motion.params[place]:g}") from None
+                                    f"{motion.params[point]:g}") from None
             found.append(motion)
         return found
 

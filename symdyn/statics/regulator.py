@@ -76,8 +76,8 @@ class Regulator:
         if wrong:
             raise ArgumentError(f"{self.linear.module.name}: the regulator does not drive {', '.join(map(shown, wrong))}; it "
                                 f"drives {', '.join(self.driven)}")
-        places = [self.linear.module.metadata.inputs.index(n) for n in wanted]
-        index: Any = places if isinstance(inputs, tuple) else places[0]
+        indices = [self.linear.module.metadata.inputs.index(n) for n in wanted]
+        index: Any = indices if isinstance(inputs, tuple) else indices[0]
         return lambda t, x: self(t, x)[index]
 
     def describe(self) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from symdyn.errors import EvaluationError
 from symdyn.runtime.constraints import turning
 from symdyn.statics.selection import Selection
-from symdyn.statics.terms import Place
+from symdyn.statics.terms import OperatingPoint
 from symdyn.tape.kernels import RANK
 
 # Angles change by at most this in one step, rad.
@@ -45,71 +45,71 @@ RUNAWAY = "a coordinate runs away"
 class Trial:
     """A state on the way, with its residual and the derivative of it by the unknowns."""
 
-    place: Place
+    point: OperatingPoint
     selection: Selection
 
     @cached_property
     def tested(self) -> np.ndarray:
-        return self.selection.tested(self.place)
+        return self.selection.tested(self.point)
 
     @cached_property
     def directions(self) -> np.ndarray:
-        return self.selection.directions(self.place)
+        return self.selection.directions(self.point)
 
     @property
     def forces(self) -> np.ndarray:
-        """Along the tested directions, with the multipliers of the place."""
-        along: np.ndarray = self.tested.T @ self.place.forces
+        """Along the tested directions, with the multipliers of the point."""
+        along: np.ndarray = self.tested.T @ self.point.forces
         return along
 
     def with_multipliers(self, weights: np.ndarray) -> Trial:
         """The same with the multipliers that balance the forces best; weights of the tested directions."""
-        if not self.place.sizes[3]:
+        if not self.point.sizes[3]:
             return self
-        still = self.place.at(lam=np.zeros(self.place.sizes[3]))
-        pulls = weights[:, None] * (self.tested.T @ self.place.C_r.T)
+        still = self.point.at(lam=np.zeros(self.point.sizes[3]))
+        pulls = weights[:, None] * (self.tested.T @ self.point.C_r.T)
         lam = np.linalg.lstsq(pulls, -weights * (self.tested.T @ still.forces), rcond=RANK)[0]
-        return Trial(self.place.at(lam=lam * self.place.scale), self.selection)
+        return Trial(self.point.at(lam=lam * self.point.scale), self.selection)
 
     def residual(self) -> np.ndarray:
         """Forces along the tested directions, constraints as lengths, rates of the free extra states."""
-        return np.concatenate([self.forces, self.place.C * self.place.scale, self.place.rates_z[self.selection.states]])
+        return np.concatenate([self.forces, self.point.C * self.point.scale, self.point.rates_z[self.selection.states]])
 
     def derivative(self) -> np.ndarray:
         """d residual / d unknowns at these multipliers; unknowns: along `directions`, extra states, parameters, inputs."""
-        place, states = self.place, self.selection.states
-        _, n_u, _, n_c = place.sizes
-        blocks = [place.by_v @ self.directions, place.by_z[:, states], *[c[:, None] for c in self.by_unknown()]]
+        point, states = self.point, self.selection.states
+        _, n_u, _, n_c = point.sizes
+        blocks = [point.by_v @ self.directions, point.by_z[:, states], *[c[:, None] for c in self.by_unknown()]]
         whole = np.hstack(blocks)
         top = self.tested.T @ whole[:n_u]
         # By C_r in place of the derivative of C: velocity constraints have none, and hold steps, too.
         middle = np.zeros((n_c, whole.shape[1]))
-        middle[:, self.directions.shape[1]:] = whole[n_u:n_u + n_c, self.directions.shape[1]:] * place.scale[:, None]
-        middle[:, :self.directions.shape[1]] = place.C_r @ self.directions
+        middle[:, self.directions.shape[1]:] = whole[n_u:n_u + n_c, self.directions.shape[1]:] * point.scale[:, None]
+        middle[:, :self.directions.shape[1]] = point.C_r @ self.directions
         return np.vstack([top, middle, whole[n_u + n_c:][states]])
 
     def by_unknown(self) -> list[np.ndarray]:
         """Derivatives of the balance by the parameters and inputs that are solved for."""
-        return list(self.place.by([*self.selection.parameters, *self.selection.inputs]).T)
+        return list(self.point.by([*self.selection.parameters, *self.selection.inputs]).T)
 
 
 class Search:
     """One search from one start."""
 
-    def __init__(self, place: Place, selection: Selection) -> None:
+    def __init__(self, point: OperatingPoint, selection: Selection) -> None:
         self.selection = selection
-        self.module = place.module
-        self.turning = turning(place.module)
+        self.module = point.module
+        self.turning = turning(point.module)
         self.steps = 0
-        trial = Trial(place, selection)
-        masses = np.abs(np.diag(place.M))
+        trial = Trial(point, selection)
+        masses = np.abs(np.diag(point.M))
         lengthy = masses[~self.turning] if (~self.turning).any() else masses
         reference = float(lengthy.max(initial=0.0)) or 1.0
         columns = np.sqrt(reference / np.where(masses > 1e-12 * masses.max(initial=0.0), masses, reference))
         self.columns = columns
         trial = self._closed(trial)
         trial = trial.with_multipliers(np.sqrt(np.sum((trial.tested * columns[:, None])**2, axis=0)))
-        n_e, n_c = trial.tested.shape[1], place.sizes[3]
+        n_e, n_c = trial.tested.shape[1], point.sizes[3]
         least = CONSTRAINED_FLOOR if n_c else FLOOR
         self.unknown = self._unknown_widths(trial)
         J = np.abs(trial.derivative() * self.widths(trial))
@@ -122,21 +122,21 @@ class Search:
         self.n_e = n_e
         self.best = trial.with_multipliers(self.weights[:n_e])
         self.best.residual()  # where it cannot be evaluated this raises now
-        self.far = FAR * max(1.0, float(np.abs(place.q).max(initial=0.0)))
+        self.far = FAR * max(1.0, float(np.abs(point.q).max(initial=0.0)))
 
     def widths(self, trial: Trial) -> np.ndarray:
         """Scales of the unknowns: what one unit of the scaled ones is."""
         along = 1 / np.sqrt(np.sum((trial.directions / self.columns[:, None])**2, axis=0))
-        return np.concatenate([along, [abs(v) or 1.0 for v in trial.place.z[self.selection.states]], self.unknown])
+        return np.concatenate([along, [abs(v) or 1.0 for v in trial.point.z[self.selection.states]], self.unknown])
 
     def _unknown_widths(self, trial: Trial) -> np.ndarray:
         """Of parameters and inputs: what acts like one unit of motion against the stiffness, that of what is kept included; their
         own size, or 1, where there is none."""
-        place, n_u = trial.place, trial.place.sizes[1]
-        stiffness = np.abs((trial.tested.T @ place.by_v[:n_u]) * self.columns).max(axis=1, initial=0.0)
+        point, n_u = trial.point, trial.point.sizes[1]
+        stiffness = np.abs((trial.tested.T @ point.by_v[:n_u]) * self.columns).max(axis=1, initial=0.0)
         stiff = stiffness > FLOOR * stiffness.max(initial=0.0)
         widths = []
-        for size, column in zip(self.selection.amounts(place), trial.by_unknown(), strict=True):
+        for size, column in zip(self.selection.amounts(point), trial.by_unknown(), strict=True):
             effect = np.abs(trial.tested.T @ column[:n_u])[stiff] / stiffness[stiff]
             largest = effect.max(initial=0.0)
             widths.append(1 / largest if largest > 0 else abs(size) or 1.0)
@@ -148,14 +148,14 @@ class Search:
         What acts is measured by the change of the forces with the logarithm of every parameter, by pulls of constraints, and,
         for rounding, by the stiffness.
         """
-        place, names = trial.place, self.module.metadata
-        n_u = place.sizes[1]
-        values = np.concatenate([place.p, place.inputs])
-        by = place.by([*names.parameters, *names.inputs])[:n_u]
+        point, names = trial.point, self.module.metadata
+        n_u = point.sizes[1]
+        values = np.concatenate([point.p, point.inputs])
+        by = point.by([*names.parameters, *names.inputs])[:n_u]
         acting = np.abs(by) @ np.abs(values)
-        if place.sizes[3]:
-            acting += np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
-        whole = self.columns * (acting + np.abs(place.by_v[:n_u]) @ self.columns)
+        if point.sizes[3]:
+            acting += np.abs(point.evaluate("C_r").T) @ np.abs(point.lam)
+        whole = self.columns * (acting + np.abs(point.by_v[:n_u]) @ self.columns)
         result: np.ndarray = LEFT * acting + ROUNDING * whole.max(initial=0.0) / self.columns
         return result
 
@@ -164,7 +164,7 @@ class Search:
         if not trial.tested.shape[1]:
             return True
         Q = trial.tested @ np.linalg.pinv(trial.tested)
-        return bool((np.abs(Q @ trial.place.forces) <= np.abs(Q) @ self.allowed(trial)).all())
+        return bool((np.abs(Q @ trial.point.forces) <= np.abs(Q) @ self.allowed(trial)).all())
 
     def run(self, limit: int) -> tuple[bool, str]:
         """Whether an equilibrium was found, and else why not; `best` holds the last state, `steps` their number.
@@ -216,7 +216,7 @@ class Search:
                     radius = max(radius, 2 * length)
             if not actual > 0.25 * predicted and newton > STEP:
                 radius = 0.25 * length
-            if np.abs(trial.place.q).max(initial=0.0) > self.far:
+            if np.abs(trial.point.q).max(initial=0.0) > self.far:
                 return False, RUNAWAY
             if radius < 1e-12:
                 return False, "forces are left that no step reduces"
@@ -224,18 +224,18 @@ class Search:
 
     def _closed(self, trial: Trial) -> Trial:
         """The state moved onto the constraints as far as a few steps get: only there dependent ones are seen to be."""
-        for _ in range(CLOSING if trial.place.sizes[3] else 0):
-            place = trial.place
-            gaps = place.C * place.scale
+        for _ in range(CLOSING if trial.point.sizes[3] else 0):
+            point = trial.point
+            gaps = point.C * point.scale
             if np.abs(gaps).max() <= CLOSED:
                 break
             B = trial.directions
             widths = 1 / np.sqrt(np.sum((B / self.columns[:, None])**2, axis=0))
-            change = -(B * widths) @ (np.linalg.pinv(place.C_r @ B * widths, rcond=1e-6) @ gaps)
+            change = -(B * widths) @ (np.linalg.pinv(point.C_r @ B * widths, rcond=1e-6) @ gaps)
             turns = np.abs(change[self.turning]).max(initial=0.0)
-            x = place.x.copy()
-            x[:len(place.q)] = place.moved(change * min(1.0, LARGEST_TURN / turns) if turns else change)
-            trial = Trial(place.at(x=self.selection.apply(x)), self.selection)
+            x = point.x.copy()
+            x[:len(point.q)] = point.moved(change * min(1.0, LARGEST_TURN / turns) if turns else change)
+            trial = Trial(point.at(x=self.selection.apply(x)), self.selection)
         return trial
 
     @staticmethod
@@ -247,8 +247,8 @@ class Search:
         """Residual and derivative, scaled, forces without what multipliers balance; scales of the unknowns."""
         widths = self.widths(trial)
         F, J = trial.residual() * self.weights, trial.derivative() * self.weights[:, None] * widths
-        if trial.place.sizes[3]:
-            pulls = self.weights[:self.n_e, None] * (trial.tested.T @ trial.place.C_r.T)
+        if trial.point.sizes[3]:
+            pulls = self.weights[:self.n_e, None] * (trial.tested.T @ trial.point.C_r.T)
             Q = _complement(pulls)
             F = np.concatenate([Q.T @ F[:self.n_e], F[self.n_e:]])
             J = np.vstack([Q.T @ J[:self.n_e], J[self.n_e:]])
@@ -262,22 +262,22 @@ class Search:
 
     def _moved(self, trial: Trial, step: np.ndarray) -> Trial | None:
         """The next state; None where the equations cannot be evaluated."""
-        place, selection = trial.place, self.selection
+        point, selection = trial.point, self.selection
         names = self.module.metadata
         n = trial.directions.shape[1]
         n_z = len(selection.states)
-        x = place.x.copy()
-        x[:len(place.q)] = place.moved(trial.directions @ step[:n])
+        x = point.x.copy()
+        x[:len(point.q)] = point.moved(trial.directions @ step[:n])
         x = selection.apply(x)
-        start = len(x) - place.sizes[2]
+        start = len(x) - point.sizes[2]
         for k, change in zip(selection.states, step[n:n + n_z], strict=True):
             x[start + k] += change
-        p, inputs = place.p.copy(), place.inputs.copy()
+        p, inputs = point.p.copy(), point.inputs.copy()
         for k, name in enumerate(selection.parameters):
             p[names.parameters.index(name)] += step[n + n_z + k]
         for k, name in enumerate(selection.inputs):
             inputs[names.inputs.index(name)] += step[n + n_z + len(selection.parameters) + k]
-        new = Trial(place.at(x=x, p=p, inputs=inputs), selection)
+        new = Trial(point.at(x=x, p=p, inputs=inputs), selection)
         try:
             new = self._closed(new).with_multipliers(self.weights[:self.n_e])
             new.residual(), new.derivative()

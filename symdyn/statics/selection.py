@@ -13,7 +13,7 @@ import numpy as np
 from symdyn.arguments import take
 from symdyn.errors import ArgumentError
 from symdyn.shown import name_of, shown
-from symdyn.statics.terms import Place, null_space
+from symdyn.statics.terms import OperatingPoint, null_space
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -49,32 +49,32 @@ class Selection:
 
     @cached_property
     def free_states(self) -> list[int]:
-        """Places of the extra states that are not held."""
+        """Indices of the extra states that are not held."""
         return [k for k, name in enumerate(self.module.metadata.z) if name not in self.held]
 
     @cached_property
     def states(self) -> list[int]:
-        """Places of the extra states that are free."""
+        """Indices of the extra states that are free."""
         return [k for k, name in enumerate(self.module.metadata.z) if name not in self.kept]
 
     @property
     def unknown(self) -> tuple[str, ...]:
         return (*self.parameters, *self.inputs)
 
-    def amounts(self, place: Place) -> np.ndarray:
+    def amounts(self, point: OperatingPoint) -> np.ndarray:
         """The values of what is solved for, (n,)."""
         metadata = self.module.metadata
-        return np.array([*[place.p[metadata.parameters.index(n)] for n in self.parameters],
-                         *[place.inputs[metadata.inputs.index(n)] for n in self.inputs]])
+        return np.array([*[point.p[metadata.parameters.index(n)] for n in self.parameters],
+                         *[point.inputs[metadata.inputs.index(n)] for n in self.inputs]])
 
-    def rows(self, place: Place, equations: bool = False) -> np.ndarray:
+    def rows(self, point: OperatingPoint, equations: bool = False) -> np.ndarray:
         """R with R v = 0 for what stays, (n, n_u); equations: only for those whose equations do not hold."""
         metadata = self.module.metadata
         n_u = len(metadata.u)
         named: dict[str, np.ndarray] = {}
         for name in self.kept:
             if name in metadata.q:
-                named[name] = place.N[metadata.q.index(name)]
+                named[name] = point.N[metadata.q.index(name)]
             elif name in metadata.u:
                 named[name] = np.eye(n_u)[metadata.u.index(name)]
         held = [named[name] for name in self.conditions if equations and name in named]
@@ -82,13 +82,13 @@ class Selection:
                 if not (equations and (name in self.conditions or any(_same(row, h) for h in held)))]
         return np.array(rows).reshape(len(rows), n_u)
 
-    def directions(self, place: Place) -> np.ndarray:
+    def directions(self, point: OperatingPoint) -> np.ndarray:
         """Columns: velocities that leave what stays as it is, (n_u, n)."""
-        return null_space(self.rows(place))
+        return null_space(self.rows(point))
 
-    def tested(self, place: Place) -> np.ndarray:
+    def tested(self, point: OperatingPoint) -> np.ndarray:
         """Columns: virtual velocities along which forces balance, (n_u, n)."""
-        return null_space(self.rows(place, equations=True)) if self.conditions else self.directions(place)
+        return null_space(self.rows(point, equations=True)) if self.conditions else self.directions(point)
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """The state with given values."""

@@ -16,36 +16,36 @@ from symdyn.runtime.constraints import length as length_of
 from symdyn.runtime.constraints import names, scaled_jacobian, turning
 from symdyn.statics.manifold import held_indices, natural_scales
 from symdyn.statics.selection import Selection
-from symdyn.statics.terms import Place
+from symdyn.statics.terms import OperatingPoint
 from symdyn.tape.kernels import RANK
 
 # Positions nearby are so far away, in rad or lengths of the mechanism; so many are tried.
 AWAY, TRIES = 0.03, 4
 
 
-def singular_configuration(place: Place, selection: Selection) -> str:
+def singular_configuration(point: OperatingPoint, selection: Selection) -> str:
     """What is singular about a position, as "the constraints have rank 1 here and 2 nearby"; "" if nothing is.
 
     Held coordinates and speeds count as constraints: a crank that is held at its dead point holds a linkage at all positions
     nearby, but not there.
     """
-    module = place.module
-    held = held_indices(place, selection)
+    module = point.module
+    held = held_indices(point, selection)
     if not names(module):
         return ""
-    here = _rank(place, place.x, held)
+    here = _rank(point, point.x, held)
     if here == len(names(module)) + sum(map(len, held)):
         return ""
     stream = np.random.default_rng(5)
-    turns, size = turning(module), length_of(module, place.p)
-    n_q, n_u, *_ = place.sizes
+    turns, size = turning(module), length_of(module, point.p)
+    n_q, n_u, *_ = point.sizes
     most = here
     for _ in range(TRIES):
         change = AWAY * np.where(turns, 1.0, size) * stream.standard_normal(n_u)
-        x = place.x.copy()
-        x[:n_q] = place.moved(change)
+        x = point.x.copy()
+        x[:n_q] = point.moved(change)
         try:
-            most = max(most, _rank(place, on_constraints(place.bound, place.t, x, place.p), held))
+            most = max(most, _rank(point, on_constraints(point.bound, point.t, x, point.p), held))
         except (ArgumentError, EvaluationError):
             continue
     if most == here:
@@ -55,11 +55,11 @@ def singular_configuration(place: Place, selection: Selection) -> str:
             f"that {most - here} more direction{'s' * (most - here > 1)} would count as free than the mechanism has")
 
 
-def _rank(place: Place, x: np.ndarray, held: tuple[list[int], list[int]]) -> int:
+def _rank(point: OperatingPoint, x: np.ndarray, held: tuple[list[int], list[int]]) -> int:
     """Of the rows of constraints, and of those of held coordinates and speeds, which are given the length 1."""
     coordinates, speeds = held
-    rows = np.vstack([place.at(x=x).N[coordinates], np.eye(place.sizes[1])[speeds]]) * natural_scales(place)
+    rows = np.vstack([point.at(x=x).N[coordinates], np.eye(point.sizes[1])[speeds]]) * natural_scales(point)
     lengths = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = rows / np.where(lengths > 0, lengths, 1.0)
-    values = np.linalg.svd(np.vstack([scaled_jacobian(place.module, place.t, x, place.p), rows]), compute_uv=False)
+    values = np.linalg.svd(np.vstack([scaled_jacobian(point.module, point.t, x, point.p), rows]), compute_uv=False)
     return int((values > RANK * max(values[0], 1.0)).sum()) if len(values) else 0

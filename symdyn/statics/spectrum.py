@@ -131,22 +131,22 @@ class Spectrum:
 
     @cached_property
     def zeros(self) -> np.ndarray:
-        """Places of the neutral eigenvalues, those of `chains`: the nearest ones among those without a proved sign."""
+        """Indices of the neutral eigenvalues, those of `chains`: the nearest ones among those without a proved sign."""
         open_ = np.flatnonzero(self.signs == 0)
         order = open_[np.argsort(np.abs(self.values[open_] - self.boundary.neutral), kind="stable")]
         return np.asarray(np.sort(order[:sum(self.chains)]))
 
     @property
     def imaginary(self) -> np.ndarray:
-        """Places of eigenvalues that are neither proved to grow or decay, nor zero: undamped oscillations."""
+        """Indices of eigenvalues that are neither proved to grow or decay, nor zero: undamped oscillations."""
         open_ = np.flatnonzero(self.signs == 0)
         return np.asarray(open_[~np.isin(open_, self.zeros)])
 
     @cached_property
     def undecided(self) -> np.ndarray:
-        """Places of oscillations, and of real eigenvalues, whose sign rounding hides: something damps or drives them, but less
+        """Indices of oscillations, and of real eigenvalues, whose sign rounding hides: something damps or drives them, but less
         than E lets be known."""
-        places = []
+        indices = []
         for k in self.imaginary:
             acts = float(self.driven[k]) if len(self.driven) else 0.0
             radius = float(self.radii[k])
@@ -155,8 +155,8 @@ class Spectrum:
                 radius = min(radius, float(np.sqrt(EPSILON)) * abs(complex(self.values[k])))
             stands = abs(self.values[k].imag) > ZERO * radius or abs(self.boundary.margin(complex(self.values[k]))) == 0
             if not stands or (acts > 0 and radius > DECIDED * acts):
-                places.append(int(k))
-        return np.array(places, dtype=int)
+                indices.append(int(k))
+        return np.array(indices, dtype=int)
 
     @cached_property
     def defective(self) -> bool:

@@ -104,18 +104,18 @@ def stability(module: Module, at: Any = None, params: Any = None, t: float = 0.0
         if given:
             raise ArgumentError(f"{module.name}: {', '.join(given)} given with an equilibrium, which has its own; leave them out")
         selection = holding(at.selection, hold)
-        return of_manifold(Manifold(in_motion(at.place, selection), selection), period)
+        return of_manifold(Manifold(in_motion(at.point, selection), selection), period)
     speeds = {name_of(k) for k in fixed} & set(module.metadata.u) if isinstance(fixed, Mapping) else set()
     if start is not None and period is None and not speeds:
         rest = equilibrium(module, free, fixed, start, params, t, inputs)
-        return of_manifold(Manifold(in_motion(rest.place, holding(rest.selection, hold)), holding(rest.selection, hold)))
+        return of_manifold(Manifold(in_motion(rest.point, holding(rest.selection, hold)), holding(rest.selection, hold)))
     guess = start is not None or at is None
     if start is not None:
         at = start
     if at is None and isinstance(fixed, Mapping):
         at = _still(module)
-    place, selection = state_of(module, at, params, t, inputs, free, fixed, hold, guess)
-    return of_manifold(Manifold(place, selection), period)
+    point, selection = state_of(module, at, params, t, inputs, free, fixed, hold, guess)
+    return of_manifold(Manifold(point, selection), period)
 
 
 def _still(module: Module) -> dict[str, float]:
@@ -129,50 +129,50 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
 
     rotating   frequencies are those that an observer sees who turns with the rotor
     """
-    place = manifold.place
-    title = f"{place.module.name}: stability"
+    point = manifold.point
+    title = f"{point.module.name}: stability"
     if not manifold.n_d + manifold.n_s + len(manifold.states):
         nothing = np.zeros(0, dtype=complex)
-        return Stability(title, "", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
+        return Stability(title, "", "rest" if not point.u.any() else "motion", None, nothing, None, Modes(title, []),
                          (*held_note(manifold), WORDS[""]), manifold.selection.held, None)
-    demand_no_lock(place, "the stability was")
-    singular = singular_configuration(place, manifold.selection)
+    demand_no_lock(point, "the stability was")
+    singular = singular_configuration(point, manifold.selection)
     if singular:
         nothing = np.zeros(0, dtype=complex)
-        return Stability(title, "not decided", "rest" if not place.u.any() else "motion", None, nothing, None, Modes(title, []),
+        return Stability(title, "not decided", "rest" if not point.u.any() else "motion", None, nothing, None, Modes(title, []),
                          (*held_note(manifold), singular), manifold.selection.held, None)
     steady = steadiness(manifold)
-    if period is not None and fastest(place) * period > 2 * np.pi * MOST_TURNS:
-        raise ArgumentError(f"{place.module.name}: a period of {period:g} s is more than {MOST_TURNS} turns of the fastest "
+    if period is not None and fastest(point) * period > 2 * np.pi * MOST_TURNS:
+        raise ArgumentError(f"{point.module.name}: a period of {period:g} s is more than {MOST_TURNS} turns of the fastest "
                             "speed; pass the period of the motion")
     length = period if period is not None else found_period(manifold)
-    if steady.kind == "rest" and not depends_on_time(place):
+    if steady.kind == "rest" and not depends_on_time(point):
         return _constant(manifold, steady.kind, title)
     if steady.kind and length is None:
         return _constant(manifold, steady.kind, title)
     if length is None:
-        what = "t appears in the equations" if depends_on_time(place) else "no single speed of rotation gives a period"
+        what = "t appears in the equations" if depends_on_time(point) else "no single speed of rotation gives a period"
         guess = ", a guess of it," if autonomous(manifold) else ""
-        raise ArgumentError(f"{place.module.name}: neither rest nor steady motion: {steady.reason}; {what}: pass period=..., in "
+        raise ArgumentError(f"{point.module.name}: neither rest nor steady motion: {steady.reason}; {what}: pass period=..., in "
                             f"seconds{guess} if the motion is periodic; of other motions eigenvalues say nothing")
     if steady.kind:
         course = follow(manifold, length)
         change = constant_change(course)
         seen_by = Observer(course, rotating)
         return _turned(course, change, steady.kind, title, seen_by) if change else _named(course, steady.kind, title, seen_by)
-    open_course = None if accelerating(place, manifold) else follow(manifold, length, closed=False)
-    if open_course is None or any(accelerating(node.place, node) for node in open_course.nodes):
+    open_course = None if accelerating(point, manifold) else follow(manifold, length, closed=False)
+    if open_course is None or any(accelerating(node.point, node) for node in open_course.nodes):
         course, kind = closed_course(manifold, length, monodromy, open_course), "periodic motion"
-        if not any(accelerating(node.place, node) for node in course.nodes):
-            kind = "steady motion" if course.first.place.u.any() else "rest"
+        if not any(accelerating(node.point, node) for node in course.nodes):
+            kind = "steady motion" if course.first.point.u.any() else "rest"
     else:
-        course, kind = follow(manifold, length), "steady motion" if place.u.any() else "rest"
+        course, kind = follow(manifold, length), "steady motion" if point.u.any() else "rest"
     change = constant_change(course)
-    motion = (course.first.place.t + np.append(course.times, course.period),
-              np.array([*[node.place.x for node in course.nodes], course.last.x]))
+    motion = (course.first.point.t + np.append(course.times, course.period),
+              np.array([*[node.point.x for node in course.nodes], course.last.x]))
     seen_by = Observer(course, rotating)
     found = _periodic(course, kind, title, seen_by) if change is None else _turned(course, change, kind, title, seen_by)
-    moved = float(np.abs(course.first.place.x - place.x).max(initial=0.0))
+    moved = float(np.abs(course.first.point.x - point.x).max(initial=0.0))
     guess = f", from a guess of {length:.6g} s for its period" if course.period != length else ""
     said = (found.evidence[0], f"found by Newton's method, {moved:.3g} away from the given state{guess}", *found.evidence[1:])
     return replace(found, motion=motion, evidence=said if moved else found.evidence)
@@ -279,7 +279,7 @@ def _as_seen(observer: Observer, values: np.ndarray, shape: Callable[[int], np.n
 
 
 def _partner(values: np.ndarray, k: int) -> int:
-    """The place of the complex conjugate of a value; k of a real one. Of equal ones the one with the same rank among them."""
+    """The index of the complex conjugate of a value; k of a real one. Of equal ones the one with the same rank among them."""
     value = values[k]
     if abs(value.imag) <= 1e-12 * abs(value) or not value.imag:
         return k
@@ -305,10 +305,10 @@ def found_period(manifold: Manifold) -> float | None:
 
     None where there is none: a motion that nothing holds is not moved onto one of another period.
     """
-    place = manifold.place
-    metadata = place.module.metadata
+    point = manifold.point
+    metadata = point.module.metadata
     labels = coordinate_names(metadata)
-    turning = {name: abs(float(u)) for u, name, label in zip(place.u, metadata.u, labels, strict=True)
+    turning = {name: abs(float(u)) for u, name, label in zip(point.u, metadata.u, labels, strict=True)
                if u and metadata.units.get(label, metadata.units.get(name)) in ("rad", "rad/s")}
     held = [speed for (name, speed), label in ((each, labels[metadata.u.index(each[0])]) for each in turning.items())
             if name in manifold.selection.held or label in manifold.selection.held]
@@ -317,9 +317,9 @@ def found_period(manifold: Manifold) -> float | None:
     bodies = [float(w) for w in spinning(manifold) if w > 0]
     candidates = [common_period([*turning.values()]), common_period(bodies),
                   *[2 * np.pi / speed for speed in sorted({*turning.values(), *bodies})]]
-    if not place.u.any():
+    if not point.u.any():
         return None
-    longest = 2 * np.pi * WHOLE / fastest(place)
+    longest = 2 * np.pi * WHOLE / fastest(point)
     for candidate in dict.fromkeys(c for c in candidates if c is not None and c <= longest):
         try:
             if comes_back(follow(manifold, candidate, closed=False)):

@@ -24,7 +24,7 @@ from symdyn.statics.manifold import (
     natural_length,
     natural_scales,
 )
-from symdyn.statics.terms import Place, rest
+from symdyn.statics.terms import OperatingPoint, rest
 
 # Positions further on: so many radians, or lengths of the mechanism, of the fastest speed; and seconds, where time counts.
 FURTHER = (0.41, 1.3, 2.9, 5.3)
@@ -47,98 +47,98 @@ class Steadiness:
 
 def steadiness(manifold: Manifold) -> Steadiness:
     """Whether the linear equations of a manifold are constant along the motion through its state."""
-    place = manifold.place
-    if place.motion_rates:
-        name, value = next(iter(place.motion_rates.items()))
+    point = manifold.point
+    if point.motion_rates:
+        name, value = next(iter(point.motion_rates.items()))
         return Steadiness("", f"the input {name} is {value:.4g}: how the motion goes on is not known from one instant; "
                               "write it as an expression in t, or take a coordinate with a prescribed speed in its place")
-    moving = accelerating(place, manifold)
+    moving = accelerating(point, manifold)
     if moving:
         return Steadiness("", moving)
-    kind = "steady motion" if place.u.any() else "rest"
-    clock = fastest(place)
+    kind = "steady motion" if point.u.any() else "rest"
+    clock = fastest(point)
     try:
-        places = further_on(place, manifold)
-        for later in places:
+        points = further_on(point, manifold)
+        for later in points:
             changed = accelerating(later, manifold)
             if changed:
                 return Steadiness("", f"further on, at t = {later.t:.4g} s, {changed}: the forces change along the motion")
-        partition = common_partition(manifold, places)
+        partition = common_partition(manifold, points)
         if partition is None:
             return Steadiness("", "no choice of independent coordinates serves along the motion, along which the linear "
                                   "equations change")
-        here = Manifold(place, manifold.selection, partition=partition)
-        for later in places:
+        here = Manifold(point, manifold.selection, partition=partition)
+        for later in points:
             other = Manifold(later, manifold.selection, partition=partition)
             difference = _difference(here, other, clock)
             if difference:
                 return Steadiness("", f"the linear equations change along the motion: {difference} at t = {later.t:.4g} s")
     except (EvaluationError, ArgumentError) as error:
-        owner = f"{place.module.name}: "
+        owner = f"{point.module.name}: "
         return Steadiness("", f"the motion cannot be followed: {str(error).removeprefix(owner)}")
     return Steadiness(kind)
 
 
-def accelerating(place: Place, manifold: Manifold) -> str:
+def accelerating(point: OperatingPoint, manifold: Manifold) -> str:
     """The largest acceleration, or rate of an extra state, that is more than rounding of what single loads make; "" if
     none."""
-    metadata = place.module.metadata
+    metadata = point.module.metadata
     names = [*metadata.parameters, *metadata.inputs]
-    values = np.concatenate([place.p, place.inputs])
-    by = np.abs(place.by(names)) @ np.abs(values)
-    acting = by[place.parts["forces"]]
-    if place.sizes[3]:
-        acting = acting + np.abs(place.evaluate("C_r").T) @ np.abs(place.lam)
+    values = np.concatenate([point.p, point.inputs])
+    by = np.abs(point.by(names)) @ np.abs(values)
+    acting = by[point.parts["forces"]]
+    if point.sizes[3]:
+        acting = acting + np.abs(point.evaluate("C_r").T) @ np.abs(point.lam)
     # Where single loads vanish, too, rounding of what a radian, or the natural length, would bring about.
-    lengths = natural_scales(place) * natural_length(place)
-    acting = acting + ROUNDING / STILL * (np.abs(place.by_v[place.parts["forces"]]) @ lengths)
-    level = acceleration_size(place, acting)
-    sizes = np.abs(place.ud / natural_scales(place))
+    lengths = natural_scales(point) * natural_length(point)
+    acting = acting + ROUNDING / STILL * (np.abs(point.by_v[point.parts["forces"]]) @ lengths)
+    level = acceleration_size(point, acting)
+    sizes = np.abs(point.ud / natural_scales(point))
     if sizes.max(initial=0.0) > STILL * level:
         k = int(np.argmax(sizes))
-        return f"{metadata.u[k]} changes by {place.ud[k]:.4g} a second"
-    rates = np.abs(place.rates_z)
-    of_z = np.abs(place.by_z[place.parts["z_dot"]])
-    allowed = STILL * (by[place.parts["z_dot"]] + of_z @ np.abs(place.z)) + ROUNDING * of_z.sum(axis=1)
+        return f"{metadata.u[k]} changes by {point.ud[k]:.4g} a second"
+    rates = np.abs(point.rates_z)
+    of_z = np.abs(point.by_z[point.parts["z_dot"]])
+    allowed = STILL * (by[point.parts["z_dot"]] + of_z @ np.abs(point.z)) + ROUNDING * of_z.sum(axis=1)
     for k in manifold.states:
         if rates[k] > allowed[k]:
-            return f"{metadata.z[k]} changes by {place.rates_z[k]:.4g} a second"
+            return f"{metadata.z[k]} changes by {point.rates_z[k]:.4g} a second"
     return ""
 
 
-def further_on(place: Place, manifold: Manifold) -> list[Place]:
+def further_on(point: OperatingPoint, manifold: Manifold) -> list[OperatingPoint]:
     """The motion with constant speeds and extra states at a few later times, with the accelerations that belong there."""
-    timed = depends_on_time(place)
-    if not place.u.any() and not timed:
+    timed = depends_on_time(point)
+    if not point.u.any() and not timed:
         return []
-    rate = fastest(place)
+    rate = fastest(point)
     times = np.array(FURTHER) / rate if rate else np.array(LATER)
     if rate and timed:
         times = np.unique(np.concatenate([times, LATER]))
-    n_q = place.sizes[0]
+    n_q = point.sizes[0]
 
     def rates(t: float, q: np.ndarray) -> np.ndarray:
-        x = np.concatenate([q, place.x[n_q:]])
-        here = rest(place.module, place.t + t, x, place.p, place.inputs)
+        x = np.concatenate([q, point.x[n_q:]])
+        here = rest(point.module, point.t + t, x, point.p, point.inputs)
         return np.asarray(here.balance[here.parts["q_dot"]])
 
-    found = scipy.integrate.solve_ivp(rates, (0.0, float(times[-1])), place.q, "DOP853", times, rtol=PRECISE, atol=PRECISE)
-    places = []
+    found = scipy.integrate.solve_ivp(rates, (0.0, float(times[-1])), point.q, "DOP853", times, rtol=PRECISE, atol=PRECISE)
+    points = []
     for t, q in zip(found.t, found.y.T, strict=True):
-        x = np.concatenate([q, place.x[n_q:]])
-        places.append(in_motion(rest(place.module, place.t + float(t), x, place.p, place.inputs), manifold.selection))
-    return places
+        x = np.concatenate([q, point.x[n_q:]])
+        points.append(in_motion(rest(point.module, point.t + float(t), x, point.p, point.inputs), manifold.selection))
+    return points
 
 
-def fastest(place: Place) -> float:
+def fastest(point: OperatingPoint) -> float:
     """The largest speed, lengths by the natural length, 1/s."""
-    speeds = np.abs(place.u) / np.where(turning(place.module), 1.0, natural_length(place))
+    speeds = np.abs(point.u) / np.where(turning(point.module), 1.0, natural_length(point))
     return float(speeds.max(initial=0.0))
 
 
-def depends_on_time(place: Place) -> bool:
+def depends_on_time(point: OperatingPoint) -> bool:
     """Whether t is an argument of the equations."""
-    return "t" in place.module.unit("balance").metadata.arguments.get("balance", ())
+    return "t" in point.module.unit("balance").metadata.arguments.get("balance", ())
 
 
 def _difference(a: Manifold, b: Manifold, slowest: float) -> str:

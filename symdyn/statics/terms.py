@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class OperatingPoint:
     """A module at a state x = [q; u; z] with accelerations and multipliers; p and inputs in the module's order."""
 
     module: Module
@@ -40,13 +40,13 @@ class Place:
         for name in ("x", "p", "inputs", "ud", "lam"):  # results are evaluated from them when they are asked for
             object.__setattr__(self, name, fixed(getattr(self, name)))
 
-    def at(self, **changes: Any) -> Place:
+    def at(self, **changes: Any) -> OperatingPoint:
         """The same with some of these replaced."""
         return replace(self, **changes)
 
     @property
     def bound(self) -> Module:
-        """The module with the motions of this place wherever inputs are left out."""
+        """The module with the motions of this point wherever inputs are left out."""
         return self.module.following(self.inputs)
 
     @property
@@ -213,8 +213,8 @@ class Place:
         """The coordinates after the velocities v (n_u,) for a unit of time, unit vectors of length 1."""
         q = self.q + self.N @ v
         for group in self.module.metadata.unit_groups:
-            places = [self.module.metadata.q.index(name) for name in group]
-            q[places] /= np.linalg.norm(q[places])
+            indices = [self.module.metadata.q.index(name) for name in group]
+            q[indices] /= np.linalg.norm(q[indices])
         return q
 
 
@@ -223,9 +223,9 @@ def multiplier(k: int) -> str:
     return f"(lambda {k + 1})"
 
 
-def rest(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> Place:
-    """A place without accelerations and multipliers."""
-    return Place(module, t, x, p, inputs, np.zeros(module.metadata.sizes.u), np.zeros(len(constraint_names(module))))
+def rest(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: np.ndarray) -> OperatingPoint:
+    """An operating point without accelerations and multipliers."""
+    return OperatingPoint(module, t, x, p, inputs, np.zeros(module.metadata.sizes.u), np.zeros(len(constraint_names(module))))
 
 
 def null_space(A: np.ndarray, tolerance: float = RANK) -> np.ndarray:

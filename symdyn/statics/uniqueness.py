@@ -15,7 +15,7 @@ from symdyn.statics.noise import ENTRIES, EPSILON, SAFETY, SAMPLES, rounded
 from symdyn.statics.search import Search, Trial
 from symdyn.statics.sensitivity import second
 from symdyn.statics.spectrum import ZERO
-from symdyn.statics.terms import Place, coordinate_names, multiplier, null_space
+from symdyn.statics.terms import OperatingPoint, coordinate_names, multiplier, null_space
 from symdyn.tape.kernels import RANK
 
 # Where parameters or inputs are solved for, less than this part of the largest stiffness, scaled, counts as none.
@@ -26,10 +26,10 @@ _STIFFNESSES = {"rad/s": "N m", "m/s": "N/m"}
 def demand_stiffness(search: Search) -> None:
     """Raises EquilibriumNotUnique for a direction along which there is no stiffness, or none that the digits prove."""
     trial, module = search.best, search.module
-    place, columns = trial.place, search.columns
-    _, n_u, _, n_c = place.sizes
+    point, columns = trial.point, search.columns
+    _, n_u, _, n_c = point.sizes
     states = trial.selection.states
-    inner = place.by_z[n_u + n_c:][states][:, states]
+    inner = point.by_z[n_u + n_c:][states][:, states]
     drifting = bool(states) and np.linalg.matrix_rank(inner) < len(states)
     lost: list[str] = []
     if trial.selection.conditions or drifting:  # all unknowns take part, as many as equations, seen by the scaled derivative
@@ -42,11 +42,11 @@ def demand_stiffness(search: Search) -> None:
             loose = Wt[sizes > 1e-6]
         lost = [_lost_in_trim(search, direction) for direction in loose]
     else:
-        Z = null_space(np.vstack([place.C_r, trial.selection.rows(place)]) * columns)
-        K, error = _stiffness(place, columns, states)
+        Z = null_space(np.vstack([point.C_r, trial.selection.rows(point)]) * columns)
+        K, error = _stiffness(point, columns, states)
         left, loose = (each @ Z.T for each in _without_stiffness(Z.T @ K @ Z, np.abs(Z.T) @ error @ np.abs(Z)))
         labels = list(coordinate_names(module.metadata))
-        lost = [_lost(place, states, columns * u, columns * v, labels.index(_first(v, labels)),
+        lost = [_lost(point, states, columns * u, columns * v, labels.index(_first(v, labels)),
                       float(np.abs(u) @ error @ np.abs(v)), float(np.abs(u) @ np.abs(K) @ np.abs(v)))
                 for u, v in zip(left, loose, strict=True)]
     if not len(loose):
@@ -64,9 +64,9 @@ def demand_stiffness(search: Search) -> None:
                                + " and along ".join(_described(direction, labels) for direction in loose) + remedy)
 
 
-def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def _stiffness(point: OperatingPoint, columns: np.ndarray, states: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """K of all speeds, (n_u, n_u), scaled, with what extra states do at rest, and how much of its entries rounding may be."""
-    def at(here: Place) -> np.ndarray:
+    def at(here: OperatingPoint) -> np.ndarray:
         forces, rates = here.parts["forces"], here.parts["z_dot"]
         K = here.by_v[forces]
         if states:
@@ -74,8 +74,8 @@ def _stiffness(place: Place, columns: np.ndarray, states: list[int]) -> tuple[np
             K = K - here.by_z[forces][:, states] @ np.linalg.solve(inner, here.by_v[rates][states])
         return np.asarray(K * np.outer(columns, columns))
 
-    K, stream = at(place), np.random.default_rng(11)
-    change = np.max([np.abs(at(rounded(place, stream)) - K) for _ in range(SAMPLES)], axis=0)
+    K, stream = at(point), np.random.default_rng(11)
+    change = np.max([np.abs(at(rounded(point, stream)) - K) for _ in range(SAMPLES)], axis=0)
     return K, SAFETY * change + ENTRIES * EPSILON * np.abs(K)
 
 
@@ -93,16 +93,16 @@ def _without_stiffness(K: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np
     return left, right
 
 
-def _lost(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, leader: int, error: float, terms: float) -> str:
+def _lost(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray, leader: int, error: float, terms: float) -> str:
     """What loads contribute to a stiffness u^T K v that is zero within `error`, in words; "" where they contribute nothing.
 
     u, v    (n_u,) left and right direction; leader: the coordinate by whose displacement sizes are given
     terms   size of the terms of the stiffness
     """
-    found = [each for each in (_contribution(place, states, u, v, k) for k in range(len(place.p) + len(place.inputs))) if each]
+    found = [each for each in (_contribution(point, states, u, v, k) for k in range(len(point.p) + len(point.inputs))) if each]
     if not found:
         return ""
-    unit = _STIFFNESSES.get(place.module.metadata.units.get(place.module.metadata.u[leader], ""), "(N, m)")
+    unit = _STIFFNESSES.get(point.module.metadata.units.get(point.module.metadata.u[leader], ""), "(N, m)")
     by = abs(u[leader] * v[leader]) or float(np.abs(u).max() * np.abs(v).max())
     most, together = max(abs(each) for each in found) / by, abs(sum(found)) / by
     return (f"loads make a stiffness of {together:.3g} {unit} in sums of terms of {max(terms / by, most):.3g} {unit}, known to "
@@ -111,36 +111,36 @@ def _lost(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, leader:
 
 def _lost_in_trim(search: Search, direction: np.ndarray) -> str:
     """The same for a direction among scaled unknowns, (n,), by the stiffness along its displacements."""
-    trial, place, columns = search.best, search.best.place, search.columns
+    trial, point, columns = search.best, search.best.point, search.columns
     n = trial.directions.shape[1]
     v = trial.directions @ (search.widths(trial)[:n] * direction[:n])
     if not v.any():
         return ""
-    terms = np.abs(place.by_v[:len(v)] * np.outer(columns, columns)).max(initial=0.0) * float(np.sum((v / columns)**2))
-    return _lost(place, [], v, v, int(np.argmax(np.abs(v / columns))), LEAST * terms, terms)
+    terms = np.abs(point.by_v[:len(v)] * np.outer(columns, columns)).max(initial=0.0) * float(np.sum((v / columns)**2))
+    return _lost(point, [], v, v, int(np.argmax(np.abs(v / columns))), LEAST * terms, terms)
 
 
-def _contribution(place: Place, states: list[int], u: np.ndarray, v: np.ndarray, k: int) -> float:
+def _contribution(point: OperatingPoint, states: list[int], u: np.ndarray, v: np.ndarray, k: int) -> float:
     """What the load of parameter (or input) k contributes to u^T K v, with its part in the multipliers; 0 within rounding."""
-    metadata = place.module.metadata
+    metadata = point.module.metadata
     name = (*metadata.parameters, *metadata.inputs)[k]
-    value = float(np.concatenate([place.p, place.inputs])[k])
-    _, n_u, n_z, n_c = place.sizes
+    value = float(np.concatenate([point.p, point.inputs])[k])
+    _, n_u, n_z, n_c = point.sizes
     if not value:
         return 0.0
     changes = {name: 1.0}
     if n_c:
-        by = place.by([name])[:n_u, 0]
-        lam = np.linalg.lstsq(place.C_r.T, -by, rcond=RANK)[0] * place.scale
+        by = point.by([name])[:n_u, 0]
+        lam = np.linalg.lstsq(point.C_r.T, -by, rcond=RANK)[0] * point.scale
         changes |= {multiplier(j): float(each) for j, each in enumerate(lam) if each}
-    forces, rates = place.parts["forces"], place.parts["z_dot"]
+    forces, rates = point.parts["forces"], point.parts["z_dot"]
     z_of_v, u_z = np.zeros((n_z, n_u)), np.zeros(n_z)
     if states:
-        inner = place.by_z[rates][states][:, states]
-        z_of_v[states] = -np.linalg.solve(inner, place.by_v[rates][states])
-        u_z[states] = -np.linalg.solve(inner.T, place.by_z[forces][:, states].T @ u)
+        inner = point.by_z[rates][states][:, states]
+        z_of_v[states] = -np.linalg.solve(inner, point.by_v[rates][states])
+        u_z[states] = -np.linalg.solve(inner.T, point.by_z[forces][:, states].T @ u)
     none = np.zeros(n_u)
-    columns = [second(place, changes, unit, none, none, z_of_v @ unit, np.zeros(n_c)) for unit in np.eye(n_u)]
+    columns = [second(point, changes, unit, none, none, z_of_v @ unit, np.zeros(n_c)) for unit in np.eye(n_u)]
     change = np.array(columns).T  # of the statics by v, by the parameter
     weights = np.concatenate([u, np.zeros(n_c), u_z])
     found = float(weights @ change @ v)
@@ -148,7 +148,7 @@ def _contribution(place: Place, states: list[int], u: np.ndarray, v: np.ndarray,
 
 
 def _direction_names(trial: Trial) -> list[str]:
-    labels = coordinate_names(trial.place.module.metadata)
+    labels = coordinate_names(trial.point.module.metadata)
     return [labels[int(np.argmax(np.abs(column)))] for column in trial.directions.T]
 
 
