@@ -9,17 +9,17 @@ from pathlib import Path
 def users_line(path: Path, cause: BaseException | None) -> str:
     """What to add to the message: a line with the file, the number of the line and what is there; empty where the text is not of
     this file."""
-    from symdyn.runtime.raised import place_of
+    from symdyn.runtime.raised import location_of
 
-    place = place_of(cause) if cause is not None else None
-    if place is None or not path.is_file():
+    location = location_of(cause) if cause is not None else None
+    if location is None or not path.is_file():
         return ""
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.FunctionDef) and node.name == place.name:
+        if isinstance(node, ast.FunctionDef) and node.name == location.name:
             first = min([node.lineno, *[decorator.lineno for decorator in node.decorator_list]])
-            number = first + place.line - 1
-            if number <= len(lines) and lines[number - 1].strip() == place.text:
-                return f"\n  {path}, line {number}: {place.text}"
+            number = first + location.line - 1
+            if number <= len(lines) and lines[number - 1].strip() == location.text:
+                return f"\n  {path}, line {number}: {location.text}"
     return ""

@@ -23,7 +23,7 @@ _NAMED = 0.3
 
 
 @dataclass(frozen=True)
-class Place:
+class Passage:
     """A time of the motion, s, what is there, and whether it is near a singularity."""
 
     t: float
@@ -44,13 +44,13 @@ class Along:
     solution: Solution
     t: np.ndarray
     curves: dict[str, np.ndarray]
-    places: tuple[Place, ...]
+    passages: tuple[Passage, ...]
     warnings: tuple[str, ...]
 
     @property
     def near(self) -> bool:
         """Whether some place is near a singularity."""
-        return any(place.near for place in self.places)
+        return any(passage.near for passage in self.passages)
 
 
 def along(tested: SystemUnderTest) -> Along:
@@ -61,8 +61,8 @@ def along(tested: SystemUnderTest) -> Along:
         return Along(sol, sol.t, {}, (), warnings)
     t, x = _closer(tested, sol.t, sol.x)
     curves = _curves(tested, t, x)
-    places = [*(_peaks(tested, t, x, list(curves.values())[-1]) if curves else ()), *_locks(tested, t, x)]
-    return Along(sol, t, curves, tuple(sorted(places, key=lambda p: p.t)), warnings)
+    passages = [*(_peaks(tested, t, x, list(curves.values())[-1]) if curves else ()), *_locks(tested, t, x)]
+    return Along(sol, t, curves, tuple(sorted(passages, key=lambda p: p.t)), warnings)
 
 
 def _curves(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
@@ -91,8 +91,8 @@ def _closer(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> tuple[np.n
         if sol.success:
             times.append(sol.t[1:-1])
             states.append(sol.x[1:-1])
-    every, places = np.unique(np.concatenate(times), return_index=True)
-    return every, np.concatenate(states)[places]
+    every, passages = np.unique(np.concatenate(times), return_index=True)
+    return every, np.concatenate(states)[passages]
 
 
 def _highest(values: np.ndarray, least: float) -> list[int]:
@@ -103,10 +103,10 @@ def _highest(values: np.ndarray, least: float) -> list[int]:
     return list(dict.fromkeys([int(high.argmax()), *sorted(peaks, key=lambda k: -high[k])]))[:PEAKS]
 
 
-def _peaks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, values: np.ndarray) -> list[Place]:
+def _peaks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray, values: np.ndarray) -> list[Passage]:
     """The worst place, and the highest of the other peaks that are near a singularity."""
     high = np.where(np.isnan(values), np.inf, values)
-    return [Place(float(t[k]), _sentence(tested, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
+    return [Passage(float(t[k]), _sentence(tested, t[k], x[k], float(high[k]), first=i == 0), bool(high[k] >= NEAR))
             for i, k in enumerate(_highest(values, NEAR))]
 
 
@@ -138,15 +138,15 @@ def _weakest(tested: SystemUnderTest, t: float, x: np.ndarray) -> list[str]:
     return [names[k] for k in np.argsort(-direction) if direction[k] > _NAMED * direction.max()][:4]
 
 
-def _locks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> list[Place]:
+def _locks(tested: SystemUnderTest, t: np.ndarray, x: np.ndarray) -> list[Passage]:
     """For the Euler angles of every joint where they come nearest to gimbal lock, and where else they come near."""
     found = []
     for (joint, sequence, *_), d in zip(tested.module.metadata.charts, distances(tested.module, x).T, strict=True):
         for k in _highest(-d, -NEAR_LOCK):
             near = bool(d[k] < NEAR_LOCK)
             advice = f": {INSTEAD}" if near else ""
-            found.append(Place(float(t[k]), f"the {sequence} angles of joint {joint} come within "
-                               f"{math.asin(min(1.0, d[k])):.2g} rad of gimbal lock{advice}", near))
+            found.append(Passage(float(t[k]), f"the {sequence} angles of joint {joint} come within "
+                                 f"{math.asin(min(1.0, d[k])):.2g} rad of gimbal lock{advice}", near))
     return found
 
 
@@ -191,10 +191,10 @@ def picture(found: Along) -> str:
 def _labels(found: Along) -> list[tuple[float, str, bool]]:
     """Times with the numbers of the places there, those that lie close together as one."""
     labels: list[tuple[float, str, bool]] = []
-    for k, place in enumerate(found.places, 1):
-        if labels and place.t - labels[-1][0] <= 0.02 * (found.t[-1] - found.t[0]):
+    for k, passage in enumerate(found.passages, 1):
+        if labels and passage.t - labels[-1][0] <= 0.02 * (found.t[-1] - found.t[0]):
             t, label, near = labels[-1]
-            labels[-1] = t, f"{label}, {k}", near or place.near
+            labels[-1] = t, f"{label}, {k}", near or passage.near
         else:
-            labels.append((place.t, str(k), place.near))
+            labels.append((passage.t, str(k), passage.near))
     return labels

@@ -46,7 +46,7 @@ def called(function: Callable[..., Any], t: float, x: np.ndarray, what: str, of_
         raise InputRaised(message, t, np.array(x)) from error
 
 
-class Place(NamedTuple):
+class Location(NamedTuple):
     """Where the text of a function raised: how it is called, its name, its line, from 1, and what stands there."""
 
     signature: str
@@ -55,22 +55,22 @@ class Place(NamedTuple):
     text: str
 
 
-def place_of(error: BaseException) -> Place | None:
+def location_of(error: BaseException) -> Location | None:
     """Of what the text of a user's function raised in a generated module; None: of anything else."""
     frames = _frames(error)
     for (frame, _), (inner, line) in itertools.pairwise(frames):
         file, code = frame.f_code.co_filename, inner.f_code
         if frame.f_code.co_name == _CALLS and code.co_filename == file:
-            return Place(frame.f_locals["signature"], code.co_name, line - code.co_firstlineno + 1,
-                         linecache.getline(file, line).strip())
+            return Location(frame.f_locals["signature"], code.co_name, line - code.co_firstlineno + 1,
+                            linecache.getline(file, line).strip())
     return None
 
 
 def raise_by_text(error: BaseException) -> None:
     """Raises EvaluationError from what the text of a user's function raised in a generated module; passes over anything else."""
-    place = place_of(error)
-    if place is not None:
-        message = f"the function {place.signature} raised {_said(error)}, in its line {place.line}: {place.text}"
+    location = location_of(error)
+    if location is not None:
+        message = f"the function {location.signature} raised {_said(error)}, in its line {location.line}: {location.text}"
         raise EvaluationError(message) from error
 
 

@@ -139,7 +139,7 @@ def _entries(F: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray
 
 
 def rounded(point: OperatingPoint, stream: np.random.Generator) -> OperatingPoint:
-    """The operating point with data that differ in their last digit; coordinates that are not exactly zero also by rounding of 1 rad, or of
+    """The point with data that differ in their last digit; coordinates that are not exactly zero also by rounding of 1 rad, or of
     the natural length: a search ends there, and leaves 1e-18 where zero is meant."""
     def near(values: np.ndarray) -> np.ndarray:
         return np.asarray(values * (1 + DATA * EPSILON * stream.uniform(-1, 1, len(values))))

@@ -599,7 +599,7 @@ ORIENTATIONS: dict[str, tuple[dict[str, Any], bool, str]] = {
                  "orientation EulerParameters is given, but coordinates are 'relative'"),
     "planar": ({"orientation": sd.EulerAngles("XYZ"), "coordinates": "absolute"}, True, "but the system is planar.*leave it out"),
     "text": ({"orientation": "XYZ", "coordinates": "absolute"}, False,
-             "orientation is 'XYZ'; it tells how bodies turn.*sd.EulerAngles"),
+             "orientation is 'XYZ'; it describes how bodies turn.*sd.EulerAngles"),
 }
 
 

@@ -90,7 +90,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of text alone."""
     monkeypatch.setattr(full, "stress", lambda tested, short: StressReport())
     monkeypatch.setattr(full, "_show_condition", lambda part, tested: part.shown.update(
-        found=SimpleNamespace(warnings=(), places=(), near=False),
+        found=SimpleNamespace(warnings=(), passages=(), near=False),
         curves=[], states=0, end="0", facts=[], picture="", mechanism=[]))
     monkeypatch.setattr(full_work, "measure", lambda *arguments: None)
     monkeypatch.setattr(full_work, "shown", lambda benchmark: {"parts": [], "text": "a table", "note": ""})
@@ -163,9 +163,9 @@ def test_the_condition_is_that_of_the_mass_matrix() -> None:
     assert np.array_equal(found.t[at], sol.t) and len(found.t) > len(sol.t)
     assert np.allclose(found.curves["mass matrix, scaled"][at], (1 + r) / (1 - r), rtol=1e-10)
     assert np.allclose(found.curves["mass matrix, in its units"][at], np.linalg.cond(matrices), rtol=1e-10)
-    assert len(found.places) == 1 and not found.near
-    assert f"largest condition {found.curves['mass matrix, scaled'].max():.3g}" in found.places[0].text
-    assert "q1_ddot" in found.places[0].text and "q2_ddot" in found.places[0].text
+    assert len(found.passages) == 1 and not found.near
+    assert f"largest condition {found.curves['mass matrix, scaled'].max():.3g}" in found.passages[0].text
+    assert "q1_ddot" in found.passages[0].text and "q2_ddot" in found.passages[0].text
 
 
 def test_gimbal_lock_is_named(tmp_path: Path) -> None:
@@ -175,14 +175,14 @@ def test_gimbal_lock_is_named(tmp_path: Path) -> None:
 
     tested = SystemUnderTest(from_file(path, {}).embedding())
     found = full_condition.along(tested)
-    locks = [place for place in found.places if "gimbal lock" in place.text]
+    locks = [place for place in found.passages if "gimbal lock" in place.text]
     assert len(locks) == 1 and locks[0].near and found.near and "the ZYX angles of joint ball" in locks[0].text
     dense = tested.run(np.linspace(locks[0].t - 2e-4, locks[0].t + 2e-4, 401), tested.run((0.0, locks[0].t - 2e-4)).x[-1])
     least = float(np.arcsin(distances(tested.module, dense.x).min()))
     assert f"within {least:.2g} rad" in locks[0].text
     # The rates' mass matrix loses rank there as 1/distance^2: I_xx and the moment about the vertical share their direction.
     worst = found.curves["mass matrix, scaled"].max()
-    assert 0.5 < worst * least**2 < 3 and "psi_ddot, phi_ddot" in "".join(p.text for p in found.places)
+    assert 0.5 < worst * least**2 < 3 and "psi_ddot, phi_ddot" in "".join(p.text for p in found.passages)
 
 
 def test_constraints_count(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,10 +190,10 @@ def test_constraints_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(full_condition, "NEAR", 20.0)
     found = full_condition.along(SystemUnderTest(sd.systems.get("four_bar").augmented()))
     assert list(found.curves)[-1] == "mass matrix with constraints, scaled" and found.near
-    assert 1 < len(found.places) <= full_condition.PEAKS and "multiplier of hinge4" in "".join(p.text for p in found.places)
-    assert [p.t for p in found.places] == sorted(p.t for p in found.places)
+    assert 1 < len(found.passages) <= full_condition.PEAKS and "multiplier of hinge4" in "".join(p.text for p in found.passages)
+    assert [p.t for p in found.passages] == sorted(p.t for p in found.passages)
     labels = full_condition._labels(found)
-    assert ", ".join(label for _, label, _ in labels) == ", ".join(str(k + 1) for k in range(len(found.places)))
+    assert ", ".join(label for _, label, _ in labels) == ", ".join(str(k + 1) for k in range(len(found.passages)))
 
 
 # -- long equations

@@ -47,9 +47,9 @@ class NullSpaceSolver:
             self._factorize(names)
             columns = [self._solve(-C[self.rows, k]) for k in self.i]
             self.Z = zeros(C.shape[1], len(self.i))
-            for place, k in enumerate(self.i):
-                self.Z[k, place] = 1
-                self.Z[self.d, place] = algebra.name(f"Z_{k + 1}", columns[place])
+            for index, k in enumerate(self.i):
+                self.Z[k, index] = 1
+                self.Z[self.d, index] = algebra.name(f"Z_{k + 1}", columns[index])
         with algebra.section("mass matrix of the independent speeds"):
             self.MZ = M @ self.Z if self.i else zeros(len(M), 0)
             reduced = congruence(M, self.Z)
@@ -66,8 +66,8 @@ class NullSpaceSolver:
             dependent = any(k in self.d for k in (first, *others))
             for k in (first,) if first in self.i else others:
                 if k in self.i:
-                    place = self.i.index(k)
-                    sizes[place] = reduced[place, place] + (self.M[k, k] if dependent else 0)
+                    index = self.i.index(k)
+                    sizes[index] = reduced[index, index] + (self.M[k, k] if dependent else 0)
         return sizes
 
     def solve(self, f: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +101,7 @@ class NullSpaceSolver:
             k, after = list(b), list(range(b.stop, n))
             rows = [self.rows[p] for p in b]
             scaled = [self.C[row] * self.columns for row in rows]
-            sizes = [inner(row, row) + self.least[place] for row, place in zip(scaled, rows, strict=True)]
+            sizes = [inner(row, row) + self.least[index] for row, index in zip(scaled, rows, strict=True)]
             label = " and ".join(names[self.rows[p]] for p in b)
             self.inverse.append(self._inverse(A[np.ix_(k, k)], sizes, label, b.start))
             if after:
@@ -109,7 +109,7 @@ class NullSpaceSolver:
                 A[np.ix_(after, after)] = A[np.ix_(after, after)] - A[np.ix_(after, k)] @ A[np.ix_(k, after)]
         self.LU = A
 
-    def _inverse(self, A: np.ndarray, sizes: Sequence[Any], label: str, place: int) -> np.ndarray:
+    def _inverse(self, A: np.ndarray, sizes: Sequence[Any], label: str, index: int) -> np.ndarray:
         """Of one entry or of 2 x 2, by one division; sizes: squares of the rows that they come from, scaled."""
         a = self.algebra
         determinant = A[0, 0] if len(A) == 1 else A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
@@ -118,11 +118,11 @@ class NullSpaceSolver:
             for size in sizes:
                 least = least * size
             scaled = determinant
-            for column in self.d[place:place + len(A)]:
+            for column in self.d[index:index + len(A)]:
                 scaled = scaled * self.columns[column]
             reason = f"the dependent speeds do not follow from {label} here"
             determinant = a.recorder.guard(determinant, scaled * scaled - least, reason)
-        over = a.name(f"iC{place + 1}", a.recorder.div(1, determinant))
+        over = a.name(f"iC{index + 1}", a.recorder.div(1, determinant))
         if len(A) == 1:
             return np.array([[over]], dtype=object)
         return np.array([[A[1, 1] * over, -A[0, 1] * over], [-A[1, 0] * over, A[0, 0] * over]], dtype=object)

@@ -29,7 +29,7 @@ _PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 def entries(inertia: Inertia) -> list[Any]:
     """The ten parameters of an inertia."""
-    return [inertia.m, *inertia.h, *[inertia.I[place] for place in _PLACES]]
+    return [inertia.m, *inertia.h, *[inertia.I[index] for index in _PLACES]]
 
 
 def unit_inertias() -> list[Inertia]:
@@ -55,32 +55,32 @@ def inertial_parameters(tree: Tree) -> np.ndarray:
     return vector(*values)
 
 
-def regressor(tree: Tree, w_dot: Vector, a_0: np.ndarray, places: Sequence[Pose] | None = None) -> np.ndarray:
+def regressor(tree: Tree, w_dot: Vector, a_0: np.ndarray, poses: Sequence[Pose] | None = None) -> np.ndarray:
     """Y (n_w, 10 n): joint forces that one of each parameter takes, at joint accelerations w_dot (n_w,).
 
     a_0      acceleration of the base, n-frame, (3,); -gravity makes the weight part of it
-    places   frames that the parameters are about, n of them; default: those of the bodies
+    poses    frames that the parameters are about, n of them; default: those of the bodies
     """
     motions = outward(tree, w_dot, a_0)
     units = unit_inertias()
-    places = tree.poses if places is None else places
-    Y = zeros(len(tree.w), len(units) * len(places))
-    for k, place in enumerate(places):
-        if place.link == GROUND:
+    poses = tree.poses if poses is None else poses
+    Y = zeros(len(tree.w), len(units) * len(poses))
+    for k, pose in enumerate(poses):
+        if pose.link == GROUND:
             continue
-        with tree.algebra.section(f"link {tree.links[place.link].name}: forces at the joints, a column for each parameter"):
-            motion = _seen_from(place, motions[place.link])
+        with tree.algebra.section(f"link {tree.links[pose.link].name}: forces at the joints, a column for each parameter"):
+            motion = _seen_from(pose, motions[pose.link])
             for column, unit in enumerate(units):
                 f, n = inertial_wrench(unit, motion)
-                carry(tree, Y[:, len(units) * k + column], place, f, n)
+                carry(tree, Y[:, len(units) * k + column], pose, f, n)
     return Y
 
 
-def carry(tree: Tree, tau: np.ndarray, place: Pose, f: np.ndarray, n: np.ndarray) -> None:
+def carry(tree: Tree, tau: np.ndarray, pose: Pose, f: np.ndarray, n: np.ndarray) -> None:
     """Add to the joint forces tau (n_w,) what balances a wrench: f, n about the origin of a frame on a link, in its axes."""
-    f = place.R @ f
-    n = place.R @ n + cross(place.p, f)
-    for k in tree.path(place.link):
+    f = pose.R @ f
+    n = pose.R @ n + cross(pose.p, f)
+    for k in tree.path(pose.link):
         if all(is_zero(e) for e in (*f, *n)):
             return
         link = tree.links[k]
@@ -97,9 +97,9 @@ def project(tree: Tree, Y: np.ndarray) -> np.ndarray:
     return tree.D.T @ Y if len(tree.w) else zeros(tree.D.shape[1], Y.shape[1])
 
 
-def _seen_from(place: Pose, motion: LinkMotion) -> LinkMotion:
+def _seen_from(pose: Pose, motion: LinkMotion) -> LinkMotion:
     """The motion of a frame on a link from that of the link, in the frame's own axes."""
-    E = place.R.T
+    E = pose.R.T
     omega, alpha = E @ motion.omega, E @ motion.alpha
     U, P = rates_matrix(omega, alpha)
-    return LinkMotion(omega, alpha, E @ motion.at(place.p), U, P)
+    return LinkMotion(omega, alpha, E @ motion.at(pose.p), U, P)

@@ -110,34 +110,34 @@ class _Elimination:
         n = self.rows.shape[1] - 1
         open_, order = set(range(n)), []
         while open_:
-            best = min(((len(places), *self.costs[row], row) for row in range(len(self.rows))
-                        if (places := self._places(row, open_))), default=None)
+            best = min(((len(columns), *self.costs[row], row) for row in range(len(self.rows))
+                        if (columns := self._columns(row, open_))), default=None)
             if best is None:
                 return None
             row = best[-1]
-            place = min(self._places(row, open_), key=lambda k: (isinstance(self.rows[row, k], Node), k))
+            column = min(self._columns(row, open_), key=lambda k: (isinstance(self.rows[row, k], Node), k))
             pivot, at_pivot = self.rows[row].copy(), self.numbers[row].copy()
-            order.append((place, pivot))
-            open_.remove(place)
+            order.append((column, pivot))
+            open_.remove(column)
             for other in range(len(self.rows)):
-                if not self._nonzero(other, place):
+                if not self._nonzero(other, column):
                     continue
-                factor, number = self.rows[other, place] / pivot[place], self.numbers[other, place] / at_pivot[place]
+                factor, number = self.rows[other, column] / pivot[column], self.numbers[other, column] / at_pivot[column]
                 for k in (*open_, n):
                     self.rows[other, k] = self.rows[other, k] - factor * pivot[k]
                     self.numbers[other, k] = self.numbers[other, k] - number * at_pivot[k]
-                self.rows[other, place], self.numbers[other, place] = 0, 0.0
+                self.rows[other, column], self.numbers[other, column] = 0, 0.0
         x: list[Any] = [0] * n
-        for place, pivot in reversed(order):
+        for column, pivot in reversed(order):
             total = pivot[n]
             for k in range(n):
-                if k != place:
+                if k != column:
                     total = total - pivot[k] * x[k]
-            x[place] = total / pivot[place]
+            x[column] = total / pivot[column]
         return x
 
-    def _places(self, row: int, open_: set[int]) -> list[int]:
+    def _columns(self, row: int, open_: set[int]) -> list[int]:
         return [k for k in sorted(open_) if self._nonzero(row, k)]
 
-    def _nonzero(self, row: int, place: int) -> bool:
-        return bool(abs(self.numbers[row, place]) > _ZERO)
+    def _nonzero(self, row: int, column: int) -> bool:
+        return bool(abs(self.numbers[row, column]) > _ZERO)

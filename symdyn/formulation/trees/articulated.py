@@ -31,14 +31,14 @@ from symdyn.tape.node import is_zero
 class Released:
     """A link whose joint is free to move.
 
-    places   speeds of the joint that accelerate freely
+    indices  of the speeds of the joint that accelerate freely
     S, U     (6, k) motion subspace of these speeds; U = I^A S, with N for elastic coordinates, see `_release`
     D        factors of S^T I^A S, with M_e for elastic coordinates, (k, k)
-    axes     places in the link's twist (6,) that the columns of S fill, if each is one coordinate direction, else ()
+    axes     indices in the link's twist (6,) that the columns of S fill, if each is one coordinate direction, else ()
     gain     U D^-1, (6, 1), for one column along a coordinate direction, else None
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     S: np.ndarray
     U: np.ndarray
     D: Factors
@@ -49,10 +49,10 @@ class Released:
 class Articulated:
     """Articulated inertias of a tree; `solve` gives the accelerations that forces make.
 
-    reasons   place of each joint speed that accelerates freely (the others follow given functions of time) -> what it
+    reasons   index of each joint speed that accelerates freely (the others follow given functions of time) -> what it
               means if its pivot is not positive
-    lockable  those of these places whose pivot vanishes at some positions (see locking)
-    pivots    (place, pivot) of these speeds
+    lockable  those of these indices whose pivot vanishes at some positions (see locking)
+    pivots    (index, pivot) of these speeds
     """
 
     def __init__(self, tree: Tree, reasons: Mapping[int, str], lockable: Container[int] = ()) -> None:
@@ -64,15 +64,15 @@ class Articulated:
         for k in reversed(range(len(links))):
             link = links[k]
             with algebra.section(f"link {link.name}: articulated inertia"):
-                places = tuple(place for place in link.speeds if place in reasons)
-                S = link.S[:, [place - link.speeds.start for place in places]]
-                locking = [column for column, place in enumerate(places) if place in lockable]
-                factorized = partial(factorize, algebra, reasons=[reasons[p] for p in places],
+                indices = tuple(index for index in link.speeds if index in reasons)
+                S = link.S[:, [index - link.speeds.start for index in indices]]
+                locking = [column for column, index in enumerate(indices) if index in lockable]
+                factorized = partial(factorize, algebra, reasons=[reasons[p] for p in indices],
                                      least=dict.fromkeys(locking, algebra.rounding),
                                      sizes={c: behind(tree, k, S[:, c], lambda child: (IA[child].A, IA[child].M))
                                             for c in locking if not felt(tree, k, S[:, c])})
-                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, places, S, factorized, tree.elastic(k))
-                self.pivots += zip(places, joint.D.D, strict=True)
+                joint = self.released[k] = _release(algebra, k + 1, IA[k], link, indices, S, factorized, tree.elastic(k))
+                self.pivots += zip(indices, joint.D.D, strict=True)
                 if link.parent == GROUND or any(is_zero(pivot) for pivot in joint.D.D):
                     continue
                 parent, number = link.parent, link.parent + 1
@@ -89,8 +89,8 @@ class Articulated:
         for k in reversed(range(len(links))):
             link, joint = links[k], self.released[k]
             with algebra.section(f"link {link.name}: force that accelerates its joint"):
-                own = np.array([tau[place] for place in joint.places], dtype=object)
-                if joint.places:
+                own = np.array([tau[index] for index in joint.indices], dtype=object)
+                if joint.indices:
                     u[k] = algebra.name(f"u{k + 1}", own - joint.S.T @ p[k])
                 if link.parent != GROUND:
                     pa = _carried(p[k], joint, u[k], own)
@@ -108,21 +108,21 @@ class Articulated:
             joint = self.released[k]
             with algebra.section(f"link {link.name}: acceleration"):
                 carried = zeros(6) if link.parent == GROUND else _seen_from(link, a[link.parent])
-                w_dot[list(joint.places)], own = _accelerated(joint, carried, u[k])
-                algebra.name(f"wd{k + 1}", w_dot[list(joint.places)])
+                w_dot[list(joint.indices)], own = _accelerated(joint, carried, u[k])
+                algebra.name(f"wd{k + 1}", w_dot[list(joint.indices)])
                 a.append(algebra.name(f"da{k + 1}", own))
         return w_dot
 
 
-def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, places: tuple[int, ...], S: np.ndarray,
+def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, indices: tuple[int, ...], S: np.ndarray,
              factorized: Callable[[np.ndarray], Factors], elastic: FlexibleLink | None) -> Released:
     """U = I^A S and the factors of D = S^T I^A S.
 
     Elastic coordinates also move the mass between the ends of their body: D = S^T I^A S + M_e, and U = I^A S + N with N the
     wrench that their accelerations need at the clamped end, carried to the link at the free end.
     """
-    k = len(places)
-    U = algebra.name(f"U{number}", IA.matrix() @ S) if places else zeros(6, 0)
+    k = len(indices)
+    U = algebra.name(f"U{number}", IA.matrix() @ S) if indices else zeros(6, 0)
     D = zeros(k, k)
     for i in range(k):
         for j in range(i + 1):
@@ -130,13 +130,13 @@ def _release(algebra: Any, number: int, IA: ArticulatedInertia, link: Link, plac
     if elastic is not None:
         U = algebra.name(f"N{number}", U + np.column_stack([_outwards(link, elastic.coupling(column)) for column in range(k)]))
         D = D + elastic.Me
-        return Released(places, S, U, factorized(D), (), None)
+        return Released(indices, S, U, factorized(D), (), None)
     factors = factorized(D)
     directions = [coordinate_axis(S[:, column]) for column in range(k)]
     axes = tuple(axis for column, axis in enumerate(directions) if axis is not None and abs(S[axis, column]) == 1)
     single = k == 1 and len(axes) == 1
     gain = algebra.name(f"G{number}", U[:, 0] * factors.inverse_D[0]) if single else None
-    return Released(places, S, U, factors, axes if len(axes) == k else (), gain)
+    return Released(indices, S, U, factors, axes if len(axes) == k else (), gain)
 
 
 def _outwards(link: Link, wrench: Wrench) -> np.ndarray:
@@ -149,7 +149,7 @@ def _felt_across(IA: ArticulatedInertia, joint: Released) -> ArticulatedInertia:
     """I^a = I^A - U D^-1 U^T, column by column of Y = U L^-1: U D^-1 U^T = sum of y y^T / d; symmetric entries once."""
     Y = joint.U.copy()
     Ia = IA.matrix()
-    for c in reversed(range(len(joint.places))):
+    for c in reversed(range(len(joint.indices))):
         for i in range(c):
             Y[:, i] = Y[:, i] - joint.D.L[c, i] * Y[:, c]
         scaled = Y[:, c] * joint.D.inverse_D[c]
@@ -161,7 +161,7 @@ def _felt_across(IA: ArticulatedInertia, joint: Released) -> ArticulatedInertia:
 
 def _carried(p: np.ndarray, joint: Released, u: np.ndarray, own: np.ndarray) -> np.ndarray:
     """p^a = p^A + U D^-1 u."""
-    if not joint.places:
+    if not joint.indices:
         return p
     pa = p + (joint.gain * u[0] if joint.gain is not None else joint.U @ joint.D.solve(u))
     for column, axis in enumerate(joint.axes):
@@ -176,7 +176,7 @@ def _seen_from(link: Link, a: np.ndarray) -> np.ndarray:
 
 def _accelerated(joint: Released, a: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations of the joint's speeds, and of the link, from what the parent hands on."""
-    if not joint.places:
+    if not joint.indices:
         return zeros(0), a
     if joint.gain is None:
         w_dot = joint.D.solve(u - joint.U.T @ a)

@@ -63,10 +63,10 @@ class Kinematics:
         J = zeros(6, len(self.tree.w))
         on_path = set(self.tree.path(pose.link))
         point = self.position(pose, at)
-        for place, (omega, v, link) in enumerate(self.columns):
+        for index, (omega, v, link) in enumerate(self.columns):
             if link in on_path:
-                J[:3, place] = v + cross(omega, point - self.frames[link][1])
-                J[3:, place] = omega
+                J[:3, index] = v + cross(omega, point - self.frames[link][1])
+                J[3:, index] = omega
         return J
 
     def velocity(self, pose: Pose, at: np.ndarray) -> np.ndarray:
@@ -101,8 +101,8 @@ class Kinematics:
                 omega, v = (zeros(3), zeros(3)) if link.parent == GROUND else result[link.parent]
                 E = link.R.T
                 own = zeros(6)
-                for column, place in enumerate(link.speeds):
-                    own = own + link.S[:, column] * self.tree.w[place]
+                for column, index in enumerate(link.speeds):
+                    own = own + link.S[:, column] * self.tree.w[index]
                 result.append((self.algebra.vector(f"w{k + 1}", E @ omega + own[:3]),
                                self.algebra.vector(f"v{k + 1}", E @ (v + cross(omega, link.r)) + own[3:])))
         return result

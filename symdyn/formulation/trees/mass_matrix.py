@@ -30,14 +30,14 @@ def mass_matrix(tree: Tree) -> np.ndarray:
         link = tree.links[i]
         elastic = tree.elastic(i)
         with algebra.section(f"mass matrix: composite body from link {link.name} outwards"):
-            for column, place in enumerate(link.speeds):
+            for column, index in enumerate(link.speeds):
                 f, n = composite[i].momentum(link.S[:3, column], link.S[3:, column])
                 for other in range(column + 1):
                     entry = dot(link.S[:3, other], n) + dot(link.S[3:, other], f)
                     if elastic is not None:
                         entry = entry + elastic.Me[other, column]
-                    M[place, link.speeds[other]] = M[link.speeds[other], place] = entry
-                _carry(tree, M, i, place, f, n, None if elastic is None else elastic.coupling(column))
+                    M[index, link.speeds[other]] = M[link.speeds[other], index] = entry
+                _carry(tree, M, i, index, f, n, None if elastic is None else elastic.coupling(column))
             if link.parent != GROUND:
                 composite[link.parent] = total(composite[link.parent], composite[i].moved(link.R, link.r))
                 _name(algebra, link.parent + 1, composite[link.parent])
@@ -47,8 +47,8 @@ def mass_matrix(tree: Tree) -> np.ndarray:
 def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
     """What the pivots of lockable speeds are compared with whose own link has no mass along them, so that the diagonal entry may
     be rounding, too."""
-    unfelt = [(i, column, place) for i, link in enumerate(tree.links) for column, place in enumerate(link.speeds)
-              if tree.plain and place in tree.lockable and not felt(tree, i, link.S[:, column])]
+    unfelt = [(i, column, index) for i, link in enumerate(tree.links) for column, index in enumerate(link.speeds)
+              if tree.plain and index in tree.lockable and not felt(tree, i, link.S[:, column])]
     if not unfelt:
         return {}
     composite = own_inertias(tree)
@@ -61,7 +61,7 @@ def sizes_of_pivots(tree: Tree) -> dict[int, Any]:
         whole = composite[child]
         return (whole.I, whole.m * identity()) if isinstance(whole, Inertia) else (whole.A, whole.M)
 
-    return {place: behind(tree, i, tree.links[i].S[:, column], blocks) for i, column, place in unfelt}
+    return {index: behind(tree, i, tree.links[i].S[:, column], blocks) for i, column, index in unfelt}
 
 
 def own_inertias(tree: Tree) -> list[Inertia | ArticulatedInertia]:
@@ -85,7 +85,7 @@ def _name(algebra: Any, number: int, inertia: Inertia | ArticulatedInertia) -> N
             algebra.vector(f"{letter}{number}", block)
 
 
-def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.ndarray, coupling: Wrench | None) -> None:
+def _carry(tree: Tree, M: np.ndarray, i: int, index: int, f: np.ndarray, n: np.ndarray, coupling: Wrench | None) -> None:
     """Carry the wrench of one column to the joints inwards of link i; coupling: what an elastic body adds at its clamped end."""
     link = tree.links[i]
     while link.parent != GROUND:
@@ -96,7 +96,7 @@ def _carry(tree: Tree, M: np.ndarray, i: int, place: int, f: np.ndarray, n: np.n
             f, n, coupling = f + coupling[0], n + coupling[1], None
         link = tree.links[link.parent]
         for column, row in enumerate(link.speeds):
-            M[place, row] = M[row, place] = dot(link.S[:3, column], n) + dot(link.S[3:, column], f)
+            M[index, row] = M[row, index] = dot(link.S[:3, column], n) + dot(link.S[3:, column], f)
 
 
 @dataclass(frozen=True)

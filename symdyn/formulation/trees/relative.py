@@ -92,9 +92,9 @@ class Relative:
         for k in self.path(link):
             R, p = self._frame(k)
             S = self.tree.links[k].S
-            for column, place in enumerate(self.tree.links[k].speeds):
-                Jw[:, place] = R @ S[:3, column]
-                Jv[:, place] = R @ S[3:, column] + cross(Jw[:, place], (origin - p) + arm)
+            for column, index in enumerate(self.tree.links[k].speeds):
+                Jw[:, index] = R @ S[:3, column]
+                Jv[:, index] = R @ S[3:, column] + cross(Jw[:, index], (origin - p) + arm)
         return Jv, Jw
 
     @property
