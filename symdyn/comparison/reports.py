@@ -121,7 +121,7 @@ def _formula(formula: FormulaResult, pages: Pages) -> dict[str, Any]:
             else [pages.typeset(name)] if name else [],
             "derived": pages.lines(room, formula.derived) if formula.derived is not None else [],
             "where": [pages.typeset(line) for line in where_lines(formula, room)], "notes": notes,
-            "ways": ", ".join([*ways, "on the states stated"] if formula.where and ways else ways),
+            "ways": ", ".join([*ways, "on the named states"] if formula.where and ways else ways),
             "proofs": list(dict.fromkeys(str(e.evidence) for e in formula.errata if e.evidence.holds))}
 
 

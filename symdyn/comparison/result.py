@@ -62,7 +62,7 @@ class Comparison:
         lines = [head]
         for f in self.formulas:
             line = f"{f.slide.line:>6}  " if f.slide.line is not None else ""
-            lines.append(f"  {f.name:{width}}  {line}{_counted(f.entries)}{', on the states stated' if f.where else ''}")
+            lines.append(f"  {f.name:{width}}  {line}{_counted(f.entries)}{', on the named states' if f.where else ''}")
             lines += [f"    {text}" for text in _remarks(f)]
         lines += [f"  {'' if r.line is None else f'line {r.line}: '}{r.why}" for r in self.remarks]
         lines.append(f"  {_entries(self.counts)}: {_counted(e for f in self.formulas for e in f.entries)}")

@@ -118,8 +118,8 @@ def test_formulas_of_other_shape_are_printed_whole(bare):
 
 
 def test_what_holds_on_some_states_only_is_said(bare):
-    assert "1 equal, proved, on the states told" in str(bare)
-    assert "on the states told" in report(Comparisons((bare,)), "comparison.html")
+    assert "1 equal, proved, on the named states" in str(bare)
+    assert "on the named states" in report(Comparisons((bare,)), "comparison.html")
 
 
 def test_only_the_wrong_row_of_an_equation_is_coloured(bare):

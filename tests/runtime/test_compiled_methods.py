@@ -237,7 +237,7 @@ def test_auto_tells_that_series_do_not_fit() -> None:
     system.add_joint_force("slide", -sp.Abs(q))
     found = system.embedding().compile(backend="c").simulate((0, 1), {"q": 1.0}, rtol=1e-9, method="auto")
     assert found.method == "dop853" and found.why.endswith(
-        "operations in the right-hand side) Taylor series would be most exact, but do not fit (method='taylor' tells why); the "
+        "operations in the right-hand side) Taylor series would be most exact, but do not fit (method='taylor' says why); the "
         "explicit method of order 8 is quickest")
 
 
