@@ -18,7 +18,8 @@ from symdyn.errors import ArgumentError
 from symdyn.lab.figures import print_figures
 
 ROOT = Path(__file__).parents[2]
-TEXTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "notebooks").glob("*.py"))]
+TEXTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md")),
+         *sorted((ROOT / "notebooks").glob("*.py"))]
 
 
 @pytest.mark.parametrize("word", MEASUREMENTS)
@@ -149,10 +150,10 @@ def test_stress_is_told_what_is_missing_before_anything_is_run(tmp_path: Path, c
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.name)
 def test_commands_in_texts_are_there(path: Path) -> None:
-    """What README, notebooks and the change log call is a word or a mechanism; every word is in README."""
+    """What README, pages, notebooks and the change log call is a word or a mechanism; every word is on the page of figures."""
     text = path.read_text(encoding="utf-8")
     named = set(re.findall(r"symdyn bench (\w+)\b(?!\.py)", text))
     assert named <= {*MEASUREMENTS, *known(), "NAME"}
     modules = re.findall(r"python -m (symdyn[\w.]*)", text)
     assert all(re.fullmatch(r"symdyn\.lab\.\w+", m) and importlib.util.find_spec(m) for m in modules)
-    assert path.name != "README.md" or set(MEASUREMENTS) <= named | set(re.findall(r"`(\w+)`", text))
+    assert path.name != "measured.md" or set(MEASUREMENTS) <= named | set(re.findall(r"`(\w+)`", text))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -296,10 +295,3 @@ def test_a_function_without_a_file_needs_its_text() -> None:
         "f: the Python function identity: its text cannot be read, as it is in no file; pass it as python_source=",)
     text = "def identity(v):\n    return 1 * v\n"
     assert sd.External("f", ["v"], python=nowhere, python_source=text).function.text("numpy") == text.strip()
-
-
-def test_the_readme_shows_what_happens(tmp_path: Path) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    block: Callable[[str], str] = lambda mark: re.search(rf"<!-- {mark} -->\n```\w*\n(.*?)```", text, re.DOTALL)[1]  # type: ignore[index]
-    (tmp_path / "boat.py").write_text(block("function"))
-    assert run("import boat", tmp_path) == block("function printed")
