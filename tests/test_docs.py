@@ -10,6 +10,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 
+# They are texts of the project's folder on the site.
+OF_THE_PROJECT = "contributing", "changes"
+
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
@@ -42,5 +45,6 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_the_index_lists_every_page() -> None:
-    listed = set(re.findall(r"\]\((\w+)\.md\)", (ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
-    assert listed == {page.stem for page in PAGES} - {"index"}
+    listed = set(re.findall(r"\]\(([\w/]+)\.(?:md|rst)\)", (ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
+    reference = {f"reference/{page.stem}" for page in (ROOT / "docs" / "reference").glob("*.rst")}
+    assert listed == {page.stem for page in PAGES} - {"index", *OF_THE_PROJECT} | reference

@@ -1,0 +1,83 @@
+"""The documentation as a site: it builds without a warning, has every public name, and works from the disk without a network."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import symdyn as sd
+from tests.helpers import browser
+
+ROOT = Path(__file__).parents[1]
+# As wide as a screen, and as a telephone.
+WIDTHS = 1280, 400
+PAGES = ("index", "describing_mechanisms", "printing", "measured", "reference/system", "reference/module", "contributing",
+         "genindex")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("sphinx")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", str(ROOT / "docs"), str(folder)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown() -> Iterator[Any]:
+    with browser() as opened:
+        yield opened
+
+
+def test_every_public_name_has_an_entry(site: Path) -> None:
+    listed = (site / "genindex.html").read_text(encoding="utf-8")
+    text = "".join(page.read_text(encoding="utf-8") for page in (site / "reference").glob("*.html"))
+    for name in sd.__all__:
+        thing = getattr(sd, name)
+        module = inspect.ismodule(thing)
+        ids = [f"symdyn.{name}", f"module-{thing.__name__}" if module else f"{getattr(thing, '__module__', 'symdyn')}.{name}"]
+        # Packages that can be called stand under the name of what they call.
+        assert any(f'id="{one}"' in text for one in ids) or (module and callable(thing) and f"sd.{name}" in text), name
+    assert "add_joint() (symdyn.System method)" in listed and "simulate() (symdyn.runtime.module.Module method)" in listed
+
+
+def test_docstrings_are_typeset(site: Path) -> None:
+    """Arguments are definitions, examples are code, and no markup is left over."""
+    page = (site / "reference" / "system.html").read_text(encoding="utf-8")
+    event = page[page.index('id="symdyn.System.add_event"'):]
+    event = event[:event.index("</dd></dl>")]
+    assert re.search(r"<dt>direction</dt><dd><p>1: only upwards through zero, -1: only downwards", event)
+    assert 'class="doctest' in event and "``" not in re.sub(r"<[^>]+>", "", page)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_work_without_a_network(site: Path, shown: Any, name: str) -> None:
+    """No request beyond the disk, nothing on the console, nothing wider than the window."""
+    for width in WIDTHS:
+        page = shown.new_page(viewport={"width": width, "height": 900})
+        asked: list[str] = []
+        said: list[str] = []
+        page.on("request", lambda request, asked=asked: asked.append(request.url))
+        page.on("console", lambda message, said=said: said.append(message.text))
+        page.on("pageerror", lambda error, said=said: said.append(str(error)))
+        page.goto((site / f"{name}.html").as_uri())
+        assert all(url.startswith(("file:", "data:")) for url in asked) and not said, (asked, said)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.close()
+
+
+def test_the_search_finds_a_name(site: Path, shown: Any) -> None:
+    page = shown.new_page()
+    page.goto((site / "search.html").as_uri() + "?q=close_loop")
+    page.wait_for_selector("#search-results li", timeout=20_000)
+    assert "Constraints" in page.inner_text("#search-results") or "close_loop" in page.inner_text("#search-results")
+    page.close()
