@@ -59,7 +59,8 @@ def _with_items(block: list[str]) -> list[str]:
     """A paragraph, an aligned list, or the first followed by the second; formulas within it that are indented."""
     first = next((k for k, line in enumerate(block) if ITEM.fullmatch(line)), len(block))
     result = _paragraphs(block[:first])
-    name, texts = "", []
+    name = ""
+    texts: list[str] = []
     for line in [*block[first:], ""]:
         item = ITEM.fullmatch(line)
         if item or not line or not line.startswith(" "):

@@ -61,7 +61,7 @@ METADATA = {
 
 class SingularError(ArithmeticError):
     """A value that must be positive is not; `code` is its place in METADATA["reasons"], from 1; of arrays of states, `states`
-    tells at which: booleans that broadcast to the shape of these arrays."""
+    says at which: booleans that broadcast to the shape of these arrays."""
 
     def __init__(self, code, states=True):
         super().__init__(METADATA["reasons"][code - 1])
