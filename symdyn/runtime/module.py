@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 Provider = Callable[[str | RightSide], Unit]
 # Times that the generated code takes as they are.
 _TIMES = (float, np.float64)
+_WHOLE = 2**53
 
 
 class Jacobian(NamedTuple):
@@ -138,9 +139,9 @@ class Module:
         # One state of doubles at a finite time needs no further look; text, complex and masked numbers take the other way.
         if type(x) is np.ndarray and x.dtype is DOUBLE and x.shape == self._one and _is_time(t):
             if self._n_in == 0 and (inputs is None or (type(inputs) is tuple and not inputs)):
-                return evaluator.one(t, x)
+                return evaluator.one(float(t), x)
             if type(inputs) is np.ndarray and inputs.dtype is DOUBLE and inputs.shape == self._free:
-                return evaluator.one(t, x, inputs)
+                return evaluator.one(float(t), x, inputs)
         return self.evaluate("rhs", t, x, params, inputs)
 
     def rhs_batch(self, t: Times, x: States, params: States | None = None, inputs: States | None = (),
@@ -1067,9 +1068,9 @@ class BoundModule:
         """A function at one state. Inputs that are left out take their initial values in the system, else 0."""
         if type(x) is np.ndarray and x.dtype is DOUBLE and x.shape == self._one and _is_time(t):
             if self._n_in == 0 and not len(inputs):
-                return evaluator.one(t, x)  # type: ignore[no-any-return]
+                return evaluator.one(float(t), x)  # type: ignore[no-any-return]
             if type(inputs) is np.ndarray and inputs.dtype is DOUBLE and inputs.shape == self._free:
-                return evaluator.one(t, x, inputs)  # type: ignore[no-any-return]
+                return evaluator.one(float(t), x, inputs)  # type: ignore[no-any-return]
         owner = self.module.name
         if isinstance(inputs, Mapping):
             names = self.module.metadata.inputs
@@ -1096,8 +1097,8 @@ def _restored(metadata: Mapping[str, Any], provider: Any, backend: str, fallback
 
 
 def _is_time(t: Any) -> bool:
-    """Whether t is a finite double."""
-    return type(t) in _TIMES and t - t == 0
+    """Whether t is a finite double, or a whole number that a double holds."""
+    return type(t) in _TIMES and t - t == 0 or type(t) is int and -_WHOLE <= t <= _WHOLE
 
 
 def _mark(params: Any) -> Any:
