@@ -1098,7 +1098,7 @@ def _restored(metadata: Mapping[str, Any], provider: Any, backend: str, fallback
 
 def _is_time(t: Any) -> bool:
     """Whether t is a finite double, or a whole number that a double holds."""
-    return type(t) in _TIMES and t - t == 0 or type(t) is int and -_WHOLE <= t <= _WHOLE
+    return (type(t) in _TIMES and t - t == 0) or (type(t) is int and -_WHOLE <= t <= _WHOLE)
 
 
 def _mark(params: Any) -> Any:
