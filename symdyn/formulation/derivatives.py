@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations
 from symdyn.model.symbols import time
 from symdyn.spatial.vectors import vector
@@ -133,6 +134,25 @@ def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
                 unit = {seed: int(leaf is chosen) for leaf, seed in seeds.items()}
                 columns.append(substitute(tuple(gradient(equations, wrt, group)), unit, equations.recorder))
     return np.array(columns, dtype=object).T.reshape(len(columns), len(columns))
+
+
+def curvature_named(name: str) -> tuple[str, ...] | None:
+    """By what a function of this name differentiates the weighted constraints twice: constraints_hessian_x_params; None for other
+    functions."""
+    wrt = tuple(name.removeprefix("constraints_hessian_").split("_"))
+    return wrt if name.startswith("constraints_hessian_") and wrt in (("x",), ("x", "params")) else None
+
+
+def curvature(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
+    """The matrix of second derivatives of w^T [C; C_dot], with the weights w (2 n_c,) among the arguments."""
+    recorder = equations.recorder
+    values = [*equations.quantity("C").tolist(), *equations.quantity("C_dot").tolist()]
+    weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(len(values))]
+    leaves = [leaf for by in wrt for group in BY[by] for leaf in leaves_of(equations, group)]
+    total = sum((w * value for w, value in zip(weights, values, strict=True)), 0)
+    slopes = reverse(recorder, total, leaves)
+    columns = [forward(recorder, slopes, {leaf: 1}) for leaf in leaves]
+    return np.array(columns, dtype=object).T.reshape(len(leaves), len(leaves))
 
 
 def seeds_in(equations: Equations, group: str) -> tuple[str, ...]:
