@@ -110,10 +110,10 @@ def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
         driven = free
     if not driven:
         raise ArgumentError(f"{owner}: R has no weights, so there is nothing to drive; give weights of inputs: {', '.join(free)}")
-    state_weights = _weights(Q, linear.states, "Q", owner, dict.fromkeys(linear.states, 0.0))
-    input_weights = _weights(R, driven, "R", owner, {})
-    _demand_definite(state_weights, linear.states, "Q", owner, strictly=False)
-    _demand_definite(input_weights, driven, "R", owner, strictly=True)
+    state_weights = weights_of(Q, linear.states, "Q", owner, dict.fromkeys(linear.states, 0.0))
+    input_weights = weights_of(R, driven, "R", owner, {})
+    demand_definite(state_weights, linear.states, "Q", owner, strictly=False)
+    demand_definite(input_weights, driven, "R", owner, strictly=True)
     A, B = linear.A, linear.B[:, [inputs.index(n) for n in driven]]
     for value, shares in _out_of_reach(A, B):
         if value.real > -NEUTRAL * np.linalg.norm(A):
@@ -143,7 +143,7 @@ def lqr(linear: Linearization, Q: Any, R: Any) -> Regulator:
     return Regulator(linear, gain, S, closed[order], state_weights, input_weights, driven)
 
 
-def _weights(values: Any, names: Sequence[str], what: str, owner: str, left_out: Mapping[str, float]) -> np.ndarray:
+def weights_of(values: Any, names: Sequence[str], what: str, owner: str, left_out: Mapping[str, float]) -> np.ndarray:
     """A symmetric matrix from one, from a diagonal, or from weights by name or symbol."""
     if isinstance(values, Mapping):
         return np.diag(take(values, names, what, left_out, owner))
@@ -168,7 +168,7 @@ def _weights(values: Any, names: Sequence[str], what: str, owner: str, left_out:
     return (matrix + matrix.T) / 2
 
 
-def _demand_definite(matrix: np.ndarray, names: Sequence[str], what: str, owner: str, strictly: bool) -> None:
+def demand_definite(matrix: np.ndarray, names: Sequence[str], what: str, owner: str, strictly: bool) -> None:
     """Raises ArgumentError for a matrix that is not positive semidefinite, or strictly: not positive definite."""
     size = np.sqrt(np.abs(np.diag(matrix)))
     scale = 1 / np.where(size > 0, size, 1.0)
