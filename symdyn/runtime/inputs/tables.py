@@ -111,6 +111,14 @@ class Table(OverTime):
         return f"holds from t = {first:g} s to {last:g} s, and the run goes from {begin:g} s to {end:g} s"
 
 
+class Piecewise(Table):
+    """A table whose pieces are given: polynomials of order three at most, which may jump where steps of the integration end."""
+
+    def __init__(self, pieces: Pieces) -> None:
+        super().__init__(pieces.breaks, pieces.at(pieces.breaks), extend="hold")
+        self.__dict__["pieces"] = pieces
+
+
 def _first_wrong(times: np.ndarray, values: np.ndarray) -> str:
     """The first entry that is not finite, or the first time that does not come after the one before; "" if there is none."""
     for what, array in (("time", times), ("value", values)):
