@@ -39,12 +39,13 @@ _HOME = {
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
     "symdyn.estimation": ("Experiment", "Fit", "fit"),
+    "symdyn.optimal": ("Optimum", "Tracking", "optimize"),
     "symdyn.runtime.inputs.tables": ("Table",),
     "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",
                       "EnsembleStopped", "EquilibriumNotUnique", "EvaluationError", "EvaluationWarning", "GimbalLock",
-                      "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium", "NotARotation", "NotNormalized",
-                      "RotationError", "SimulationInterrupted", "SimulationWarning", "SymdynError", "UnknownCase",
-                      "UnsupportedExpression", "ZeroAxis"),
+                      "MissingExtra", "ModelError", "ModelWarning", "NoEquilibrium", "NoOptimum", "NotARotation",
+                      "NotNormalized", "OptimumWarning", "RotationError", "SimulationInterrupted", "SimulationWarning",
+                      "SymdynError", "UnknownCase", "UnsupportedExpression", "ZeroAxis"),
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {

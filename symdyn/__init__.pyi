@@ -65,10 +65,16 @@ from symdyn.errors import (
     NoEquilibrium as NoEquilibrium,
 )
 from symdyn.errors import (
+    NoOptimum as NoOptimum,
+)
+from symdyn.errors import (
     NotARotation as NotARotation,
 )
 from symdyn.errors import (
     NotNormalized as NotNormalized,
+)
+from symdyn.errors import (
+    OptimumWarning as OptimumWarning,
 )
 from symdyn.errors import (
     RotationError as RotationError,
@@ -211,6 +217,9 @@ from symdyn.model.symbols import (
     speeds as speeds,
 )
 from symdyn.model.system import System as System
+from symdyn.optimal import Optimum as Optimum
+from symdyn.optimal import Tracking as Tracking
+from symdyn.optimal import optimize as optimize
 from symdyn.overview.page import full_report as full_report
 from symdyn.report.latex import latex as latex
 from symdyn.runtime.inputs.inputs import Smooth as Smooth

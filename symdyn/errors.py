@@ -130,6 +130,19 @@ class EquilibriumNotUnique(NoEquilibrium):
     """Something can move without any stiffness; the message names the direction."""
 
 
+class NoOptimum(SymdynError, ArithmeticError):
+    """No optimal motion was found; the message reports which condition is violated and by how much, `optimum` holds what was
+    computed."""
+
+    def __init__(self, message: str, optimum: object) -> None:
+        super().__init__(message)
+        self.optimum = optimum
+
+
+class OptimumWarning(UserWarning):
+    """An optimal motion is less exact than requested; the message reports by how much."""
+
+
 class EnsembleStopped(SymdynError):
     """An ensemble stopped early: its executor died or the disk is full. `n_done` of `count` samples are kept."""
 

@@ -1,0 +1,415 @@
+"""A problem on a mesh: its nonlinear program, where the parts of the motion are in its variables, the motion of a solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.interpolate import PPoly
+
+from symdyn.errors import ArgumentError
+from symdyn.optimal.expressions import Expressions
+from symdyn.optimal.field import Dynamics, Field, Rows
+from symdyn.optimal.loops import Loops, independent_rows, normals
+from symdyn.optimal.problem import Problem
+from symdyn.optimal.program import Block, Label, Program
+from symdyn.optimal.steps import Steps
+from symdyn.optimal.transcription import Transcription, gauss_points
+
+MOTION = "the equation of motion of "
+# What a condition whose variables are all given may lack.
+GIVEN = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """States X (N, n_x) at the nodes of a mesh, inputs U (M, n_in) at its samples, parameters p (n_p,), duration T, s."""
+
+    X: np.ndarray
+    U: np.ndarray
+    p: np.ndarray
+    T: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Indices in z: of X (N, n_x), U (M, n_in), corrections (K, n_corrections), free parameters, duration (-1: prescribed); n of
+    all."""
+
+    X: np.ndarray
+    U: np.ndarray
+    corrections: np.ndarray
+    params: np.ndarray
+    duration: int
+    n: int
+
+
+@dataclass(eq=False)
+class Discretized:
+    """See above.
+
+    steps   in each interval of shooting
+    elastic   whether what is demanded of the motion may be missed, the sum of what is missed being the cost
+    """
+
+    problem: Problem
+    mesh: Transcription
+    steps: int
+    guess: Motion
+    elastic: bool = False
+
+    def __post_init__(self) -> None:
+        problem, mesh = self.problem, self.mesh
+        self.dynamics = Dynamics(problem.module, problem.of, self.guess.p)
+        self.held = mesh.kind == "shooting" and mesh.at_inputs.shape[1] == 1
+        self.rows_of_loops, self.normals = np.zeros(0, dtype=int), np.zeros((mesh.n_intervals, problem.of.n_x, 0))
+        if problem.module.metadata.constraints:
+            X, t = self.guess.X[mesh.ends], problem.t0 + mesh.breaks * self.guess.T
+            self.rows_of_loops = independent_rows(problem.module, float(t[0]), X[0], self.guess.p)
+            self.normals = normals(problem.module, t[1:], X[1:], self.guess.p, self.rows_of_loops)
+        self.layout = self._laid_out()
+        self.z = self.variables(self.guess)
+        self.program = self._program()
+
+    # -- variables
+
+    def _laid_out(self) -> Layout:
+        of, mesh = self.problem.of, self.mesh
+        sizes = [len(mesh.nodes) * of.n_x, len(mesh.samples) * of.n_in, mesh.n_intervals * len(self.rows_of_loops), len(of.free)]
+        first = np.concatenate([[0], np.cumsum(sizes)])
+        free = self.problem.duration[0] < self.problem.duration[1]
+        part = lambda k, *shape: np.arange(int(first[k]), int(first[k + 1])).reshape(shape)
+        return Layout(part(0, -1, of.n_x), part(1, -1, of.n_in) if of.n_in else np.zeros((len(mesh.samples), 0), dtype=int),
+                      part(2, mesh.n_intervals, len(self.rows_of_loops)), part(3, -1), int(first[4]) if free else -1,
+                      int(first[4]) + free)
+
+    def variables(self, motion: Motion) -> np.ndarray:
+        """z of a motion, without corrections, within its bounds."""
+        at, z = self.layout, np.zeros(self.layout.n)
+        z[at.X], z[at.U], z[at.params] = motion.X, motion.U, motion.p[list(self.problem.of.free)]
+        if at.duration >= 0:
+            z[at.duration] = motion.T
+        return z
+
+    def motion(self, z: np.ndarray) -> Motion:
+        """The motion of variables."""
+        at, p = self.layout, self.guess.p.copy()
+        p[list(self.problem.of.free)] = z[at.params]
+        return Motion(z[at.X], z[at.U], p, float(z[at.duration]) if at.duration >= 0 else float(self.problem.duration[0]))
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        at, problem, found = self.layout, self.problem, []
+        for k, worst in ((0, -np.inf), (1, np.inf)):
+            z = np.full(at.n, worst)
+            z[at.X], z[at.U], z[at.params] = problem.states[k], problem.inputs[k], problem.params[k]
+            z[at.X[0]] = problem.start[k]
+            if not self.elastic:
+                z[at.X[self.mesh.ends[-1]]] = problem.end[k]
+            if at.duration >= 0:
+                z[at.duration] = problem.duration[k]
+            found.append(z)
+        return found[0], found[1]
+
+    # -- the program
+
+    def _program(self) -> Program:
+        least, most = self._bounds()
+        self.z = np.clip(self.z, least, most)
+        parts = [self._defects(), *self._path(), *self._boundary(), *self._rates(), *self._loops()]
+        if self.elastic:
+            parts.append(self._end())
+        program = self._assembled(parts, least, most)
+        moving = least < most
+        depends = np.zeros(program.m, dtype=bool)
+        depends[program.jacobian_rows[moving[program.jacobian_columns]]] = True
+        if not depends.all():
+            program = self._without(program, depends)
+        return self._with_slacks(program) if self.elastic else program
+
+    def _assembled(self, parts: list[_Part], least: np.ndarray, most: np.ndarray) -> Program:
+        m = sum(part.m for part in parts)
+        L, blocks, labels, first = [], [], [], 0
+        for part in parts:
+            L.append(part.L if part.L is not None else sp.csr_matrix((part.m, self.layout.n)))
+            labels += [replace(label, first=label.first + first) for label in part.labels]
+            if part.block is not None:
+                A = sp.vstack([sp.csr_matrix((first, part.block.A.shape[1])), part.block.A,
+                               sp.csr_matrix((m - first - part.m, part.block.A.shape[1]))]).tocsr()
+                b = np.zeros_like(part.block.b) if self.elastic else part.block.b
+                blocks.append(replace(part.block, A=A, b=b))
+            first += part.m
+        return Program(blocks, sp.vstack(L).tocsr(), least, most, np.concatenate([part.least for part in parts]),
+                       np.concatenate([part.most for part in parts]), labels)
+
+    def _without(self, program: Program, depends: np.ndarray) -> Program:
+        """Without rows that depend on nothing that is free. Raises ArgumentError where one of them does not hold."""
+        missing = program.violations(self.z)
+        wrong = np.flatnonzero(~depends & ~(missing <= GIVEN))
+        if len(wrong) and not self.elastic:
+            told = [f"{self.text(program, row)} by {missing[row]:.3g}" for row in wrong[:4]]
+            how = " (module.consistent finds states that fulfil constraints)" if len(self.rows_of_loops) else ""
+            raise ArgumentError(f"{self.problem.module.name}: what is given violates {'; '.join(told)}; change the start, the "
+                                f"end or the condition{how}")
+        kept = np.flatnonzero(depends)
+        labels, first = [], 0
+        for label in program.labels:
+            for k, share in enumerate(label.shares):
+                for e, entry in enumerate(label.entries):
+                    if depends[label.first + k * len(label.entries) + e]:
+                        labels.append(Label(f"{label.text}{entry}", first, np.array([share]), soft=label.soft))
+                        first += 1
+        blocks = [replace(block, A=block.A[kept]) for block in program.blocks]
+        return Program(blocks, program.L[kept], program.z_least, program.z_most, program.g_least[kept], program.g_most[kept],
+                       labels)
+
+    def _with_slacks(self, program: Program) -> Program:
+        """With two more variables for each condition, by which it is missed, and their sum as the cost."""
+        rows = np.array([k for label in program.labels if label.soft for k in range(label.first, label.first + label.n)],
+                        dtype=int)
+        n, s = program.n, len(rows)
+        more = sp.csr_matrix((np.repeat([1.0, -1.0], s), (np.tile(rows, 2), np.arange(2 * s))), (program.m, 2 * s))
+        of_slacks = Block(_Sum(), np.arange(n, n + 2 * s)[:, None], np.zeros((2 * s, 1)), np.ones((2 * s, 1)),
+                          sp.csr_matrix((program.m, 2 * s)), np.ones(2 * s))
+        missing = np.nan_to_num(program.violations(self.z)[rows])
+        self.z = np.concatenate([self.z, missing, missing])
+        self.slacks = rows
+        least, most = np.append(program.z_least, np.zeros(2 * s)), np.append(program.z_most, np.full(2 * s, np.inf))
+        return Program([*program.blocks, of_slacks], sp.hstack([program.L, more]).tocsr(), least, most, program.g_least,
+                       program.g_most, program.labels)
+
+    def text(self, program: Program, row: int) -> str:
+        """What a row of the constraints is, and when, by the duration of the guess."""
+        text, share = program.what(row)
+        return text if np.isnan(share) else f"{text} at t = {self.problem.t0 + share * self.guess.T:.4g} s"
+
+    def field(self, shares: np.ndarray) -> Field:
+        """The rates at points."""
+        return Field(self.dynamics, self.problem.integrand, self.problem.t0, shares)
+
+    def flow(self, steps: int | None = None) -> Rows:
+        """What the defects are made of: rates at points, or changes across the intervals of shooting."""
+        field = self.field(self.mesh.shares)
+        return Steps(field, np.diff(self.mesh.breaks), steps or self.steps, self.held) if self.mesh.kind == "shooting" else field
+
+    def columns(self, states: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and constants of [states; inputs; free parameters; duration] at points."""
+        at, N = self.layout, len(states)
+        columns = np.hstack([at.X[states], *[at.U[inputs[:, k]] for k in range(inputs.shape[1])],
+                             np.broadcast_to(at.params, (N, len(at.params))), np.full((N, 1), at.duration)])
+        constants = np.zeros(columns.shape)
+        if at.duration < 0:
+            constants[:, -1] = self.problem.duration[0]
+        return columns, constants
+
+    def _defects(self) -> _Part:
+        mesh, n_x, flow = self.mesh, self.problem.of.n_x, self.flow()
+        columns, constants = self.columns(mesh.at_state, mesh.at_inputs)
+        R = mesh.E.shape[0]
+        block = Block(flow, columns, constants, np.ones(columns.shape), (-sp.kron(mesh.W, sp.eye(n_x, n_x + 1))).tocsr(),
+                      np.kron(mesh.b, np.eye(n_x + 1)[n_x]))
+        L = sp.lil_matrix((R * n_x, self.layout.n))
+        L[:, :self.layout.X.size] = sp.kron(mesh.E, sp.identity(n_x))
+        for row in np.flatnonzero(mesh.corrected >= 0) if len(self.rows_of_loops) else ():
+            k = mesh.corrected[row]
+            L[row * n_x:(row + 1) * n_x, self.layout.corrections[k]] = -self.normals[k]
+        names = self.problem.module.metadata.x
+        return _Part(R * n_x, L.tocsr(), block, np.zeros(R * n_x), np.zeros(R * n_x),
+                     [Label(MOTION, 0, mesh.share, names)])
+
+    def _pointwise(self, expressions: Expressions, columns: np.ndarray, shares: np.ndarray, A: sp.csr_matrix,
+                   b: np.ndarray) -> Block:
+        """Expressions whose last argument is the time, at points."""
+        T, N = self.layout.duration, len(shares)
+        columns = np.column_stack([columns, np.full(N, T)])
+        constants, scale = np.zeros(columns.shape), np.ones(columns.shape)
+        constants[:, -1] = self.problem.t0 + (0.0 if T >= 0 else shares * self.problem.duration[0])
+        scale[:, -1] = shares
+        return Block(expressions, columns, constants, scale, A, b)
+
+    def _path(self) -> list[_Part]:
+        of, mesh = self.problem.path, self.mesh
+        m = of.expressions.m
+        if not m:
+            return []
+        if mesh.kind == "shooting":
+            states, shares = mesh.ends, mesh.breaks
+            inputs = np.minimum(np.arange(len(shares)), len(mesh.samples) - 1)
+        else:
+            states, shares, inputs = mesh.at_state, mesh.shares, mesh.at_inputs[:, 0]
+        N, at = len(states), self.layout
+        columns = np.hstack([at.X[states], at.U[inputs], np.broadcast_to(at.params, (N, len(at.params)))])
+        block = self._pointwise(of.expressions, columns, shares, sp.identity(N * m, format="csr"), np.zeros(N * m))
+        return [_Part(N * m, None, block, np.tile(of.least, N), np.tile(of.most, N), [Label("", 0, shares, of.texts, True)])]
+
+    def _boundary(self) -> list[_Part]:
+        at, problem = self.layout, self.problem
+        columns = np.concatenate([at.X[0], at.X[self.mesh.ends[-1]], at.U[-1], at.params])[None, :]
+        of, end = problem.boundary, problem.end_cost
+        found = []
+        if of.expressions.m:
+            m = of.expressions.m
+            block = self._pointwise(of.expressions, columns, np.ones(1), sp.identity(m, format="csr"), np.zeros(m))
+            found.append(_Part(m, None, block, of.least, of.most, [Label("", 0, np.array([np.nan]), of.texts, True)]))
+        if end.slopes.any():
+            block = self._pointwise(end, columns, np.ones(1), sp.csr_matrix((0, 1)), np.ones(1))
+            found.append(_Part(0, None, block, np.zeros(0), np.zeros(0), []))
+        return found
+
+    def _end(self) -> _Part:
+        """The end as conditions, that may be missed."""
+        n_x, names = self.problem.of.n_x, self.problem.module.metadata.x
+        L = sp.csr_matrix((np.ones(n_x), (np.arange(n_x), self.layout.X[self.mesh.ends[-1]])), (n_x, self.layout.n))
+        least, most = self.problem.end
+        texts = tuple(f"{name} = {low:g}" if low == high else f"{name} between {low:g} and {high:g}"
+                      for name, low, high in zip(names, least, most, strict=True))
+        return _Part(n_x, L, None, least, most, [Label("", 0, np.ones(1), texts, True)])
+
+    def _rates(self) -> list[_Part]:
+        mesh, at, (low, high) = self.mesh, self.layout, self.problem.rates
+        found = []
+        for k, name in enumerate(self.problem.module.metadata.inputs):
+            if not (np.isfinite(low[k]) or np.isfinite(high[k])):
+                continue
+            D = self._of_input(mesh.rates, k)
+            m, shares = D.shape[0], np.repeat(mesh.breaks[:-1], mesh.rates.shape[0] // mesh.n_intervals)
+            for bound, least, most, what in ((low[k], 0.0, np.inf, "least"), (high[k], -np.inf, 0.0, "largest")):
+                if np.isfinite(bound) and m:
+                    rate, text = D.copy(), f"the {what} rate {bound:g} of {name}"
+                    shift = 0.0
+                    if at.duration >= 0:
+                        rate = rate - sp.csr_matrix((np.full(m, bound), (np.arange(m), np.full(m, at.duration))), rate.shape)
+                    else:
+                        shift = bound * self.problem.duration[0]
+                    found.append(_Part(m, rate, None, np.full(m, least + shift), np.full(m, most + shift),
+                                       [Label(text, 0, shares)]))
+            joints = self._of_input(mesh.joints, k)
+            found.append(_Part(joints.shape[0], joints, None, np.zeros(joints.shape[0]), np.zeros(joints.shape[0]),
+                               [Label(f"the continuity of {name}", 0, mesh.breaks[1:1 + joints.shape[0]])]))
+        return found
+
+    def _of_input(self, matrix: sp.csr_matrix, k: int) -> sp.csr_matrix:
+        """A matrix on the samples of one input as one on z."""
+        found = matrix.tocoo()
+        return sp.csr_matrix((found.data, (found.row, self.layout.U[found.col, k])), (found.shape[0], self.layout.n))
+
+    def _loops(self) -> list[_Part]:
+        rows, mesh, at, problem = self.rows_of_loops, self.mesh, self.layout, self.problem
+        if not len(rows):
+            return []
+        N, names = len(mesh.ends), problem.module.metadata.constraints
+        t = problem.t0 + mesh.breaks * self.guess.T
+        loops = Loops(problem.module, problem.of, self.guess.p, t, rows)
+        columns = np.hstack([at.X[mesh.ends], np.broadcast_to(at.params, (N, len(at.params)))])
+        m = N * len(rows)
+        block = Block(loops, columns, np.zeros(columns.shape), np.ones(columns.shape), sp.identity(m, format="csr"), np.zeros(m))
+        texts = tuple(names[k] if k < len(names) else f"the rate of {names[k - len(names)]}" for k in rows)
+        return [_Part(m, None, block, np.zeros(m), np.zeros(m), [Label("the constraint ", 0, mesh.breaks, texts)])]
+
+    # -- the motion
+
+    def polynomials(self, motion: Motion) -> tuple[PPoly, PPoly]:
+        """State and inputs over shares of the duration."""
+        mesh = self.mesh
+        inputs = mesh.of_inputs(motion.U)
+        at = self._arguments(motion)
+        flow = self.flow()
+        if isinstance(flow, Steps):
+            return _hermite(*flow.states(at)), inputs
+        return mesh.of_states(motion.X, flow.values(at)[:, :-1]), inputs
+
+    def _arguments(self, motion: Motion) -> np.ndarray:
+        mesh, N = self.mesh, len(self.mesh.at_state)
+        free = motion.p[list(self.problem.of.free)]
+        return np.hstack([motion.X[mesh.at_state], *[motion.U[mesh.at_inputs[:, k]] for k in range(mesh.at_inputs.shape[1])],
+                          np.broadcast_to(free, (N, len(free))), np.full((N, 1), motion.T)])
+
+    def errors(self, motion: Motion) -> np.ndarray:
+        """The error of each interval (K,): what the rates of the polynomials lack of those of the equations, integrated over it;
+        of shooting, how far steps of half the length lead elsewhere. Relative to the largest state or rate, plus 1.
+
+        Source: Betts, section 4.7.
+        """
+        mesh, n_x = self.mesh, self.problem.of.n_x
+        if mesh.kind == "shooting":
+            at = self._arguments(motion)
+            once, twice = self.flow().values(at), self.flow(2 * self.steps).values(at)
+            size = np.abs(motion.X).max(axis=0) + 1
+            return np.asarray((np.abs(twice - once)[:, :n_x] * 16 / 15 / size).max(axis=1))
+        shares, weights = gauss_points(mesh.breaks)
+        x, u = self.polynomials(motion)
+        flat, free = shares.ravel(), motion.p[list(self.problem.of.free)]
+        at = np.hstack([x(flat), u(flat), np.broadcast_to(free, (len(flat), len(free))), np.full((len(flat), 1), motion.T)])
+        F = self.field(flat).values(at)[:, :n_x]
+        lacking = np.abs(x.derivative()(flat) - F).reshape(*shares.shape, n_x)
+        size = np.maximum(np.abs(motion.X).max(axis=0), np.abs(F).max(axis=0) / motion.T) + 1
+        return np.asarray((np.einsum("kg,kgi->ki", weights, lacking) / size).max(axis=1))
+
+
+    def transversal(self, motion: Motion) -> float:
+        """How far the normals of the constraints at this motion are from lying in those of the guess: the smallest singular value
+        of their products, 1 for none."""
+        t = self.problem.t0 + self.mesh.breaks[1:] * motion.T
+        now = normals(self.problem.module, t, motion.X[self.mesh.ends[1:]], motion.p, self.rows_of_loops)
+        return float(np.linalg.svd(np.einsum("kxi,kxj->kij", self.normals, now), compute_uv=False).min())
+
+    def multipliers(self, lam: np.ndarray) -> dict[str, np.ndarray]:
+        """Those of conditions of the user, by their texts."""
+        found: dict[str, list[float]] = {}
+        for label in self.program.labels:
+            if label.soft:
+                for k in range(label.n):
+                    found.setdefault(label.text + label.entries[k % len(label.entries)], []).append(float(lam[label.first + k]))
+        return {text: np.array(values) for text, values in found.items()}
+
+    def costates(self, lam: np.ndarray, T: float) -> tuple[np.ndarray, np.ndarray]:
+        """Times (n,), s, and the costates there, (n, n_x): a defect d of the state across an interval changes the cost by
+        -lam d."""
+        mesh, n_x = self.mesh, self.problem.of.n_x
+        if mesh.kind == "hermite-simpson":
+            rows, shares, weights = np.arange(1, 2 * mesh.n_intervals, 2), (mesh.breaks[1:] + mesh.breaks[:-1]) / 2, 1.0
+        elif mesh.kind == "radau":
+            rows, shares, weights = np.arange(mesh.E.shape[0]), mesh.share, mesh.b / mesh.W.diagonal()
+        else:
+            rows, shares, weights = np.arange(mesh.n_intervals), mesh.share, 1.0
+        first = next(label.first for label in self.program.labels if label.text.startswith(MOTION))
+        values = -lam[first + rows[:, None] * n_x + np.arange(n_x)]
+        return self.problem.t0 + shares * T, values / np.broadcast_to(weights, len(rows))[:, None]
+
+
+@dataclass
+class _Part:
+    """Rows of g: L z + A F between bounds."""
+
+    m: int
+    L: sp.csr_matrix | None
+    block: Block | None
+    least: np.ndarray
+    most: np.ndarray
+    labels: list[Label]
+
+
+class _Sum:
+    """A variable itself, as Rows."""
+
+    slopes, curvature = np.ones((1, 1), dtype=bool), np.zeros((1, 1), dtype=bool)
+
+    def values(self, at: np.ndarray) -> np.ndarray:
+        return at
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        return np.ones((len(at), 1, 1))
+
+    def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        return np.zeros((len(at), 1, 1))
+
+
+def _hermite(shares: np.ndarray, states: np.ndarray, slopes: np.ndarray) -> PPoly:
+    """Cubic polynomials through states and slopes (K, n + 1, n_x) at shares (K, n + 1)."""
+    n_x = states.shape[2]
+    h = np.diff(shares, axis=1)[:, :, None]
+    change = np.diff(states, axis=1) / h
+    first, last = slopes[:, :-1], slopes[:, 1:]
+    c = [(first + last - 2 * change) / h**2, (3 * change - 2 * first - last) / h, first, states[:, :-1]]
+    breaks = np.append(shares[:, :-1].ravel(), shares[-1, -1])
+    return PPoly(np.array([part.reshape(-1, n_x) for part in c]), breaks)

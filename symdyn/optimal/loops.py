@@ -1,0 +1,95 @@
+"""Constraints of closed loops along a motion: kept at the ends of the intervals, for positions and for velocities.
+
+The rates of the state keep the constraints by themselves, along with the defects they would be too many equations. So the defects
+at the end of each interval have as many corrections more, along the normals of the constraints, as there are constraints there:
+they are of the size of the error of the mesh. Of dependent constraints an independent set is kept.
+Source: Posa, Kuindersma and Tedrake, Optimization and stabilization of trajectories for constrained dynamical systems, ICRA 2016.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg
+
+from symdyn.errors import EvaluationError
+from symdyn.optimal.field import Arguments
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Diagonal entries of the triangular factor below this part of the largest belong to dependent constraints.
+DEPENDENT = 1e-8
+
+
+class Loops:
+    """[C; C_dot] of independent constraints at points of a motion, as Rows of [x; free parameters].
+
+    p     (n_p,) values of all parameters; t: times of the points, (N,); rows: of [C; C_dot], that are kept
+    """
+
+    def __init__(self, module: Module, of: Arguments, p: np.ndarray, t: np.ndarray, rows: np.ndarray) -> None:
+        self.module, self.of, self.p, self.t, self.rows = module, of, p.copy(), t, rows
+        n_x, n_p = of.n_x, len(p)
+        self.n_c = len(module.metadata.constraints)
+        self._wrt = ("x", "params") if of.free else ("x",)
+        self._kept = np.array([*range(n_x), *(n_x + k for k in of.free)], dtype=int)
+        self._sizes = {"x": n_x, "params": n_p}
+        n = n_x + len(of.free)
+        self.slopes, self.curvature = np.ones((len(rows), n), dtype=bool), np.ones((n, n), dtype=bool)
+
+    def values(self, at: np.ndarray) -> np.ndarray:
+        return np.hstack([self._call(name, at, (self.n_c,)) for name in ("C", "C_dot")])[:, self.rows]
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        found = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, self._sizes[by])) for by in self._wrt], axis=2)
+                 for name in ("C", "C_dot")]
+        return np.concatenate(found, axis=1)[:, self.rows][:, :, self._kept]
+
+    def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        n = sum(self._sizes[by] for by in self._wrt)
+        whole = np.zeros((len(at), 2 * self.n_c))
+        whole[:, self.rows] = weights
+        given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), whole])
+        found = self._call(f"constraints_hessian_{'_'.join(self._wrt)}", at, (n, n), given)
+        return found[:, self._kept[:, None], self._kept]
+
+    def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
+        n_x = self.of.n_x
+        if self.of.free:
+            self.p = self.p.copy()
+            self.p[list(self.of.free)] = at[0, n_x:]
+        try:
+            return self.module.evaluate(name, self.t, at[:, :n_x], self.p, (), given)
+        except EvaluationError:
+            return np.full((len(at), *shape), np.nan)
+
+
+def independent_rows(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Which rows of [C; C_dot] imply the others at a state: velocity constraints have no row among those of C."""
+    n_c = len(module.metadata.constraints)
+    C_r = module.evaluate("C_r", t, x, p) * module.evaluate("C_scale", t, x, p)[:, None]
+    holonomic = np.array(module.metadata.holonomic or [True] * n_c, dtype=bool)
+    return np.array([*_independent(C_r, np.flatnonzero(holonomic)), *(n_c + k for k in _independent(C_r, np.arange(n_c)))],
+                    dtype=int)
+
+
+def _independent(C_r: np.ndarray, among: np.ndarray) -> list[int]:
+    if not len(among):
+        return []
+    _, R, order = scipy.linalg.qr(C_r[among].T, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    return sorted(int(among[k]) for k in order[:len(sizes)][sizes > DEPENDENT * sizes[0]])
+
+
+def normals(module: Module, t: np.ndarray, x: np.ndarray, p: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Directions (N, n_x, n) along which the state is corrected, orthonormal for positions and for velocities each."""
+    sizes, n_c = module.metadata.sizes, len(module.metadata.constraints)
+    C_r, N = module.evaluate("C_r", t, x, p), module.evaluate("N", t, x, p)
+    found = np.zeros((len(x), sizes.x, len(rows)))
+    of_positions, of_speeds = rows[rows < n_c], rows[rows >= n_c] - n_c
+    for k in range(len(x)):
+        found[k, :sizes.q, :len(of_positions)] = np.linalg.qr(N[k] @ C_r[k, of_positions].T)[0]
+        found[k, sizes.q:sizes.q + sizes.u, len(of_positions):] = np.linalg.qr(C_r[k, of_speeds].T)[0]
+    return found

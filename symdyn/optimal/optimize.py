@@ -1,0 +1,425 @@
+"""Optimal motions by direct methods: collocation and multiple shooting, on meshes that are refined where errors are too large."""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from symdyn.errors import ArgumentError, EvaluationError, NoOptimum, OptimumWarning, SymdynError
+from symdyn.optimal import ipopt, scipy_solvers
+from symdyn.optimal.discretized import Discretized, Motion
+from symdyn.optimal.ipopt import Found
+from symdyn.optimal.problem import Faults, Problem, problem_of
+from symdyn.optimal.result import MeshRecord, Optimum
+from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
+from symdyn.real_numbers import NotReal, real
+from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    import sympy as sp
+
+    from symdyn.given import ByName, Named, Numbers, Row, Values
+    from symdyn.runtime.losses import Loss
+    from symdyn.runtime.module import Module
+    from symdyn.runtime.solutions.solution import Solution
+
+    # By name or symbol: a number, or (least, most).
+    Limits: TypeAlias = Named[float] | Named[tuple[float, float]] | Named[float | tuple[float, float]]
+    # The same, None for any value; or a whole state in order.
+    Ends: TypeAlias = Row | Limits | Named[float | None] | Named[float | tuple[float, float] | None]
+
+TRANSCRIPTIONS = ("hermite-simpson", "radau", "shooting")
+METHODS = ("ipopt", *scipy_solvers.METHODS)
+# An interval is cut into so many at most, by one refinement; no mesh has more intervals; steps of shooting in an interval.
+PARTS, MOST_INTERVALS, MOST_STEPS = 4, 2000, 512
+# Degrees of Radau's method: the inputs between its points are at most cubic, as tables have them.
+DEGREES = (1, 2, 3, 4)
+# What the elastic problem must miss for the problem to be infeasible.
+MISSED = 1e-6
+# Of normals at the guess and at the solution: where the smallest singular value of their products is less, they are taken again.
+TRANSVERSAL = 0.5
+
+
+def optimize(module: Module, cost: Loss, duration: float | tuple[float, float], start: Ends | str | None = None,
+             end: Ends | None = None, *, bounds: Limits | None = None, rates: Limits | None = None,
+             path: Sequence[sp.Basic] = (), boundary: Sequence[sp.Basic] = (), parameters: Limits | None = None,
+             params: Values | None = None, inputs: Numbers | None = None, t: float = 0.0,
+             guess: Solution | Optimum | ByName | None = None, transcription: str = "hermite-simpson", intervals: int | Row = 20,
+             degree: int = 3, steps: int = 4, hold: bool = False, tolerance: float | None = 1e-6, max_refinements: int = 6,
+             method: str = "ipopt", accuracy: float = 1e-8, max_iterations: int = 1000,
+             options: Mapping[str, str | float] | None = None, verbose: bool = False) -> Optimum:
+    """The motion of least cost between a start and an end, with its inputs and free parameters.
+
+    cost         sd.Loss of expressions: integral of coordinates, speeds, extra states, inputs, parameters and sd.t; end of these
+                 at the end and of values at the start, called "q1(0)"
+    duration     s; or (least, most) for one that is found
+    start, end   by name or symbol: a number, (least, most), or None for any value; or a whole state in order. A state that start
+                 leaves out has the system's initial value, one that end leaves out is free; start="free": all are
+    bounds       of states and inputs at all times: name -> (least, most); rates: of the rates of inputs, by the input's name,
+                 1/s; inputs that have them are continuous
+    path, boundary   conditions at all times, and on both ends: relations sp.Eq(a, b), a <= b, a >= b of expressions as in the
+                 cost
+    parameters   those that are free: name -> (least, most); params: values of all parameters, where the search begins of these
+    inputs       constant inputs that are prescribed, by name
+    t            time at the start, s
+    guess        a Solution, an Optimum, or a mapping: "t" -> times (n,), states and inputs -> values (n,), free parameters ->
+                 numbers; what is left out goes straight from the start to the end
+    transcription   "hermite-simpson": cubic states, order 4; "radau": collocation at `degree` points, 1 to 4, of order
+                 2 degree - 1; "shooting": `steps` of Runge and Kutta's method in each interval, with inputs that are constant
+                 there (hold) or straight
+    intervals    of the first mesh, or its ends as shares of the duration from 0 to 1
+    tolerance    error of each interval, relative, up to which the mesh is refined, max_refinements times; None: it is not
+    method       "ipopt", by CasADi (pip install 'symdyn[opt]'), or SciPy's "slsqp" or "trust-constr", for small problems
+    accuracy, max_iterations, options   of the solver; options: IPOPT's own; verbose: print its iterations
+
+    Constraints of closed loops are kept at the ends of all intervals, for positions and velocities. All derivatives are exact.
+    The result is simulated back. Raises ArgumentError with all faults, NoOptimum with what is violated and by how much, whose
+    `optimum` is what was computed; EvaluationError for a cost that is not finite; MissingExtra where IPOPT is not installed. An
+    OptimumWarning reports errors above the tolerance on the last mesh.
+
+    >>> x = sd.coordinates("x")
+    >>> F = sd.inputs("F")
+    >>> system = sd.System("slider")
+    >>> body = system.add_body("body", mass=1)
+    >>> slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x))
+    >>> system.add_joint_force(slide, F)
+    >>> found = sd.optimize(system.compile(), sd.Loss(end=sd.t), (0.1, 10), end={x: 1, x.dot: 0}, bounds={F: (-1, 1)},
+    ...                     transcription="shooting", hold=True)
+    >>> round(found.duration, 6)  # bang-bang: 2 sqrt(1 m/(1 m/s^2))
+    2.0
+    """
+    begun = clock.perf_counter()
+    faults = Faults(module.name)
+    chosen = _Chosen.of(transcription, intervals, degree, steps, hold, tolerance, max_refinements, method, accuracy,
+                        max_iterations, options, verbose, faults)
+    try:
+        problem = problem_of(module, cost, duration, start, end, bounds, rates, path, boundary, parameters, params, inputs, t)
+    except ArgumentError as error:
+        faults.add(str(error).removeprefix(f"{module.name}: "))
+    faults.demand_none()
+    assert chosen is not None
+    course = _guess(problem, guess, faults)
+    faults.demand_none()
+    if method == "ipopt":
+        ipopt.casadi()
+    return _Search(problem, chosen, course, begun).run()
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """How it is optimized, checked."""
+
+    kind: str
+    breaks: np.ndarray
+    degree: int
+    steps: int
+    hold: bool
+    tolerance: float | None
+    max_refinements: int
+    method: str
+    accuracy: float
+    max_iterations: int
+    options: Mapping[str, Any]
+    verbose: bool
+
+    @classmethod
+    def of(cls, kind: Any, intervals: Any, degree: Any, steps: Any, hold: Any, tolerance: Any, refinements: Any, method: Any,
+           accuracy: Any, iterations: Any, options: Any, verbose: Any, faults: Faults) -> _Chosen | None:
+        """Adds what does not fit to the faults."""
+        n = len(faults.found)
+        for what, value, there in (("transcription", kind, TRANSCRIPTIONS), ("method", method, METHODS)):
+            if not isinstance(value, str) or value not in there:
+                faults.add(f"{what} is {shown(value)}; there are {', '.join(map(repr, there))}")
+        for what, value, least, most in (("degree", degree, 1, DEGREES[-1]), ("steps", steps, 1, MOST_STEPS),
+                                         ("max_refinements", refinements, 0, 100), ("max_iterations", iterations, 1, 10**9)):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+                faults.add(f"{what} is {shown(value)}; pass a whole number from {least} to {most}")
+        for what, value in (("tolerance", tolerance), ("accuracy", accuracy)):
+            fits = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and 0 < value < 1
+            if not fits and not (what == "tolerance" and value is None):
+                or_none = ", or None" if what == "tolerance" else ""
+                faults.add(f"{what} is {shown(value)}; pass a number between 0 and 1{or_none}")
+        breaks = _breaks(intervals, faults)
+        if options is not None and not isinstance(options, Mapping):
+            faults.add(f"options is {shown(options)}; pass a mapping from names of IPOPT's options to values")
+        if len(faults.found) > n:
+            return None
+        return cls(kind, breaks, int(degree), int(steps), bool(hold), tolerance, int(refinements), method, float(accuracy),
+                   int(iterations), dict(options or {}), bool(verbose))
+
+    def mesh(self, breaks: np.ndarray) -> Transcription:
+        """The transcription on a mesh."""
+        if self.kind == "radau":
+            return radau(breaks, self.degree)
+        return hermite_simpson(breaks) if self.kind == "hermite-simpson" else shooting(breaks, self.hold)
+
+
+def _breaks(intervals: Any, faults: Faults) -> np.ndarray:
+    if isinstance(intervals, (int, np.integer)) and not isinstance(intervals, bool):
+        if 1 <= intervals <= MOST_INTERVALS:
+            return np.linspace(0.0, 1.0, int(intervals) + 1)
+    else:
+        try:
+            found = real(intervals)
+            if found.ndim == 1 and len(found) > 1 and found[0] == 0 and found[-1] == 1 and (np.diff(found) > 0).all():
+                return found
+        except NotReal:
+            pass
+    faults.add(f"intervals is {shown(intervals)}; pass a whole number from 1 to {MOST_INTERVALS}, or increasing numbers from 0 "
+               "to 1")
+    return np.array([0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class _Course:
+    """A guess: state and inputs over shares of the duration; parameters and duration."""
+
+    x: Any
+    inputs: Any
+    p: np.ndarray
+    T: float
+
+    def on(self, mesh: Transcription) -> Motion:
+        """At the nodes and samples of a mesh."""
+        middle = mesh.samples if mesh.kind != "shooting" or len(mesh.samples) == len(mesh.breaks) else (
+            mesh.breaks[1:] + mesh.breaks[:-1]) / 2
+        return Motion(np.asarray(self.x(mesh.nodes)), np.asarray(self.inputs(middle)), self.p, self.T)
+
+
+def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
+    """The course that the search begins with. Adds what does not fit to the faults."""
+    metadata, p = problem.module.metadata, problem.p.copy()
+    T = float(problem.duration.mean())
+    begin = _middle(problem.start, np.array([metadata.initial.get(n, 0.0) for n in metadata.x]))
+    ends = [begin, _middle(problem.end, begin)]
+    idle = np.array([metadata.initial.get(n, 0.0) for n in metadata.inputs])
+    columns = {n: ([0.0, 1.0], [ends[0][k], ends[1][k]]) for k, n in enumerate(metadata.x)}
+    columns |= {n: ([0.0, 1.0], [v, v]) for n, v in zip(metadata.inputs, np.clip(idle, *problem.inputs), strict=True)}
+    if given is not None and not isinstance(given, Mapping):
+        given = _of_motion(given, faults)
+    if given:
+        by_name = {str(name_of(key)): value for key, value in given.items()}
+        times = None
+        if "t" in by_name:
+            times = _row(by_name.pop("t"), "t", faults)
+            if times is not None and (len(times) < 2 or (np.diff(times) <= 0).any()):
+                faults.add("t of the guess must be two or more increasing times")
+                times = None
+            elif times is not None:
+                T = float(np.clip(times[-1] - times[0], *problem.duration))
+        for key, value in by_name.items():
+            name = faults.name(key, (*columns, *problem.free, "t"), "guess")
+            row = _row(value, key, faults) if name is not None else None
+            if name is None or row is None:
+                continue
+            if name in problem.free:
+                p[metadata.parameters.index(name)] = row.ravel()[0]
+                continue
+            n = 1 if row.ndim == 0 else len(row)
+            shares = np.linspace(0, 1, max(n, 2)) if times is None else (times - times[0]) / (times[-1] - times[0])
+            if row.ndim == 0:
+                columns[name] = ([0.0, 1.0], [float(row)] * 2)
+            elif len(shares) != n:
+                faults.add(f"{name} of the guess has {n} values, and t has {len(shares)}")
+            else:
+                columns[name] = (shares.tolist(), row.tolist())
+    course = lambda names: lambda share: np.column_stack([np.interp(share, *columns[n]) for n in names]) if len(names) else (
+        np.zeros((len(share), 0)))
+    return _Course(course(metadata.x), course(metadata.inputs), p, T)
+
+
+def _middle(bounds: np.ndarray, left_out: np.ndarray) -> np.ndarray:
+    """Of bounds (2, n): their middle, the finite one, or what stands for none."""
+    low, high = bounds
+    both = np.isfinite(low) & np.isfinite(high)
+    found = np.where(both, (np.where(both, low, 0) + np.where(both, high, 0)) / 2, left_out)
+    return np.asarray(np.clip(found, low, high))
+
+
+def _of_motion(given: Any, faults: Faults) -> dict[str, Any]:
+    """A Solution or an Optimum as a mapping."""
+    try:
+        metadata = given.module.metadata
+        free = {**given.values} if isinstance(given, Optimum) else {}
+        inputs = np.broadcast_to(given.inputs, (len(given.t), len(metadata.inputs)))
+        return {"t": given.t, **dict(zip((*metadata.x, *metadata.inputs), np.hstack([given.x, inputs]).T, strict=True)), **free}
+    except (AttributeError, ValueError):
+        faults.add(f"guess is {shown(given)}; pass a Solution, an Optimum, or a mapping from names to values")
+        return {}
+
+
+def _row(value: Any, name: str, faults: Faults) -> np.ndarray | None:
+    try:
+        found = real(value)
+    except NotReal as error:
+        faults.add(f"{name} of the guess must be numbers, found {shown(value)}: {error}")
+        return None
+    if found.ndim > 1 or not np.isfinite(found).all():
+        faults.add(f"{name} of the guess must be finite numbers in a row, found the shape {found.shape}")
+        return None
+    return found
+
+
+@dataclass(eq=False)
+class _Search:
+    """Solves on one mesh after the other."""
+
+    problem: Problem
+    chosen: _Chosen
+    course: _Course
+    begun: float
+
+    def run(self) -> Optimum:
+        """See optimize."""
+        chosen, problem = self.chosen, self.problem
+        breaks, steps, records = chosen.breaks, chosen.steps, list[MeshRecord]()
+        course = self.course
+        tolerance = chosen.tolerance
+        while True:
+            made, found = self._solved(breaks, steps, course, bool(records))
+            motion = made.motion(found.z)
+            errors = made.errors(motion) if np.isfinite(found.z).all() else np.full(made.mesh.n_intervals, np.nan)
+            records.append(MeshRecord(made.mesh.n_intervals, steps, found.iterations, found.cost, float(errors.max()),
+                                      self._lap()))
+            if not found.solved:
+                raise self._failed(made, found, errors, records)
+            too_large = tolerance is not None and bool((errors > tolerance).any())
+            if not too_large or len(records) > chosen.max_refinements:
+                break
+            assert tolerance is not None
+            finer = self._refined(made, errors, tolerance, breaks, steps)
+            if finer is None:
+                break
+            breaks, steps = finer
+            x, u = made.polynomials(motion)
+            course = _Course(x, u, motion.p, motion.T)
+        optimum = self._optimum(made, found, errors, records)
+        if too_large:
+            warnings.warn(f"{problem.module.name}: the error of an interval is {optimum.error:.2g} after {len(records)} meshes, "
+                          f"above the tolerance {tolerance:g}; allow more refinements, or pass a larger tolerance",
+                          OptimumWarning, stacklevel=3)
+        return optimum
+
+    def _lap(self) -> float:
+        now = clock.perf_counter()
+        lap, self._last = now - getattr(self, "_last", self.begun), now
+        return lap
+
+    def _solved(self, breaks: np.ndarray, steps: int, course: _Course, refined: bool) -> tuple[Discretized, Found]:
+        """The solution on a mesh; once more where the normals of constraints have turned too far from those of the guess."""
+        mesh = self.chosen.mesh(breaks)
+        guess = course.on(mesh)
+        for _ in range(4):
+            made = Discretized(self.problem, mesh, steps, guess)
+            self._demand_finite(made)
+            found = self._solve(made)
+            if not found.solved or not len(made.rows_of_loops) or made.transversal(made.motion(found.z)) > TRANSVERSAL:
+                break
+            guess = made.motion(found.z)
+        return made, found
+
+    def _solve(self, made: Discretized) -> Found:
+        chosen = self.chosen
+        if chosen.method == "ipopt":
+            return ipopt.solve(made.program, made.z, chosen.accuracy, chosen.max_iterations, chosen.options, chosen.verbose)
+        return scipy_solvers.solve(made.program, made.z, chosen.accuracy, chosen.max_iterations, chosen.method)
+
+    def _demand_finite(self, made: Discretized) -> None:
+        """Raises EvaluationError where cost or constraints are not finite at the guess."""
+        owner, program = self.problem.module.name, made.program
+        if not np.isfinite(program.f(made.z)) or not np.isfinite(program.gradient(made.z)).all():
+            raise EvaluationError(f"{owner}: the cost, or its derivative, is not finite at the guess: {program.f(made.z):g}; "
+                                  "pass another guess, or bounds where it is finite")
+        wrong = np.flatnonzero(~np.isfinite(program.g(made.z)))
+        if len(wrong):
+            raise EvaluationError(f"{owner}: {made.text(program, int(wrong[0]))} cannot be evaluated at the guess; pass another "
+                                  "guess")
+
+    def _refined(self, made: Discretized, errors: np.ndarray, tolerance: float, breaks: np.ndarray,
+                 steps: int) -> tuple[np.ndarray, int] | None:
+        """The next mesh: intervals cut, steps of shooting halved, by the order of their errors; None: it would be too fine."""
+        order = made.mesh.order
+        if made.mesh.kind == "shooting":
+            more = int(np.ceil(steps * np.clip((errors.max() / tolerance) ** (1 / order), 1.2, 4)))
+            return (breaks, more) if more <= MOST_STEPS else None
+        parts = np.where(errors > tolerance, np.clip(np.ceil((errors / tolerance) ** (1 / order)), 2, PARTS), 1).astype(int)
+        if parts.sum() > MOST_INTERVALS:
+            return None
+        finer = [breaks[k] + (breaks[k + 1] - breaks[k]) * np.arange(n) / n for k, n in enumerate(parts)]
+        return np.append(np.concatenate(finer), 1.0), steps
+
+    def _optimum(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord]) -> Optimum:
+        problem, mesh, motion = self.problem, made.mesh, made.motion(found.z)
+        x, u = made.polynomials(motion)
+        in_time = lambda poly: PPoly(poly.c / motion.T ** np.arange(len(poly.c) - 1, -1, -1.0)[:, None, None],
+                                     problem.t0 + poly.x * motion.T)
+        x, u = in_time(x), in_time(u)
+        t = problem.t0 + mesh.nodes * motion.T
+        metadata = problem.module.metadata
+        optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
+                          {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
+                          motion.T, sum(r.iterations for r in records), tuple(records), float(errors.max()), errors, {}, None,
+                          made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
+                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, x, u)
+        simulated = None
+        difference = dict.fromkeys(metadata.x, np.nan)
+        if np.isfinite(found.z).all():
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    simulated = optimum.simulate()
+                if simulated.success:
+                    difference = dict(zip(metadata.x, np.abs(simulated.x - motion.X).max(axis=0).tolist(), strict=True))
+            except SymdynError:
+                pass  # the difference is not a number, which says so
+        return replace(optimum, simulated=simulated, difference=difference, seconds=clock.perf_counter() - self.begun)
+
+    def _kind(self, mesh: Transcription) -> str:
+        if mesh.kind == "radau":
+            return f"Gauss-Radau of degree {mesh.degree}"
+        return "Hermite-Simpson" if mesh.kind == "hermite-simpson" else "multiple shooting"
+
+    def _failed(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord]) -> NoOptimum:
+        """What to raise: what is violated, and by how much."""
+        owner = self.problem.module.name
+        optimum = self._optimum(made, found, errors, records)
+        used_up = found.iterations >= self.chosen.max_iterations
+        head = f"{owner}: no optimal motion was found in {optimum.iterations} iterations ({found.message})"
+        if used_up:
+            return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess",
+                             optimum)
+        try:
+            begin = made.motion(found.z) if np.isfinite(found.z).all() else made.guess
+            elastic = Discretized(self.problem, made.mesh, made.steps, begin, elastic=True)
+            nearest = self._solve(elastic)
+        except (SymdynError, RuntimeError):
+            return NoOptimum(f"{head}; {self._worst(made, found.z)}", optimum)
+        s = nearest.z[elastic.layout.n:].reshape(2, -1)
+        missed = np.abs(s[0] - s[1])
+        if not nearest.solved:
+            return NoOptimum(f"{head}; {self._worst(made, found.z)}; begin with another guess", optimum)
+        if missed.max(initial=0.0) <= MISSED:
+            return NoOptimum(f"{head}; a motion that fulfils all conditions exists, so begin with another guess: "
+                             f"{self._worst(made, found.z)}", optimum)
+        told = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
+                for k in np.argsort(-missed)[:4] if missed[k] > MISSED]
+        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(told)}",
+                         optimum)
+
+    def _worst(self, made: Discretized, z: np.ndarray) -> str:
+        """The largest violation where the solver ended."""
+        missing = made.program.violations(z)
+        if np.isnan(missing).any():
+            return "the last point cannot be evaluated"
+        row = int(missing.argmax()) if len(missing) else 0
+        if not len(missing) or missing[row] <= self.chosen.accuracy:
+            return "all conditions are fulfilled there, and the cost is not at its minimum"
+        return f"the largest violation left is {missing[row]:.3g}, of {made.text(made.program, row)}"

@@ -1,0 +1,298 @@
+"""What is optimized, checked: bounds, ends, constraints and costs, in the order of the module's names."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+from sympy.logic.boolalg import BooleanFalse, BooleanTrue
+
+from symdyn.arguments import take
+from symdyn.errors import ArgumentError, UnsupportedExpression
+from symdyn.optimal.expressions import Expressions
+from symdyn.optimal.field import Arguments, structure_of
+from symdyn.real_numbers import NotReal, number
+from symdyn.runtime.losses import Loss
+from symdyn.runtime.masses import real_parameters
+from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+FREE = (-np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Expressions between bounds: least <= values <= most, (m,); texts: as the user wrote them."""
+
+    expressions: Expressions
+    least: np.ndarray
+    most: np.ndarray
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """See `optimize` for what these are. Pairs of bounds are (2, n): least and most.
+
+    p          (n_p,) values of all parameters, guesses of the free ones; duration (2,), equal if it is prescribed
+    start, end, states, inputs, rates, params   bounds, (2, n); params: of the free ones
+    integrand  by [x; inputs; free parameters; t]; path: at all times, by the same
+    end_cost, boundary   by [x at the start; x; inputs; free parameters; t], at the end
+    """
+
+    module: Module
+    of: Arguments
+    p: np.ndarray
+    t0: float
+    duration: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    states: np.ndarray
+    inputs: np.ndarray
+    rates: np.ndarray
+    params: np.ndarray
+    integrand: Expressions
+    end_cost: Expressions
+    path: Conditions
+    boundary: Conditions
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the free parameters."""
+        return tuple(self.module.metadata.parameters[k] for k in self.of.free)
+
+
+class Faults:
+    """Collects what does not fit, to be raised at once."""
+
+    def __init__(self, owner: str) -> None:
+        self.owner, self.found = owner, list[str]()
+
+    def add(self, fault: str) -> None:
+        self.found.append(fault)
+
+    def demand_none(self) -> None:
+        """Raises ArgumentError with all of them."""
+        if self.found:
+            raise ArgumentError(f"{self.owner}: {'; '.join(self.found)}")
+
+    def name(self, key: Any, there: Sequence[str], what: str) -> str | None:
+        """The name of a key that is there; None, and a fault, where it is not."""
+        name = str(name_of(key))
+        if name in there:
+            return name
+        near = difflib.get_close_matches(name, there, 3)
+        self.add(f"{what} has {shown(name)}, which is not there; " + (f"did you mean {' or '.join(near)}?" if near else
+                                                                    f"there are {', '.join(there) or 'none'}"))
+        return None
+
+
+def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, bounds: Any, rates: Any, path: Any, boundary: Any,
+               parameters: Any, params: Any, inputs: Any, t: Any) -> Problem:
+    """The problem, checked. Raises ArgumentError with all faults."""
+    metadata, faults = module.metadata, Faults(module.name)
+    if metadata.motions:
+        raise ArgumentError(f"{module.name}: optimize was asked for a mechanism with motions as inputs "
+                            f"({', '.join(metadata.motions)}), whose rates and accelerations are not free; make the joint a "
+                            "coordinate and drive it by a force")
+    resets = [event.name for event in metadata.events if event.reset]
+    if resets:
+        raise ArgumentError(f"{module.name}: optimize was asked for a motion, and the events {', '.join(resets)} reset the "
+                            "state; a motion is optimized between two of them: leave the events out, and write what they do as "
+                            "boundary conditions")
+    free_bounds = _free_parameters(metadata, parameters, faults)
+    names = list(free_bounds)
+    p = _values_of_parameters(module, params, free_bounds)
+    of = Arguments(len(metadata.x), len(metadata.inputs), tuple(metadata.parameters.index(n) for n in names))
+    for name, (low, high) in free_bounds.items():
+        value = p[metadata.parameters.index(name)]
+        if not low <= value <= high:
+            faults.add(f"the value {value:g} of parameter {name}, from which the search begins, is not between its bounds "
+                       f"({low:g}, {high:g}); pass another one in params")
+    t0 = _number(t, faults, "t, the time at the start,")
+    T = _duration(duration, faults)
+    limits = _pairs(bounds, (*metadata.x, *metadata.inputs), "bounds", faults)
+    states = np.array([limits.get(n, FREE) for n in metadata.x]).reshape(-1, 2).T
+    of_inputs = np.array([limits.get(n, FREE) for n in metadata.inputs]).reshape(-1, 2).T
+    for name, value in _pairs(inputs, metadata.inputs, "inputs", faults, single=True).items():
+        of_inputs[:, metadata.inputs.index(name)] = value
+        if name in limits:
+            faults.add(f"{name} has bounds and a prescribed value; leave one of them out")
+    found_rates = _pairs(rates, metadata.inputs, "rates", faults)
+    of_rates = np.array([found_rates.get(n, FREE) for n in metadata.inputs]).reshape(-1, 2).T
+    begin, stop = _ends(metadata, start, end, states, faults)
+    point = (*metadata.x, *metadata.inputs, *names, "t")
+    both = (*[f"{n}(0)" for n in metadata.x], *point)
+    constants = {n: float(v) for n, v in zip(metadata.parameters, p, strict=True) if n not in names}
+    if not isinstance(cost, Loss):
+        faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...) with expressions")
+        cost = Loss(integral=0)
+    integrand = _expressions([_expression(cost.integral, "the integral of the cost", point, constants, faults)], point, constants,
+                             faults, "the integral of the cost")
+    end_cost = _expressions([_expression(cost.end, "the end of the cost", both, constants, faults)], both, constants, faults,
+                            "the end of the cost")
+    along = _conditions(path, "path", point, constants, faults)
+    at_ends = _conditions(boundary, "boundary", both, constants, faults)
+    if not faults.found and T[0] < T[1] and _depends_on_time(module, p):
+        faults.add("the duration is free, and the equations of motion depend on t, by which there are no second derivatives; "
+                   "give the duration as a number")
+    faults.demand_none()
+    assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
+    params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
+    return Problem(module, of, p, t0, T, begin, stop, states, of_inputs, of_rates, params_bounds, integrand, end_cost, along,
+                   at_ends)
+
+
+def _free_parameters(metadata: Any, given: Any, faults: Faults) -> dict[str, tuple[float, float]]:
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        faults.add(f"parameters is {shown(given)}; pass a mapping from names to bounds (least, most)")
+        return {}
+    found = _pairs(given, metadata.parameters, "parameters", faults)
+    return {n: found[n] for n in metadata.parameters if n in found}
+
+
+def _values_of_parameters(module: Module, params: Any, free: Mapping[str, tuple[float, float]]) -> np.ndarray:
+    """Values of all parameters; a free one without a value begins in the middle of its bounds."""
+    metadata = module.metadata
+    defaults = dict(zip(metadata.parameters, metadata.defaults, strict=True))
+    given = {str(name_of(key)) for key in params} if isinstance(params, Mapping) else set()
+    if params is None or isinstance(params, Mapping):
+        middle = {name: (low + high) / 2 for name, (low, high) in free.items()
+                  if name not in given and defaults[name] is None and np.isfinite(low + high)}
+        params = {**{str(name_of(key)): value for key, value in (params or {}).items()}, **middle}
+    return np.array(real_parameters(module, params))
+
+
+def _number(value: Any, faults: Faults, what: str) -> float:
+    try:
+        found = number(value)
+    except NotReal:
+        found = np.nan
+    if not np.isfinite(found):
+        faults.add(f"{what} is {shown(value)}; pass a finite number")
+        return 0.0
+    return found
+
+
+def _duration(given: Any, faults: Faults) -> np.ndarray:
+    pair = given if isinstance(given, (list, tuple)) else (given, given)
+    try:
+        found = np.array([number(v) for v in pair])
+    except NotReal:
+        found = np.zeros(0)
+    if found.shape != (2,) or not np.isfinite(found).all() or not 0 < found[0] <= found[1]:
+        faults.add(f"duration is {shown(given)}; pass a positive number of seconds, or (least, most) for one that is free")
+        return np.ones(2)
+    return found
+
+
+def _pairs(given: Any, there: Sequence[str], what: str, faults: Faults, single: bool = False) -> dict[str, tuple[float, float]]:
+    """Name -> (least, most); a number stands for both, None for no bounds."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        faults.add(f"{what} is {shown(given)}; pass a mapping from names or symbols")
+        return {}
+    found = {}
+    for key, value in given.items():
+        name = faults.name(key, there, what)
+        pair = FREE if value is None and not single else value if isinstance(value, (list, tuple)) else (value, value)
+        try:
+            numbers = tuple(number(v) for v in pair)
+        except NotReal:
+            numbers = ()
+        if name is None:
+            continue
+        if len(numbers) != 2 or np.isnan(numbers).any() or (single and numbers[0] != numbers[1]):
+            faults.add(f"{what} of {name} is {shown(value)}; pass " + ("a number" if single else "a number or (least, most)"))
+        elif numbers[0] > numbers[1] or np.inf == numbers[0] or -np.inf == numbers[1]:
+            faults.add(f"{what} of {name} contradict each other: at least {numbers[0]:g} and at most {numbers[1]:g}")
+        else:
+            found[name] = (numbers[0], numbers[1])
+    return found
+
+
+def _ends(metadata: Any, start: Any, end: Any, states: np.ndarray, faults: Faults) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the state at the start and at the end, (2, n_x) each."""
+    found = []
+    for what, given in (("start", start), ("end", end)):
+        left_out = {n: (metadata.initial.get(n, 0.0),) * 2 if what == "start" else FREE for n in metadata.x}
+        if isinstance(given, str) and given == "free":
+            given = dict.fromkeys(metadata.x)
+        elif given is not None and not isinstance(given, Mapping):
+            try:
+                given = dict(zip(metadata.x, take(given, metadata.x, what, {}, "").tolist(), strict=True))
+            except ArgumentError as error:
+                faults.add(str(error).removeprefix(": "))
+                given = {}
+        pairs = {**left_out, **_pairs(given, metadata.x, what, faults)}
+        both = np.array([pairs[n] for n in metadata.x]).T
+        for name, (low, high), (least, most) in zip(metadata.x, both.T, states.T, strict=True):
+            if low > most or high < least:
+                faults.add(f"the {what} of {name}, {low:g}" + (f" to {high:g}" if high > low else "") + f", is outside of its "
+                           f"bounds ({least:g}, {most:g})")
+        found.append(np.array([np.maximum(both[0], states[0]), np.minimum(both[1], states[1])]))
+    return found[0], found[1]
+
+
+def _expression(given: Any, what: str, there: Sequence[str], constants: Mapping[str, float], faults: Faults) -> sp.Expr:
+    if given is None:
+        return sp.S.Zero
+    try:
+        found = sp.sympify(given, strict=True)
+        if not isinstance(found, sp.Expr):
+            raise TypeError
+    except (sp.SympifyError, TypeError):
+        faults.add(f"{what} is {shown(given)}; pass an expression of coordinates, speeds, inputs, parameters and sd.t: second "
+                   "derivatives are needed, which functions do not have")
+        return sp.S.Zero
+    unknown = sorted({str(s) for s in found.free_symbols} - {*there, *constants})
+    if unknown:
+        faults.add(f"{what} has {', '.join(unknown)}, which is not there; there are {', '.join((*there, *constants))}")
+        return sp.S.Zero
+    return found
+
+
+def _expressions(given: Sequence[sp.Expr], names: Sequence[str], constants: Mapping[str, float], faults: Faults,
+                 what: str) -> Expressions | None:
+    try:
+        return Expressions(given, names, constants)
+    except UnsupportedExpression as error:
+        faults.add(f"{what}: {error}")
+        return None
+
+
+def _conditions(given: Any, what: str, names: Sequence[str], constants: Mapping[str, float], faults: Faults) -> Conditions | None:
+    listed = list(given) if isinstance(given, (list, tuple)) else [given]
+    expressions, least, most, texts = [], [], [], []
+    for relation in listed:
+        if isinstance(relation, (bool, BooleanTrue, BooleanFalse)):
+            faults.add(f"a condition of {what} is {relation} whatever the motion is; it must depend on it")
+            continue
+        if not isinstance(relation, (sp.Eq, sp.Le, sp.Ge, sp.Lt, sp.Gt)):
+            faults.add(f"a condition of {what} is {shown(relation)}; write sp.Eq(a, b), a <= b or a >= b")
+            continue
+        expressions.append(_expression(relation.lhs - relation.rhs, f"the condition {relation} of {what}", names, constants,
+                                       faults))
+        least.append(-np.inf if isinstance(relation, (sp.Le, sp.Lt)) else 0.0)
+        most.append(np.inf if isinstance(relation, (sp.Ge, sp.Gt)) else 0.0)
+        texts.append(str(relation) if not isinstance(relation, sp.Eq) else f"{relation.lhs} = {relation.rhs}")
+    made = _expressions(expressions, names, constants, faults, what)
+    return None if made is None else Conditions(made, np.array(least), np.array(most), tuple(texts))
+
+
+def _depends_on_time(module: Module, p: np.ndarray) -> bool:
+    """Whether the rates depend on the time, by structure, or where this is not known by their values at two times."""
+    if getattr(module._provider, "structure", None) is not None:
+        return bool(structure_of(module, "rhs_by_t", (len(module.metadata.x), 1)).any())
+    x = np.array([module.metadata.initial.get(n, 0.0) for n in module.metadata.x]) + 0.1
+    first, second = (module.rhs(t, x, p) for t in (0.1, 0.7351))
+    return not np.array_equal(first, second)

@@ -1,0 +1,167 @@
+"""An optimal motion: its course at any time, its cost, how exact it is, and what follows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from symdyn.errors import ArgumentError
+from symdyn.real_numbers import real_of
+from symdyn.runtime.inputs.tables import ORDER, Pieces, Piecewise
+from symdyn.shown import name_of, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from symdyn.given import Key, PathName, Row, Times
+    from symdyn.optimal.tracking import Tracking
+    from symdyn.runtime.module import Module
+    from symdyn.runtime.solutions.solution import Solution
+    from symdyn.statics.regulator import Weights
+
+
+@dataclass(frozen=True)
+class MeshRecord:
+    """One mesh: intervals (of shooting also the steps in each), iterations, cost, largest error of an interval, time, s."""
+
+    n_intervals: int
+    steps: int
+    iterations: int
+    cost: float
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """An optimal motion of a module.
+
+    t, x, inputs   times of the nodes (n_t,), s, states (n_t, n_x) and inputs (n_t, n_in) there; a name or symbol as an index
+                   gives one of them over these times
+    params         all parameters (n_p,); values: those that were free, by name
+    cost, duration, iterations   iterations: on all meshes; meshes: what each of them took
+    error          largest error of an interval of the last mesh, relative: see docs/optimal_motion.md; errors: of all (K,)
+    simulated      the motion by `simulate` with these inputs; None where it cannot be computed
+    difference     by state: largest difference of it, in units of the state; NaN where it cannot be computed
+    multipliers    by condition: of the path (n,), of the boundary (1,); derivatives of the cost by what is demanded, with the
+                   sign of f + multipliers^T g; NaN where the solver has none
+    costates       (n, n_x) at costate_times (n,): derivatives of the cost by a shift of the state there; NaN likewise
+    success, message   whether the solver ended at a minimum, and why it ended
+    seconds        of the whole call
+
+    >>> module = sd.systems.cart_pole().compile()
+    >>> F = sd.inputs("F")
+    >>> there = {"q1": 0.5, "q2": 0, "q1_dot": 0, "q2_dot": 0}
+    >>> found = sd.optimize(module, sd.Loss(integral=F**2), 1.0, start={"q2": 0.0}, end=there, intervals=8, tolerance=None,
+    ...                     method="slsqp")
+    >>> found.x.shape, bool(abs(found["q1"][-1] - 0.5) < 1e-6)
+    ((17, 4), True)
+    """
+
+    module: Module
+    t: np.ndarray
+    x: np.ndarray
+    inputs: np.ndarray
+    params: np.ndarray
+    values: Mapping[str, float]
+    cost: float
+    duration: float
+    iterations: int
+    meshes: tuple[MeshRecord, ...]
+    error: float
+    errors: np.ndarray
+    difference: Mapping[str, float]
+    simulated: Solution | None
+    multipliers: Mapping[str, np.ndarray]
+    costate_times: np.ndarray
+    costates: np.ndarray
+    transcription: str
+    success: bool
+    message: str
+    seconds: float
+    breaks: np.ndarray
+    _states: PPoly = field(repr=False)
+    _inputs: PPoly = field(repr=False)
+
+    def __getitem__(self, name: Key) -> np.ndarray:
+        """A state or input over the times t, (n_t,). Raises ArgumentError for another name."""
+        metadata, asked = self.module.metadata, name_of(name)
+        if asked in metadata.x:
+            return self.x[:, metadata.x.index(asked)]
+        if asked in metadata.inputs:
+            return self.inputs[:, metadata.inputs.index(asked)]
+        raise ArgumentError(f"{self.module.name}: the optimal motion has no {shown(asked)}; it has "
+                            f"{', '.join((*metadata.x, *metadata.inputs))}")
+
+    def at(self, t: Times) -> np.ndarray:
+        """The state at a time, (n_x,), or at times, (n, n_x), by the polynomials of the transcription. Raises ArgumentError
+        beyond the motion."""
+        return np.asarray(self._states(self._within(t)))
+
+    def inputs_at(self, t: Times) -> np.ndarray:
+        """The inputs at a time, (n_in,), or at times, (n, n_in); where they jump, those after it. Raises ArgumentError beyond the
+        motion."""
+        return np.asarray(self._inputs(self._within(t)))
+
+    def _within(self, t: Any) -> np.ndarray:
+        times, slack = real_of(t, self.module.name, "t must be numbers"), 1e-9 * (1 + abs(self.t[-1]))
+        if not np.isfinite(times).all() or (times < self.t[0] - slack).any() or (times > self.t[-1] + slack).any():
+            raise ArgumentError(f"{self.module.name}: the optimal motion goes from t = {self.t[0]:g} to {self.t[-1]:g} s; found "
+                                f"{shown(t)}")
+        return np.clip(times, self.t[0], self.t[-1])
+
+    @property
+    def table(self) -> Piecewise:
+        """The inputs as `simulate` takes them, inputs=optimum.table: exactly these, steps end where intervals do."""
+        return as_table(self._inputs)
+
+    def simulate(self, t: Row | None = None, rtol: float = 1e-9, method: str | None = None) -> Solution:
+        """The motion from the same start with these inputs, integrated with error control; t: output times, default: the
+        nodes."""
+        sizes = self.module.metadata.sizes
+        q, u, z = np.split(self.x[0], [sizes.q, sizes.q + sizes.u])
+        return self.module.simulate(self.t if t is None else t, q, u, self.params, z=z, rtol=rtol, method=method, events=False,
+                                    inputs=self.table if sizes.inputs else None)
+
+    def lqr(self, Q: Weights, R: Weights, Qf: Weights | None = None) -> Tracking:
+        """The time-varying linear-quadratic regulator about the motion: inputs of least integral of dx^T Q dx + din^T R din and
+        dx^T Qf dx at the end.
+
+        Q, R, Qf   matrices, their diagonals, or weights by name or symbol: of the states (n_x,), of inputs, of the states at the
+                   end (default: the numbers of Q)
+        Returns a function of (t, x) for simulate(inputs=...). Raises ArgumentError for weights that do not fit.
+        """
+        from symdyn.optimal.tracking import tracking
+
+        return tracking(self, Q, R, Qf)
+
+    def plot(self, path: PathName | None = None) -> Figure:
+        """States, inputs and errors over time; written to a file if a path is given."""
+        from symdyn.pictures.optima import plot
+
+        return plot(self, path)
+
+    def __str__(self) -> str:
+        last = self.meshes[-1]
+        meshes = f"{len(self.meshes)} mesh{'es' if len(self.meshes) > 1 else ''}"
+        lines = [f"optimal motion of {self.module.name}: cost {self.cost:.9g}, {self.duration:.6g} s; {self.message}",
+                 f"  {self.transcription}, {meshes}, at last {last.n_intervals} intervals, {self.iterations} iterations, "
+                 f"{self.seconds:.2g} s",
+                 f"  error of an interval {self.error:.2g}; simulated back, the largest difference is "
+                 f"{max(self.difference.values(), default=0.0):.2g}"]
+        lines += [f"  {name} = {value:.9g}" for name, value in self.values.items()]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def as_table(inputs: PPoly) -> Piecewise:
+    """A piecewise polynomial of inputs as a table."""
+    c = np.zeros((inputs.c.shape[1], inputs.c.shape[2], ORDER))
+    c[:, :, :len(inputs.c)] = inputs.c[::-1].transpose(1, 2, 0)
+    return Piecewise(Pieces(inputs.x, c))
