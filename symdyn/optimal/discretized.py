@@ -324,18 +324,22 @@ class Discretized:
         return np.hstack([motion.X[mesh.at_state], *[motion.U[mesh.at_inputs[:, k]] for k in range(mesh.at_inputs.shape[1])],
                           np.broadcast_to(free, (N, len(free))), np.full((N, 1), motion.T)])
 
-    def errors(self, motion: Motion) -> np.ndarray:
+    def errors(self, z: np.ndarray) -> np.ndarray:
         """The error of each interval (K,): what the rates of the polynomials lack of those of the equations, integrated over it;
-        of shooting, how far steps of half the length lead elsewhere. Relative to the largest state or rate, plus 1.
+        of shooting, how far steps of half the length lead elsewhere; with the corrections that keep the constraints. Relative to
+        the largest state or rate, plus 1.
 
         Source: Betts, section 4.7.
         """
-        mesh, n_x = self.mesh, self.problem.of.n_x
+        mesh, n_x, motion = self.mesh, self.problem.of.n_x, self.motion(z)
+        corrections = np.abs(np.einsum("kxi,ki->kx", self.normals, z[self.layout.corrections]))
+        if mesh.kind == "radau":
+            corrections *= (mesh.b / mesh.W.diagonal())[-1]
         if mesh.kind == "shooting":
             at = self._arguments(motion)
             once, twice = self.flow().values(at), self.flow(2 * self.steps).values(at)
             size = np.abs(motion.X).max(axis=0) + 1
-            return np.asarray((np.abs(twice - once)[:, :n_x] * 16 / 15 / size).max(axis=1))
+            return np.asarray(((np.abs(twice - once)[:, :n_x] * 16 / 15 + corrections) / size).max(axis=1))
         shares, weights = gauss_points(mesh.breaks)
         x, u = self.polynomials(motion)
         flat, free = shares.ravel(), motion.p[list(self.problem.of.free)]
@@ -343,7 +347,7 @@ class Discretized:
         F = self.field(flat).values(at)[:, :n_x]
         lacking = np.abs(x.derivative()(flat) - F).reshape(*shares.shape, n_x)
         size = np.maximum(np.abs(motion.X).max(axis=0), np.abs(F).max(axis=0) / motion.T) + 1
-        return np.asarray((np.einsum("kg,kgi->ki", weights, lacking) / size).max(axis=1))
+        return np.asarray(((np.einsum("kg,kgi->ki", weights, lacking) + corrections) / size).max(axis=1))
 
 
     def transversal(self, motion: Motion) -> float:

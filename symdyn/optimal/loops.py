@@ -8,12 +8,13 @@ Source: Posa, Kuindersma and Tedrake, Optimization and stabilization of trajecto
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
 
-from symdyn.errors import EvaluationError
+from symdyn.errors import EvaluationError, SymdynError
 from symdyn.optimal.field import Arguments
 
 if TYPE_CHECKING:
@@ -81,6 +82,29 @@ def _independent(C_r: np.ndarray, among: np.ndarray) -> list[int]:
     _, R, order = scipy.linalg.qr(C_r[among].T, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     return sorted(int(among[k]) for k in order[:len(sizes)][sizes > DEPENDENT * sizes[0]])
+
+
+def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, leading: Sequence[str]) -> np.ndarray:
+    """Guesses X (N, n_x) at times, moved onto the constraints one after the other: leading coordinates stay as far as they can,
+    the others go on from the state before; speeds are those of this course. A state without a solution nearby stays as it is."""
+    metadata, sizes = module.metadata, module.metadata.sizes
+    found, q = X.copy(), X[0, :sizes.q]
+    led = np.array([name in leading for name in metadata.q], dtype=bool)
+    for k in range(len(X)):
+        guess = np.where(led, X[k, :sizes.q], q)
+        for keep in ([name for name in leading if name in metadata.q], []):
+            try:
+                q = module.consistent(guess, np.zeros(sizes.u), p, float(t[k]), keep)[0]
+                break
+            except SymdynError:
+                continue
+        found[k, :sizes.q] = q
+    rates = np.gradient(found[:, :sizes.q], t, axis=0)
+    N, C_r, C_t = (module.evaluate(name, t, found, p) for name in ("N", "C_r", "C_t"))
+    for k in range(len(X)):
+        rows, right = np.vstack([N[k], C_r[k]]), np.concatenate([rates[k], -C_t[k]])
+        found[k, sizes.q:sizes.q + sizes.u] = np.linalg.lstsq(rows, right, rcond=None)[0]
+    return found
 
 
 def normals(module: Module, t: np.ndarray, x: np.ndarray, p: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from symdyn.errors import ArgumentError, EvaluationError, NoOptimum, OptimumWarn
 from symdyn.optimal import ipopt, scipy_solvers
 from symdyn.optimal.discretized import Discretized, Motion
 from symdyn.optimal.ipopt import Found
+from symdyn.optimal.loops import on_constraints
 from symdyn.optimal.problem import Faults, Problem, problem_of
 from symdyn.optimal.result import MeshRecord, Optimum
 from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
@@ -180,12 +181,14 @@ def _breaks(intervals: Any, faults: Faults) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Course:
-    """A guess: state and inputs over shares of the duration; parameters and duration."""
+    """A guess: state and inputs over shares of the duration; parameters and duration; leading: coordinates that a guess has which
+    constraints are still to be fulfilled by, None for one that fulfils them."""
 
     x: Any
     inputs: Any
     p: np.ndarray
     T: float
+    leading: tuple[str, ...] | None = None
 
     def on(self, mesh: Transcription) -> Motion:
         """At the nodes and samples of a mesh."""
@@ -203,10 +206,11 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
     idle = np.array([metadata.initial.get(n, 0.0) for n in metadata.inputs])
     columns = {n: ([0.0, 1.0], [ends[0][k], ends[1][k]]) for k, n in enumerate(metadata.x)}
     columns |= {n: ([0.0, 1.0], [v, v]) for n, v in zip(metadata.inputs, np.clip(idle, *problem.inputs), strict=True)}
-    if given is not None and not isinstance(given, Mapping):
+    as_motion = given is not None and not isinstance(given, Mapping)
+    if as_motion:
         given = _of_motion(given, faults)
-    if given:
-        by_name = {str(name_of(key)): value for key, value in given.items()}
+    by_name = {str(name_of(key)): value for key, value in (given or {}).items()}
+    if by_name:
         times = None
         if "t" in by_name:
             times = _row(by_name.pop("t"), "t", faults)
@@ -233,7 +237,9 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
                 columns[name] = (shares.tolist(), row.tolist())
     course = lambda names: lambda share: np.column_stack([np.interp(share, *columns[n]) for n in names]) if len(names) else (
         np.zeros((len(share), 0)))
-    return _Course(course(metadata.x), course(metadata.inputs), p, T)
+    fixed = (problem.start[0] == problem.start[1]) & (problem.end[0] == problem.end[1])
+    leading = None if as_motion else tuple(n for n, both in zip(metadata.x, fixed, strict=True) if both or n in by_name)
+    return _Course(course(metadata.x), course(metadata.inputs), p, T, leading)
 
 
 def _middle(bounds: np.ndarray, left_out: np.ndarray) -> np.ndarray:
@@ -284,9 +290,9 @@ class _Search:
         course = self.course
         tolerance = chosen.tolerance
         while True:
-            made, found = self._solved(breaks, steps, course, bool(records))
+            made, found = self._solved(breaks, steps, course)
             motion = made.motion(found.z)
-            errors = made.errors(motion) if np.isfinite(found.z).all() else np.full(made.mesh.n_intervals, np.nan)
+            errors = made.errors(found.z) if np.isfinite(found.z).all() else np.full(made.mesh.n_intervals, np.nan)
             records.append(MeshRecord(made.mesh.n_intervals, steps, found.iterations, found.cost, float(errors.max()),
                                       self._lap()))
             if not found.solved:
@@ -313,10 +319,13 @@ class _Search:
         lap, self._last = now - getattr(self, "_last", self.begun), now
         return lap
 
-    def _solved(self, breaks: np.ndarray, steps: int, course: _Course, refined: bool) -> tuple[Discretized, Found]:
+    def _solved(self, breaks: np.ndarray, steps: int, course: _Course) -> tuple[Discretized, Found]:
         """The solution on a mesh; once more where the normals of constraints have turned too far from those of the guess."""
         mesh = self.chosen.mesh(breaks)
         guess = course.on(mesh)
+        if course.leading is not None and self.problem.module.metadata.constraints:
+            t = self.problem.t0 + mesh.nodes * course.T
+            guess = replace(guess, X=on_constraints(self.problem.module, t, guess.X, guess.p, course.leading))
         for _ in range(4):
             made = Discretized(self.problem, mesh, steps, guess)
             self._demand_finite(made)
