@@ -16,7 +16,8 @@ import symdyn as sd
 from symdyn.runtime.module import Module
 
 STEP, DURATION = 0.5, 0.7
-# Of the stance tibia, stance femur, torso, swing femur, swing tibia: kg, kg m^2, m, and m from the knee, or the hip, to the centre.
+# Of the stance tibia, stance femur, torso, swing femur, swing tibia: kg, kg m^2, m, and m from the knee, or the hip, to the
+# centre.
 MASSES, INERTIAS = (3.2, 6.8, 20.0, 6.8, 3.2), (0.93, 1.08, 2.22, 1.08, 0.93)
 LENGTHS, CENTRES = (0.4, 0.4, 0.625, 0.4, 0.4), (0.128, 0.163, 0.2, 0.163, 0.128)
 # A guess of the first posture; at the end the legs have changed.
@@ -24,8 +25,8 @@ POSTURE = (-0.3, 0.7, 0.0, -0.5, -0.6)
 
 
 def biped() -> sd.System:
-    """The biped on its stance foot: q1 ... q5 turn the links about z, counted from the vertical; torques u1 ... u5 at the ankle, the
-    stance knee, the hip from stance femur to torso, the hip from torso to swing femur, the swing knee."""
+    """The biped on its stance foot: q1 ... q5 turn the links about z, counted from the vertical; torques u1 ... u5 at the ankle,
+    the stance knee, the hip from stance femur to torso, the hip from torso to swing femur, the swing knee."""
     q, u = sd.coordinates("q1:6"), sd.inputs("u1:6")
     m, inertia, length, d = (sd.parameters(f"{name}1:6") for name in ("m", "I", "l", "d"))
     g = sd.parameters("g")
@@ -59,13 +60,14 @@ def points(q: Any) -> tuple[list[Any], list[Any]]:
     P2 = P1 + LENGTHS[1] * up[1]
     P3, P4 = P2 + LENGTHS[2] * up[2], P2 - LENGTHS[3] * up[3]
     P5 = P4 - LENGTHS[4] * up[4]
-    G = [P1 - CENTRES[0] * up[0], P2 - CENTRES[1] * up[1], P2 + CENTRES[2] * up[2], P2 - CENTRES[3] * up[3], P4 - CENTRES[4] * up[4]]
+    G = [P1 - CENTRES[0] * up[0], P2 - CENTRES[1] * up[1], P2 + CENTRES[2] * up[2], P2 - CENTRES[3] * up[3],
+         P4 - CENTRES[4] * up[4]]
     return [foot, P1, P2, P3, P4, P5], G
 
 
 def boundary() -> list[sp.Basic]:
-    """One step: the legs change, angular momentum is kept by the impact about every joint that the rest hangs on; the foot lands at
-    the step's length, and leaves the ground upward, lands downward."""
+    """One step: the legs change, the impact keeps the angular momentum of all about the foot that lands and of what hangs on each
+    joint about it; the foot lands at the step's length, leaves the ground upward, lands downward."""
     q, rates = sp.symbols("q1:6"), sp.symbols(" ".join(f"q{k}_dot" for k in range(1, 6)))
     q0, rates0 = [sp.Symbol(f"{s}(0)") for s in q], [sp.Symbol(f"{s}(0)") for s in rates]
     P, G = points(q)

@@ -208,7 +208,7 @@ def _guess(problem: Problem, given: Any, faults: Faults) -> _Course:
     columns |= {n: ([0.0, 1.0], [v, v]) for n, v in zip(metadata.inputs, np.clip(idle, *problem.inputs), strict=True)}
     as_motion = given is not None and not isinstance(given, Mapping)
     if as_motion:
-        given = _of_motion(given, faults)
+        given = _of_motion(given, problem.free, faults)
     by_name = {str(name_of(key)): value for key, value in (given or {}).items()}
     if by_name:
         times = None
@@ -250,13 +250,13 @@ def _middle(bounds: np.ndarray, left_out: np.ndarray) -> np.ndarray:
     return np.asarray(np.clip(found, low, high))
 
 
-def _of_motion(given: Any, faults: Faults) -> dict[str, Any]:
+def _of_motion(given: Any, free: Sequence[str], faults: Faults) -> dict[str, Any]:
     """A Solution or an Optimum as a mapping."""
     try:
         metadata = given.module.metadata
-        free = {**given.values} if isinstance(given, Optimum) else {}
+        values = {n: v for n, v in given.values.items() if n in free} if isinstance(given, Optimum) else {}
         inputs = np.broadcast_to(given.inputs, (len(given.t), len(metadata.inputs)))
-        return {"t": given.t, **dict(zip((*metadata.x, *metadata.inputs), np.hstack([given.x, inputs]).T, strict=True)), **free}
+        return {"t": given.t, **dict(zip((*metadata.x, *metadata.inputs), np.hstack([given.x, inputs]).T, strict=True)), **values}
     except (AttributeError, ValueError):
         faults.add(f"guess is {shown(given)}; pass a Solution, an Optimum, or a mapping from names to values")
         return {}

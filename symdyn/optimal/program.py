@@ -76,7 +76,11 @@ class Program:
 
     def f(self, z: np.ndarray) -> float:
         """The cost."""
-        return float(sum(block.b @ F.ravel() for block, F in zip(self.blocks, self._all("values", z), strict=True)))
+        found = 0.0
+        for block, F in zip(self.blocks, self._all("values", z), strict=True):
+            there = np.flatnonzero(block.b)
+            found += float(block.b[there] @ F.ravel()[there])
+        return found
 
     def g(self, z: np.ndarray) -> np.ndarray:
         """The constraints (m,)."""

@@ -35,6 +35,13 @@ class Tracking:
     driven  names of the inputs that have weights; all others are those of the motion
 
     `tracking(t, x)` are the inputs (n_in,), to be passed to `simulate` as inputs=tracking, or sd.Sampled(tracking, period=0.01).
+
+    >>> module = sd.systems.cart_pole().compile()
+    >>> swing = sd.optimize(module, sd.Loss(integral=sp.Symbol("F") ** 2), 0.5, end={"q1": 0, "q2": 0}, tolerance=None,
+    ...                     intervals=5, method="slsqp")
+    >>> tracking = swing.lqr(Q=[1, 1, 0, 0], R=[0.01], Qf={"q2": 10})
+    >>> bool(tracking(0.0, swing.x[0])[0] == swing.inputs[0, 0]), tracking.K(0.2).shape
+    (True, (1, 4))
     """
 
     optimum: Optimum
@@ -92,9 +99,13 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
         demand_definite(matrix, names, what, owner, strictly=strictly)
     places, n = [inputs.index(name) for name in driven], len(states)
     inverse = np.linalg.inv(of_inputs)
+    without = (f"{owner}: Riccati's equation along the motion has no finite solution to working precision; change the weights by "
+               "less extreme ratios")
 
     def rate(t: float, flat: np.ndarray) -> np.ndarray:
         S = flat.reshape(n, n)
+        if not np.isfinite(flat).all() or not np.isfinite(t):
+            raise EvaluationError(without)
         found = module.jacobian(t, optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["x", "inputs"])
         assert found.x is not None and found.inputs is not None
         A, SB = found.x, S @ found.inputs[:, places]
@@ -102,9 +113,8 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
 
     first, last = float(optimum.t[0]), float(optimum.t[-1])
     size = max(np.abs(of_states).max(), np.abs(at_end).max(), 1e-300)
-    found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size,
-                      dense_output=True)
-    if not found.success or not np.isfinite(found.y).all():
-        raise EvaluationError(f"{owner}: Riccati's equation along the motion stopped at t = {found.t[-1]:.4g} s: {found.message}; "
-                              "change the weights by less extreme ratios")
+    with np.errstate(all="ignore"):
+        found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
+    if not found.success:
+        raise EvaluationError(without)
     return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol)

@@ -182,7 +182,7 @@ def _basis(points: np.ndarray) -> list[Polynomial]:
     found = []
     for j, one in enumerate(points):
         others = np.delete(points, j)
-        found.append(Polynomial.fromroots(others) / np.prod(one - others))
+        found.append(Polynomial(np.atleast_1d(np.poly(others))[::-1]) / np.prod(one - others))
     return found
 
 

@@ -1,0 +1,190 @@
+"""What cannot be optimized: faults of a call, conditions that contradict each other, solvers that end early or are not there."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import symdyn as sd
+from symdyn.runtime.module import Module
+
+x, v, F = sp.symbols("x x_dot F")
+EFFORT = sd.Loss(integral=F**2)
+REST = {"x": 1, "x_dot": 0}
+
+
+def _slider(force: Any = F, **more: Any) -> sd.System:
+    position = sd.coordinates("x")
+    system = sd.System("slider")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=position))
+    system.add_joint_force(slide, force.subs({F: sd.inputs("F"), x: position, v: position.dot}))
+    return system
+
+
+@pytest.fixture(scope="module")
+def slider() -> Module:
+    return _slider().compile(backend="c")
+
+
+@pytest.mark.parametrize(("given", "text"), [
+    ({"start": {"y": 1}}, "start has 'y', which is not there; there are x, x_dot"),
+    ({"start": {"x_dto": 1}}, "start has 'x_dto', which is not there; did you mean x_dot?"),
+    ({"start": [1.0]}, "start has the shape \\(1,\\), needed are 2 numbers: x, x_dot"),
+    ({"end": {"x": (2, 1)}}, "end of x contradict each other: at least 2 and at most 1"),
+    ({"end": {"x": "far"}}, "end of x is 'far'; pass a number or \\(least, most\\)"),
+    ({"bounds": {"F": (1, 2, 3)}}, "bounds of F is \\(1, 2, 3\\); pass a number"),
+    ({"bounds": {"x": (0, 0.5)}, "end": {"x": 1}}, "the end of x, 1, is outside of its bounds \\(0, 0.5\\)"),
+    ({"bounds": {"x": (0, 2)}, "start": {"x": -1}}, "the start of x, -1, is outside of its bounds \\(0, 2\\)"),
+    ({"bounds": {"x": (0, 2)}, "start": {"x": (-2, -1)}}, "the start of x, -2 to -1, is outside of its bounds"),
+    ({"bounds": 3}, "bounds is 3; pass a mapping from names or symbols"),
+    ({"rates": {"x": 1}}, "rates has 'x', which is not there; there are F"),
+    ({"inputs": {"F": 1}, "bounds": {"F": (0, 2)}}, "F has bounds and a prescribed value"),
+    ({"inputs": {"F": (0, 1)}}, "inputs of F is \\(0, 1\\); pass a number"),
+    ({"duration": -1}, "duration is -1; pass a positive number of seconds"),
+    ({"duration": (2, 1)}, "duration is \\(2, 1\\)"),
+    ({"t": np.nan}, "t, the time at the start, is nan"),
+    ({"cost": 3}, "the cost is 3; pass sd.Loss"),
+    ({"cost": sd.Loss(integral=lambda t, x, p: (0.0, x))}, "second derivatives are needed, which functions do not have"),
+    ({"cost": sd.Loss(integral=sp.Symbol("w"))}, "the integral of the cost has w, which is not there; there are x, x_dot, F, t"),
+    ({"cost": sd.Loss(end=sp.Function("f")(x))}, "the end of the cost: "),
+    ({"path": [x]}, "a condition of path is x; write sp.Eq\\(a, b\\), a <= b or a >= b"),
+    ({"path": x <= 1, "boundary": [sp.true]}, "a condition of boundary is True whatever the motion is"),
+    ({"path": [x + sp.Symbol("y") <= 1]}, "the condition x \\+ y <= 1 of path has y"),
+    ({"parameters": {"m": (0, 1)}}, "parameters has 'm', which is not there; there are none"),
+    ({"parameters": ["m"]}, "parameters is \\['m'\\]; pass a mapping from names to bounds"),
+    ({"guess": 3}, "guess is 3; pass a Solution, an Optimum, or a mapping"),
+    ({"guess": {"y": 1}}, "guess has 'y', which is not there"),
+    ({"guess": {"x": ["a"]}}, "x of the guess must be numbers"),
+    ({"guess": {"x": [[1, 2]]}}, "x of the guess must be finite numbers in a row, found the shape \\(1, 2\\)"),
+    ({"guess": {"t": [0, 1, 2], "x": [1, 2]}}, "x of the guess has 2 values, and t has 3"),
+    ({"guess": {"t": [0, 0]}}, "t of the guess must be two or more increasing times"),
+    ({"transcription": "euler"}, "transcription is 'euler'; there are 'hermite-simpson', 'radau', 'shooting'"),
+    ({"method": "snopt"}, "method is 'snopt'; there are 'ipopt', 'slsqp', 'trust-constr'"),
+    ({"intervals": 0}, "intervals is 0; pass a whole number from 1 to 2000"),
+    ({"intervals": [0, 0.7, 0.5, 1]}, "or increasing numbers from 0 to 1"),
+    ({"degree": 5}, "degree is 5; pass a whole number from 1 to 4"),
+    ({"steps": True}, "steps is True"),
+    ({"max_iterations": 0}, "max_iterations is 0"),
+    ({"tolerance": -1}, "tolerance is -1; pass a number between 0 and 1, or None"),
+    ({"accuracy": None}, "accuracy is None; pass a number between 0 and 1$"),
+    ({"options": 1}, "options is 1; pass a mapping"),
+])
+def test_faults_of_a_call(slider: Module, given: dict[str, Any], text: str) -> None:
+    call: dict[str, Any] = {"cost": EFFORT, "duration": 2.0, "end": REST, **given}
+    with pytest.raises(sd.ArgumentError, match=text):
+        sd.optimize(slider, **call)
+
+
+def test_all_faults_at_once(slider: Module) -> None:
+    with pytest.raises(sd.ArgumentError) as error:
+        sd.optimize(slider, sd.Loss(integral=sp.Symbol("w")), -2, {"y": 1}, {"x": 3}, bounds={"x": (0, 1), "G": 1},
+                    method="snopt", intervals=0)
+    for part in ("'y'", "has w", "-2", "outside of its bounds", "'G'", "snopt", "intervals"):
+        assert part in str(error.value)
+
+
+def test_an_infeasible_end_by_how_much(slider: Module) -> None:
+    """By |F| <= 1 the slider comes 1/4 m far in 1 s, from rest to rest."""
+    text = r"cannot all be met within the bounds\. Of the nearest motion x = 1 at t = 1 s is missed by 0\.75"
+    with pytest.raises(sd.NoOptimum, match=text) as error:
+        sd.optimize(slider, EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)})
+    kept = error.value.optimum
+    assert isinstance(kept, sd.Optimum) and not kept.success and kept.x.shape[1] == 2 and kept.iterations > 0
+
+
+def test_an_infeasible_path_by_how_much(slider: Module) -> None:
+    with pytest.raises(sd.NoOptimum, match=r"is missed by 0\.[67]"):
+        sd.optimize(slider, EFFORT, 3.0, end=REST, path=[v <= sp.Rational(1, 10)], transcription="radau")
+    with pytest.raises(sd.NoOptimum, match=r"x <= x\(0\) - 1|x = 1"):
+        sd.optimize(slider, EFFORT, 3.0, end={"x": (0, 1)}, boundary=[x <= sp.Symbol("x(0)") - 1])
+
+
+def test_conditions_that_what_is_given_violates(slider: Module) -> None:
+    with pytest.raises(sd.ArgumentError, match=r"what is given violates x >= 1/2 at t = 0 s by 0.5; change the start"):
+        sd.optimize(slider, EFFORT, 2.0, end=REST, path=[x >= sp.Rational(1, 2)])
+    module = sd.systems.four_bar().compile(backend="c")
+    with pytest.raises(sd.ArgumentError, match=r"the constraint hinge4_x at t = 0 s by .*module.consistent finds"):
+        sd.optimize(module, sd.Loss(end=sp.Symbol("q1") ** 2), 1.0, start={"q1": 1.2})
+
+
+def test_iterations_used_up(slider: Module) -> None:
+    with pytest.raises(sd.NoOptimum, match=r"in 2 iterations .*allow more iterations, or begin with a better guess") as error:
+        sd.optimize(slider, sd.Loss(integral=F**4 + x**2), 2.0, end=REST, bounds={"F": (-5, 5)}, max_iterations=2)
+    assert error.value.optimum.iterations == 2
+    with pytest.raises(sd.NoOptimum, match=r"the largest violation left is .*, of the equation of motion of x"):
+        sd.optimize(slider, EFFORT, 1.0, end=REST, bounds={"F": (-1, 1)}, max_iterations=3, method="slsqp")
+
+
+def test_costs_and_rates_that_are_not_finite() -> None:
+    module = _slider().compile(backend="c")
+    with pytest.raises(sd.EvaluationError, match=r"the cost, or its derivative, is not finite at the guess: -?inf; pass another"):
+        sd.optimize(module, sd.Loss(integral=sp.log(F)), 2.0, end=REST)
+    singular = _slider(F + 1 / x).compile(backend="c")
+    with pytest.raises(sd.EvaluationError, match=r"the equation of motion of x at t = .* cannot be evaluated at the guess"):
+        sd.optimize(singular, EFFORT, 2.0, end=REST)
+    found = sd.optimize(singular, EFFORT, 2.0, start={"x": 1}, end={"x": 2, "x_dot": 0})  # away from it all is well
+    assert found.success
+
+
+def test_mesh_that_is_not_fine_enough(slider: Module) -> None:
+    with pytest.warns(sd.OptimumWarning, match=r"the error of an interval is .* after 1 meshes, above the tolerance 1e-08"):
+        found = sd.optimize(slider, sd.Loss(integral=F**2 + x**4), 2.0, end=REST, tolerance=1e-8, max_refinements=0, intervals=3)
+    assert found.error > 1e-8 and len(found.meshes) == 1
+
+
+def test_without_casadi(slider: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(sd.MissingExtra, match=r"pip install 'symdyn\[opt\]'.*slsqp.*trust-constr"):
+        sd.optimize(slider, EFFORT, 2.0, end=REST)
+    assert sd.optimize(slider, EFFORT, 2.0, end=REST, method="slsqp", intervals=4, tolerance=None).cost == pytest.approx(1.5)
+
+
+def test_systems_that_are_not_optimized() -> None:
+    events = _slider()
+    events.add_event("wall", x.subs(x, sd.coordinates("x")) - 5, reset={sd.coordinates("x").dot: 0})
+    with pytest.raises(sd.ArgumentError, match=r"the events wall reset the state"):
+        sd.optimize(events.compile(backend="c"), EFFORT, 2.0, end=REST)
+    z = sd.motions("z")
+    moved = sd.System("moved")
+    body = moved.add_body("body", mass=1)
+    moved.add_joint(sd.Prismatic("slide", moved.ground, body, axis=[1, 0], coordinate=z))
+    carried = moved.add_body("carried", mass=1)
+    moved.add_joint(sd.Prismatic("second", body, carried, axis=[0, 1], coordinate=sd.coordinates("y")))
+    with pytest.raises(sd.ArgumentError, match=r"with motions as inputs"):
+        sd.optimize(moved.compile(backend="c"), sd.Loss(end=sp.Symbol("y")), 2.0)
+    timed = _slider(F + sp.sin(sd.t)).compile(backend="c")
+    with pytest.raises(sd.ArgumentError, match=r"the duration is free, and the equations of motion depend on t"):
+        sd.optimize(timed, EFFORT, (1, 2), end=REST)
+    found = sd.optimize(timed, EFFORT, 2.0, end=REST)
+    assert found.success and max(found.difference.values()) < 1e-4
+
+
+def test_what_a_result_does_not_have(slider: Module) -> None:
+    found = sd.optimize(slider, EFFORT, 2.0, end=REST, tolerance=None, intervals=3)
+    with pytest.raises(sd.ArgumentError, match=r"the optimal motion has no 'y'; it has x, x_dot, F"):
+        found["y"]
+    for at in (found.at, found.inputs_at):
+        with pytest.raises(sd.ArgumentError, match=r"goes from t = 0 to 2 s; found 2.5"):
+            at(2.5)
+    with pytest.raises(sd.ArgumentError, match=r"R has weights of G; give weights of inputs: F"):
+        found.lqr(Q=[1, 1], R={"G": 1})
+    with pytest.raises(sd.ArgumentError, match=r"R is not positive definite"):
+        found.lqr(Q=[1, 1], R=[0.0])
+    with pytest.raises(sd.ArgumentError, match=r"Qf has the shape"):
+        found.lqr(Q=[1, 1], R=[1.0], Qf=[1])
+    free = sd.systems.pendulum().compile(backend="c")
+    fall = sd.optimize(free, sd.Loss(end=sp.Symbol("q1") ** 2), 0.5, start={"q1": (0.1, 1)}, tolerance=None)
+    assert fall.inputs.shape[1] == 0 and max(fall.difference.values()) < 1e-3
+    with pytest.raises(sd.ArgumentError, match=r"the system has no inputs"):
+        fall.lqr(Q=[1, 1], R=[1])
+
+
+def test_riccati_that_overflows(slider: Module) -> None:
+    found = sd.optimize(slider, EFFORT, 2.0, end=REST, tolerance=None, intervals=3)
+    with pytest.raises(sd.EvaluationError, match=r"Riccati's equation along the motion has no finite solution"):
+        found.lqr(Q=[1e300, 1], R=[1e-200], Qf=[0, 1e300])
