@@ -20,8 +20,8 @@ import sympy as sp
 import symdyn as sd
 from symdyn.bench.toolchain import package_folder
 from symdyn.formulation.equations import Equations
+from symdyn.lab.casadi_field import casadi_field
 from symdyn.lab.figures import Figure, print_figures
-from symdyn.tape.node import Node
 
 NAMES = ("m1", "m3", "l1", "l2", "lc5")
 START = np.array([-np.pi / 2 + 0.2, 0.1, -0.1, 0.05, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -88,23 +88,11 @@ def _within_folder(equations: Equations, values: np.ndarray, rtol: float) -> tup
     options: Any = {"abstol": rtol, "reltol": rtol, "max_num_steps": 10**7, "fsens_err_con": True,
                     "linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional",
                     "jit": True, "compiler": "shell", "jit_options": {"flags": ["-O3", "-march=native"]}}
-    integrator = ca.integrator("motion", "cvodes", {"x": x, "p": by, "ode": _field(ca, equations, leaves)}, 0, END, options)
+    integrator = ca.integrator("motion", "cvodes", {"x": x, "p": by, "ode": casadi_field(ca, equations, leaves)}, 0, END, options)
     forward = integrator.forward(len(NAMES))
     call = lambda: forward(x0=START, p=values[places], fwd_x0=np.zeros((len(START), len(NAMES))), fwd_p=np.eye(len(NAMES)))
     found = np.array(call()["fwd_xf"])
     return min(_seconds(call) for _ in range(10)), found
-
-
-def _field(ca: Any, equations: Equations, leaves: dict[str, Any]) -> Any:
-    """x_dot in CasADi's symbols, statement by statement as on the tape."""
-    value: dict[Node, Any] = {}
-    operations = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
-                  "neg": lambda a: -a, "sin": ca.sin, "cos": ca.cos, "guard": lambda a, *_: a}
-    tape = equations.tape("rhs")
-    get = lambda a: value[a] if isinstance(a, Node) else float(a)
-    for node in (*tape.inputs, *tape.steps):
-        value[node] = leaves[node.args[1]] if node.op == "leaf" else operations[node.op](*map(get, node.args))
-    return ca.vertcat(*map(get, tape.outputs["rhs"].entries))
 
 
 def gradient() -> Iterator[Figure]:
