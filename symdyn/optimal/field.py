@@ -182,6 +182,5 @@ class Field:
 
 def structure_of(module: Module, name: str, shape: tuple[int, ...]) -> np.ndarray:
     """Where derivatives may differ from zero; everywhere where the module does not know."""
-    structure = getattr(module._provider, "structure", None)
-    found = None if structure is None else structure(name)
+    found = module.structure(name)
     return np.ones(shape, dtype=bool) if found is None else found

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # Diagonal entries of the triangular factor below this part of the largest belong to dependent constraints.
 DEPENDENT = 1e-8
+# States of a guess that are moved onto the constraints.
+MOVED = 21
 
 
 class Loops:
@@ -86,7 +88,12 @@ def _independent(C_r: np.ndarray, among: np.ndarray) -> list[int]:
 
 def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, leading: Sequence[str]) -> np.ndarray:
     """Guesses X (N, n_x) at times, moved onto the constraints one after the other: leading coordinates stay as far as they can,
-    the others go on from the state before; speeds are those of this course. A state without a solution nearby stays as it is."""
+    the others go on from the state before; speeds are those of this course. A state without a solution nearby stays as it is.
+    Straight between every few of them."""
+    if len(t) > MOVED:
+        some = np.linspace(t[0], t[-1], MOVED)
+        moved = on_constraints(module, some, np.column_stack([np.interp(some, t, x) for x in X.T]), p, leading)
+        return np.column_stack([np.interp(t, some, x) for x in moved.T])
     metadata, sizes = module.metadata, module.metadata.sizes
     found, q = X.copy(), X[0, :sizes.q]
     led = np.array([name in leading for name in metadata.q], dtype=bool)

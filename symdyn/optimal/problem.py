@@ -14,7 +14,7 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from symdyn.arguments import take
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.optimal.expressions import Expressions
-from symdyn.optimal.field import Arguments, structure_of
+from symdyn.optimal.field import Arguments
 from symdyn.real_numbers import NotReal, number
 from symdyn.runtime.losses import Loss
 from symdyn.runtime.masses import real_parameters
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
 FREE = (-np.inf, np.inf)
+# Characters of a condition that messages and multipliers name it by.
+LONGEST = 120
 
 
 @dataclass(frozen=True)
@@ -280,19 +282,20 @@ def _conditions(given: Any, what: str, names: Sequence[str], constants: Mapping[
         if not isinstance(relation, (sp.Eq, sp.Le, sp.Ge, sp.Lt, sp.Gt)):
             faults.add(f"a condition of {what} is {shown(relation)}; write sp.Eq(a, b), a <= b or a >= b")
             continue
-        expressions.append(_expression(relation.lhs - relation.rhs, f"the condition {relation} of {what}", names, constants,
-                                       faults))
+        text = str(relation) if not isinstance(relation, sp.Eq) else f"{relation.lhs} = {relation.rhs}"
+        expressions.append(_expression(relation.lhs - relation.rhs, f"the condition {text} of {what}", names, constants, faults))
         least.append(-np.inf if isinstance(relation, (sp.Le, sp.Lt)) else 0.0)
         most.append(np.inf if isinstance(relation, (sp.Ge, sp.Gt)) else 0.0)
-        texts.append(str(relation) if not isinstance(relation, sp.Eq) else f"{relation.lhs} = {relation.rhs}")
+        texts.append(text if len(text) <= LONGEST else f"{text[:LONGEST]} ... ({len(texts) + 1})")
     made = _expressions(expressions, names, constants, faults, what)
     return None if made is None else Conditions(made, np.array(least), np.array(most), tuple(texts))
 
 
 def _depends_on_time(module: Module, p: np.ndarray) -> bool:
     """Whether the rates depend on the time, by structure, or where this is not known by their values at two times."""
-    if getattr(module._provider, "structure", None) is not None:
-        return bool(structure_of(module, "rhs_by_t", (len(module.metadata.x), 1)).any())
+    found = module.structure("rhs_by_t")
+    if found is not None:
+        return bool(found.any())
     x = np.array([module.metadata.initial.get(n, 0.0) for n in module.metadata.x]) + 0.1
     first, second = (module.rhs(t, x, p) for t in (0.1, 0.7351))
     return not np.array_equal(first, second)

@@ -502,12 +502,21 @@ class Module:
         if not isinstance(wrt, str) or wrt not in FurtherDerivatives._fields:
             raise ArgumentError(f"{self.name}: sparsity by {shown(wrt)} asked for; there are {_BY}")
         name = self._derivatives(of)[wrt]
-        structure = getattr(self._provider, "structure", None)
-        if structure is None:
+        if not hasattr(self._provider, "structure"):
             raise ArgumentError(f"{self.name}: this module was put together without equations, so the structure of its "
                                 "derivatives is unknown; compile equations")
-        found = structure(name)
+        found = self.structure(name)
         return found if found is not None else np.zeros(self.shape(name), dtype=bool)
+
+    def structure(self, name: str) -> np.ndarray | None:
+        """Where a function that is a matrix of derivatives, such as hessian_x, may differ from zero; None where that is unknown.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").structure("hessian_x").astype(int)
+        array([[1, 0],
+               [0, 0]])
+        """
+        found: Callable[[str], np.ndarray | None] = getattr(self._provider, "structure", lambda name: None)
+        return found(name)
 
     def _derivatives(self, of: Any) -> dict[str, str]:
         """By what a function is differentiated -> the name of the function that does."""
