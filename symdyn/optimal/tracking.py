@@ -9,7 +9,7 @@ Source: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, cha
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -49,7 +49,7 @@ class Tracking:
     R: np.ndarray
     Qf: np.ndarray
     driven: tuple[str, ...]
-    _S: Any = field(repr=False)
+    _S: Callable[[float], np.ndarray] = field(repr=False)
 
     def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
         """Raises ArgumentError beyond the motion."""
