@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+
+from symdyn.estimation.estimate import Estimate, combination
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 # Singular values of the scaled derivatives below this part of the largest say that a combination is not determined: the
 # sensitivities are accurate to about this.
 UNDETERMINED = 1e-7
-# Shares of unknowns in such a combination that are written.
-_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Estimate):
     """Fitted values and how well the data determine them.
 
     values       label -> value: parameters by name, initial values as "q1(0)", of several experiments "q1(0) of experiment 2"
@@ -98,26 +96,8 @@ class Fit:
             half = (vectors.T / sizes) * scale[:, None]
             covariance = half @ half.T * (1.0 if known else estimate**2)
         return cls(module, dict(zip(labels, map(float, found.x), strict=True)), covariance, estimate,
-                   tuple(_combination(v, labels) for v in vectors[open_ones]), tuple(motions), dict(residuals),
+                   tuple(combination(v, labels) for v in vectors[open_ones]), tuple(motions), dict(residuals),
                    bool(found.status > 0), str(found.message), runs, degrees, known)
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Standard deviation of every value; NaN where the data do not determine something."""
-        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlation of the values, (n, n)."""
-        sizes = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(sizes, sizes)
-
-    def confidence(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Interval of every value in which it lies with this probability, as far as the motion is linear in it there."""
-        half = 0.5 + level / 2
-        factor = float(norm.ppf(half) if self.known_noise or self.degrees < 1 else student.ppf(half, self.degrees))
-        return {name: (value - factor * self.deviations[name], value + factor * self.deviations[name])
-                for name, value in self.values.items()}
 
     def plot(self, path: PathName | None = None) -> Figure:
         """Measured values, motion, and residuals over time; written to a file if a path is given."""
@@ -136,11 +116,3 @@ class Fit:
 
     def __repr__(self) -> str:
         return str(self)
-
-
-def _combination(vector: np.ndarray, labels: Sequence[str]) -> str:
-    """A direction in unknowns relative to their scale, as text: the largest share is 1."""
-    vector = vector / vector[np.argmax(np.abs(vector))]
-    shares = [(share, name) for share, name in zip(vector, labels, strict=True) if abs(share) > _SHARE]
-    return " ".join(f"{'-' if share < 0 else '+' if k else ''}{' ' if k else ''}{abs(share):.3g} {name}"
-                    for k, (share, name) in enumerate(shares))
