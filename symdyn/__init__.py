@@ -38,7 +38,7 @@ _HOME = {
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
-    "symdyn.estimation": ("Experiment", "Fit", "fit"),
+    "symdyn.estimation": ("Experiment", "Fit", "Identification", "MeasuredMotion", "fit", "identify"),
     "symdyn.optimal": ("Optimum", "Tracking", "optimize"),
     "symdyn.runtime.inputs.tables": ("Table",),
     "symdyn.errors": ("ArgumentError", "CacheError", "CacheWarning", "CaseError", "CompileError", "CompilerNotFound",

@@ -99,7 +99,10 @@ from symdyn.errors import (
 )
 from symdyn.estimation import Experiment as Experiment
 from symdyn.estimation import Fit as Fit
+from symdyn.estimation import Identification as Identification
+from symdyn.estimation import MeasuredMotion as MeasuredMotion
 from symdyn.estimation import fit as fit
+from symdyn.estimation import identify as identify
 from symdyn.exact.prove import prove as prove
 from symdyn.flexible.beam import Beam as Beam
 from symdyn.flexible.shape import Shape as Shape

@@ -74,6 +74,10 @@ class Libraries:
         columns = all_columns_of(self.equations, name, RightSide())
         return None if columns is None else columns.structure().reshape(*columns.shape, columns.n)
 
+    def base_names(self) -> tuple[str, ...]:
+        """Names of the base parameters of the mechanism."""
+        return self.equations.base_parameters().names
+
     def write(self, folder: Path) -> list[Path]:
         return write_source(emit(self.equations, self.backend, templates=self.templates, specialize=self.specialize), folder)
 
