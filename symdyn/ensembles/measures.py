@@ -15,6 +15,7 @@ from symdyn.errors import ArgumentError
 from symdyn.real_numbers import length_of, real_of
 from symdyn.runtime.integrating.simulate import N_POINTS
 from symdyn.runtime.memory import demand
+from symdyn.runtime.solutions.sensitivity import OUTPUTS
 from symdyn.shown import shown
 
 if TYPE_CHECKING:
@@ -34,8 +35,25 @@ REDUCTIONS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 # They need no more than the times they are about.
 OF_ONE_TIME = ("start", "end", "at")
 RESERVED = ("samples", "failed", "(failures)", "t", "about")
-_ASKED = re.compile(rf"(?P<kind>{'|'.join(REDUCTIONS)})\s+(?P<name>\S.*)")
-_AT = re.compile(r"(?P<name>\S.*?)\s+at\s+(?P<time>[-+.\deE]+)")
+# Derivatives of these by numbers that a motion depends on: (t (n_t,), values (n_t, ...), derivatives (n_t, ..., n)) -> (..., n);
+# of least and greatest values at the output time at which they are.
+GRADIENTS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    "start": lambda t, y, dy: dy[0],
+    "end": lambda t, y, dy: dy[-1],
+    "min": lambda t, y, dy: _at(dy, y.argmin(axis=0)),
+    "max": lambda t, y, dy: _at(dy, y.argmax(axis=0)),
+    "mean": lambda t, y, dy: trapezoid(dy, t, axis=0) / (t[-1] - t[0]),
+    "rms": lambda t, y, dy: trapezoid(y[..., None] * dy, t, axis=0) / (
+        (t[-1] - t[0]) * REDUCTIONS["rms"](t, y)[..., None]),
+    "trace": lambda t, y, dy: dy,
+}
+_ASKED = re.compile(rf"(?P<grad>grad\s+)?(?P<kind>{'|'.join(REDUCTIONS)})\s+(?P<name>\S.*)")
+_AT = re.compile(r"(?P<grad>grad\s+)?(?P<name>\S.*?)\s+at\s+(?P<time>[-+.\deE]+)")
+
+
+def _at(rows: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Rows (n_t, ..., n) at a place along the first axis for each entry of the axes between, (..., n)."""
+    return np.take_along_axis(rows, places[None, ..., None], axis=0)[0]
 
 
 @dataclass(frozen=True)
@@ -44,6 +62,7 @@ class Measure:
 
     label      its name in the results
     kind       one of REDUCTIONS, "at", or "function"
+    grad       its derivatives by what sensitivities are by, in place of it
     """
 
     label: str
@@ -51,13 +70,20 @@ class Measure:
     name: str = ""
     time: float = 0.0
     function: Callable[[Solution], Any] | None = None
+    grad: bool = False
 
     def of(self, solution: Solution) -> np.ndarray:
         """Its value. Whatever a function of the user raises passes through."""
         if self.function is not None:
             return real_of(self.function(solution), solution.module.name,
                            f"values of the outcome {shown(self.label)} must be numbers")
-        return self.reduce(solution.t, values_of(solution, self.name))
+        values = values_of(solution, self.name)
+        if not self.grad:
+            return self.reduce(solution.t, values)
+        derivatives = solution.sensitivity.of(self.name)
+        if self.kind == "at":
+            return self.reduce(solution.t, derivatives)
+        return np.asarray(GRADIENTS[self.kind](solution.t, values, derivatives))
 
     def reduce(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Its value from those over time, (n_t, ...)."""
@@ -68,7 +94,7 @@ class Measure:
     def record(self) -> str:
         """What distinguishes it from others."""
         function = self.function
-        return f"{self.kind} {self.name}" if function is None else (
+        return f"{'grad ' * self.grad}{self.kind} {self.name}" if function is None else (
             f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}")
 
 
@@ -85,7 +111,8 @@ def functions_of(module: Module, measures: Sequence[Measure]) -> list[str]:
     names = {m.name for m in measures}
     wanted = ["rhs", *(("C", "lam") if constraints else ("mass_matrix",))]
     wanted += ["outputs"] * any(n in names for n, _ in module.metadata.outputs) + ["energy"] * ("energy" in names)
-    return [n for n in wanted if n in there]
+    wanted += [OUTPUTS] * any(n in {m.name for m in measures if m.grad} for n, _ in module.metadata.outputs)
+    return [n for n in wanted if n in there or n == OUTPUTS]
 
 
 def take_measures(asked: Any, module: Module) -> list[Measure]:
@@ -129,7 +156,8 @@ def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measu
     by_kind, at = _ASKED.fullmatch(value.strip()), _AT.fullmatch(value.strip())
     match = by_kind or at
     if match is None:
-        faults.append(f"outcome {shown(value)}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time")
+        faults.append(f"outcome {shown(value)}: write one of {', '.join(REDUCTIONS)} and a name, or a name, 'at' and a time; "
+                      "with 'grad' before it for its derivatives")
         return None
     name, metadata = match["name"], module.metadata
     known = [*metadata.x, *metadata.inputs, *(n for n, _ in metadata.outputs),
@@ -139,10 +167,14 @@ def _measure(label: Any, value: Any, module: Module, faults: list[str]) -> Measu
         faults.append(f"outcome {shown(value)}: there is no {shown(name)}; "
                       + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"))
         return None
+    grad, smooth = bool(match["grad"]), [*metadata.x, *(n for n, _ in metadata.outputs)]
+    if grad and name not in smooth:
+        faults.append(f"outcome {shown(value)}: there are no derivatives of {name}; there are those of {', '.join(smooth)}")
+        return None
     if by_kind is not None:
-        return Measure(label, by_kind["kind"], name)
+        return Measure(label, by_kind["kind"], name, grad=grad)
     try:
-        return Measure(label, "at", name, float(match["time"]))
+        return Measure(label, "at", name, float(match["time"]), grad=grad)
     except ValueError:
         faults.append(f"outcome {shown(value)}: {shown(match['time'])} is not a time")
         return None

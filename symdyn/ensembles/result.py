@@ -27,7 +27,7 @@ class Ensemble:
 
     path       the folder;  file: its ensemble.npz
     names      what was sampled, of which `varied` is not the same in all;  labels: outcomes, `traces` those over the times t;
-               shapes: of one member's outcomes
+               shapes: of one member's outcomes; sensitivities: what derivatives among them are by, in this order
     count      number of members;  n_failed: how many of them have no outcome
     n_resumed  how many had been computed before;  seconds: wall time of the others
 
@@ -51,6 +51,7 @@ class Ensemble:
         self.labels: tuple[str, ...] = tuple(about["outcomes"])
         self.traces: tuple[str, ...] = tuple(about["traces"])
         self.shapes: dict[str, tuple[int, ...]] = {n: tuple(s) for n, s in about["shapes"].items()}
+        self.sensitivities: tuple[str, ...] = tuple(about.get("sensitivities", ()))
         self.units: dict[str, str] = about["units"]
         self.count: int = about["count"]
 

@@ -30,6 +30,7 @@ from symdyn.kinds import flag
 from symdyn.progress import bar as progress_bar
 from symdyn.runtime.batches.states import UNIT
 from symdyn.runtime.inputs.inputs import varies_over_time
+from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.module import Module
 from symdyn.shown import shown
 
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from symdyn.ensembles.samples import SampleValues
-    from symdyn.given import PathName, Row, Times, Values
+    from symdyn.given import Names, PathName, Row, Times, Values
     from symdyn.model.system import System
     from symdyn.runtime.module import InputValues
 
@@ -56,7 +57,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
              functions: tuple[str, ...] = (), rtol: float | None = None, atol: float | Row | None = None,
              method: str | type | None = None, max_step: float | None = None, first_step: float | None = None,
              max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
-             events: bool | str | Sequence[str] | None = None, event_spacing: float | None = None) -> Ensemble:
+             events: bool | str | Sequence[str] | None = None, event_spacing: float | None = None,
+             sensitivities: Names | None = None) -> Ensemble:
     """Simulate a mechanism for every sample, and keep some numbers of each motion.
 
     system      a Module, or a System, which is compiled
@@ -64,7 +66,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
                 to arrays of one length: the k-th values belong to member k
     t           as for `simulate`
     outcomes    a list of texts "end q1", or start, min, max, mean, rms (both over time), trace (all times) of a coordinate,
-                speed, input, output or "energy", and "q1 at 2.5"; or a mapping from labels to these or to functions of a
+                speed, input, output or "energy", and "q1 at 2.5"; "grad end q1" and the like are exact derivatives of these,
+                of states and outputs, (n,) numbers, by `sensitivities`; or a mapping from labels to these or to functions of a
                 Solution, which return a number or an array. Default: the end of all coordinates and speeds
     q, u, z, params, inputs   what is the same for all members, as for `simulate`; inputs are numbers
     executor    any concurrent.futures.Executor, or a function that makes one, which is called again if it dies. Processes and
@@ -78,6 +81,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     outstanding chunks that are handed to the executor at a time; default: three for every worker
     functions   of the module that functions of a Solution call in other processes only
     rtol, atol, method, max_step, first_step, max_steps, stabilization, events, event_spacing   of `simulate`; None: as there
+    sensitivities   what outcomes with "grad" are by, as for `simulate`: parameters, inputs, and initial values as "q1(0)";
+                default: what is sampled
 
     From 2000 samples on motions are integrated several at once in SIMD lanes, where `simulate_batch` does so. A member
     that fails has no numbers in its row, and is listed in `failures`; warnings of single motions are not given. Returns an
@@ -100,6 +105,7 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
              "max_steps": max_steps, "stabilization": stabilization, "events": events, "event_spacing": event_spacing}
     options = {name: value for name, value in asked.items() if value is not None}
     measures = take_measures(outcomes, module)
+    options |= _derivatives(module, drawn, measures, sensitivities)
     times = output_times(t, measures, module)
     vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
     portable = PortableModule(module, [*functions_of(module, measures), *functions, *[UNIT] * vectors])
@@ -124,6 +130,21 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
         raise
     weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)
     return result
+
+
+def _derivatives(module: Module, samples: Samples, measures: Sequence[Measure], given: Any) -> dict[str, Any]:
+    """The option of `simulate` with what outcomes are differentiated by. Raises ArgumentError with all that is wrong."""
+    if not any(m.grad for m in measures):
+        if given is not None:
+            raise ArgumentError(f"{module.name}: sensitivities were given, but no outcome is a derivative; write 'grad end "
+                                f"{module.metadata.x[0]}' or the like, or leave them out")
+        return {}
+    faults: list[str] = []
+    by = given if given is not None else [f"{n}(0)" if n in module.metadata.x else n for n in samples.names]
+    names = tuple(names_of(module, by, faults))
+    if faults:
+        raise ArgumentError("\n".join(f"{module.name}: {fault}" for fault in faults))
+    return {"sensitivities": names}
 
 
 def _in_folder(folder: Path, setting: Setting, samples: Samples, executor: Any, size: int | None, ahead: int | None,
@@ -224,7 +245,9 @@ class _Run:
                 "outcomes": [m.label for m in measures], "count": self.store.count,
                 "shapes": {m.label: s for m, s in zip(measures, self.setting.shapes)},
                 "traces": [m.label for m in measures if m.kind == "trace"], "units": {"energy": "J", **module.metadata.units},
-                "about": {m.label: m.record() for m in measures}, "rtol": self.setting.options.get("rtol", 1e-8)}
+                "about": {m.label: m.record() for m in measures},
+                "sensitivities": list(self.setting.options.get("sensitivities", ())),
+                "rtol": self.setting.options.get("rtol", 1e-8)}
 
 
 def _tried(setting: Setting, samples: Samples) -> Setting:
@@ -250,7 +273,8 @@ def _tried(setting: Setting, samples: Samples) -> Setting:
 def _shape(measure: Measure, setting: Setting, module: Module) -> tuple[int, ...]:
     """The shape of an outcome where no motion shows it; of a function a number."""
     own = dict(module.metadata.outputs).get(measure.name, ())
-    return (len(setting.times), *own) if measure.kind == "trace" else own
+    by = (len(setting.options["sensitivities"]),) if measure.grad else ()
+    return (len(setting.times), *own, *by) if measure.kind == "trace" else (*own, *by)
 
 
 def _manifest(setting: Setting, samples: Samples, size: int) -> dict[str, Any]:

@@ -45,8 +45,8 @@ TABLES = {"parameters": ("parameters",), "initial": ("q", "u", "z"), "inputs": (
 KEYS = {"system": "text", "options": "table", "formulation": "text", "coordinates": "text", "t": "times", "rtol": "positive",
         "atol": "positive", "method": "text", "max_steps": "whole", "max_step": "positive", "stabilization": "text",
         "consistent": "true or false", "sampling": "text", "count": "whole", "seed": "whole", "chunk": "whole",
-        "outcomes": "texts", "scatter": "pairs", "output": "folder", **dict.fromkeys(TABLES, "table")}
-OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization")
+        "outcomes": "texts", "sensitivities": "texts", "scatter": "pairs", "output": "folder", **dict.fromkeys(TABLES, "table")}
+OPTIONS = ("rtol", "atol", "method", "max_steps", "max_step", "stabilization", "sensitivities")
 # No double is larger; whole numbers of TOML have any number of digits.
 LARGEST = sys.float_info.max
 CHOICES = {"formulation": ("auto", "embedding", "recursive", "augmented"), "coordinates": ("relative", "absolute"),

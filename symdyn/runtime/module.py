@@ -713,7 +713,8 @@ class Module:
                        max_step: float = 0.0, first_step: float = 0.0, method: str | type | None = None,
                        max_steps: int | None = None, stabilization: str | tuple[str, float] | None = None,
                        events: bool | str | Sequence[str] = True, event_spacing: float = 0.0,
-                       interpolation: str = "linear", extend: str = "error") -> BatchSolution:
+                       interpolation: str = "linear", extend: str = "error", sensitivities: Names | None = None,
+                       sensitivity_control: bool = True) -> BatchSolution:
         """Integrate many motions of one mechanism, each with its own steps.
 
         q, u, z     starts: in order, (n_q,) for all or (n, n_q); or by name or symbol, each a number or an array (n,); what is
@@ -725,6 +726,8 @@ class Module:
         rtol, atol, max_step, first_step   as for `simulate`
         method, max_steps, stabilization, events, event_spacing   as for `simulate`, too; with others than the default, and with
                     events, they run one by one
+        sensitivities, sensitivity_control   as for `simulate`, by the same names in all motions, which run one by one then; see
+                    `BatchSolution.sensitivity`
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
         `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters
@@ -745,7 +748,8 @@ class Module:
 
         return simulate_batch(self, q, u, params, z=z, t=t, inputs=inputs, rtol=rtol, atol=atol, max_step=max_step,
                               first_step=first_step, method=method, max_steps=max_steps, stabilization=stabilization,
-                              events=events, event_spacing=event_spacing, interpolation=interpolation, extend=extend)
+                              events=events, event_spacing=event_spacing, interpolation=interpolation, extend=extend,
+                              sensitivities=sensitivities, sensitivity_control=sensitivity_control)
 
     # -- statics and linearization
 

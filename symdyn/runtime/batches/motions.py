@@ -13,7 +13,7 @@ import numpy as np
 
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows, together
-from symdyn.runtime.batches.solution import BatchSolution
+from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
 from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
 from symdyn.runtime.batches.validity import outside
 from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
@@ -21,6 +21,7 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.charts import locked
 from symdyn.runtime.integrating.events import wanted
 from symdyn.runtime.integrating.run_record import STATUS, RunReport
+from symdyn.runtime.integrating.sensitivities import names_of
 from symdyn.runtime.integrating.simulate import (
     checked_method,
     checked_positive,
@@ -65,12 +66,16 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
                    inputs: Any = None, rtol: float = 1e-8, atol: Any = None, max_step: float = 0.0,
                    first_step: float = 0.0, method: Any = None, max_steps: int | None = None, stabilization: Any = None,
                    events: Any = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                   extend: str = "error") -> BatchSolution:
+                   extend: str = "error", sensitivities: Any = None, sensitivity_control: bool = True) -> BatchSolution:
     """See Module.simulate_batch."""
     metadata = module.metadata
     checked_method(module, method)
     chosen = {"method": method, "max_steps": max_steps, "stabilization": stabilization}
     options = {k: v for k, v in chosen.items() if v is not None and not (k == "method" and v == METHOD)}
+    faults: list[str] = []
+    by = tuple(names_of(module, sensitivities, faults)) if sensitivities is not None else ()
+    if faults:
+        raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
     has_events = bool(wanted(module, events).any())
     initial = metadata.initial
     groups = [take_rows(values, metadata.names(what), f"initial {what}", metadata.initial_values(what), module.name)
@@ -82,7 +87,7 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
     n = together(rows, module.name)
     times, span = _times(module, t)
     # The states that are kept, and starts, parameters, inputs and the report of each motion.
-    demand(n * (len(times) * metadata.sizes.x + metadata.sizes.x + 12), module.name,
+    demand(n * (len(times) * metadata.sizes.x * (1 + len(by)) + metadata.sizes.x + 12), module.name,
            f"{n} motions with {len(times)} states of {metadata.sizes.x} numbers each", "simulate fewer at a time, or call "
            "sd.ensemble with a path, which keeps results on the disk")
     n_starts = together({"q": groups[0], "u": groups[1], "z": groups[2]}, module.name)
@@ -93,7 +98,9 @@ def simulate_batch(module: Module, q: Any = None, u: Any = None, params: Any = N
         check_span(along.samplers, span, module.name)
     asked = _Asked(n, starts, rows["params"], fixed, times, span, *checked_tolerances(module, rtol, atol),
                    checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"))
-    note = why_one_by_one(module, has_events) or _why_these(by_time, options)
+    note = why_one_by_one(module, has_events) or _why_these(by_time, options) or ("one by one: with sensitivities" if by else "")
+    if by:
+        options |= {"sensitivities": by, "sensitivity_control": sensitivity_control}
     options |= {"events": events, "event_spacing": checked_spacing(module, event_spacing, span)}
     if by_time:
         options |= {"interpolation": interpolation, "extend": extend}
@@ -260,9 +267,14 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
     times = asked.times if len(asked.times) > 1 else np.array(asked.span)
     begun, nowhere = clock.perf_counter(), np.full(n_x, np.nan)
 
+    by = options.get("sensitivities", ())
+    columns = np.full((*x.shape, len(by)), np.nan)
+    nowhere_columns = np.full((n_x, len(by)), np.nan)
+
     def solution() -> BatchSolution:
+        sensitivity = BatchSensitivity(module.metadata, by, columns) if by else None
         return BatchSolution(module.metadata, asked.times, x, success, messages, counts[:, 0], counts[:, 1], 1, note,
-                             clock.perf_counter() - begun)
+                             clock.perf_counter() - begun, sensitivity)
 
     for k in range(n):
         start, p, given = (a[k if len(a) > 1 else 0] for a in (asked.starts, asked.params, asked.inputs))
@@ -285,8 +297,13 @@ def _one_by_one(module: Module, asked: _Asked, inputs: Any, used: np.ndarray, no
         if len(asked.times) > 1:
             there = dict(zip(done.t.tolist(), done.x, strict=True))
             x[k] = [there.get(t, nowhere) for t in times.tolist()]
+            if by:
+                known = dict(zip(done.t.tolist(), done.sensitivity.matrix, strict=True))
+                columns[k] = [known.get(t, nowhere_columns) for t in times.tolist()]
         elif done.success:  # at the end, or where an event ended the motion
             x[k] = done.x[-1]
+            if by:
+                columns[k] = done.sensitivity.matrix[-1]
         if used.ndim == 3:
             kept = dict(zip(done.t.tolist(), done.inputs, strict=True))
             used[k] = [kept.get(t, done.inputs[-1]) for t in asked.times.tolist()]

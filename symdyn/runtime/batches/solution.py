@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,43 @@ from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from symdyn.given import Key
+
+
+class BatchSensitivity(Mapping[Any, np.ndarray]):
+    """Sensitivities of many motions by name: what they are by -> derivatives of the states, (n, n_t, n_x); NaN where x is.
+
+    names    what they are by, in order;  matrix: all of them, (n, n_t, n_x, n_names)
+    """
+
+    def __init__(self, metadata: ModuleMetadata, names: Sequence[str], matrix: np.ndarray) -> None:
+        self.names, self.matrix, self._metadata = tuple(names), matrix, metadata
+
+    def __getitem__(self, name: Any) -> np.ndarray:
+        """By a parameter, an input or an initial value, by name or symbol. Raises ArgumentError for another."""
+        return self.matrix[..., _place(name_of(name), self.names, f"{self._metadata.name}: the motions have no sensitivity by")]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name_of(name) in self.names
+
+    def of(self, name: Key) -> np.ndarray:
+        """Derivatives of one coordinate, speed or extra state by all, (n, n_t, n_names). Raises ArgumentError for another."""
+        return self.matrix[..., _place(name_of(name), self._metadata.x, f"{self._metadata.name}: there is no state"), :]
+
+    def __repr__(self) -> str:
+        n, n_t, n_x, _ = self.matrix.shape
+        return f"<Sensitivity of {n} motions, {n_x} states at {n_t} times, by {', '.join(self.names)}>"
+
+
+def _place(name: str, known: Sequence[str], what: str) -> int:
+    if name not in known:
+        raise ArgumentError(f"{what} {shown(name)}; there are {', '.join(known)}")
+    return known.index(name)
 
 
 @dataclass(frozen=True)
@@ -27,6 +64,7 @@ class BatchSolution:
     n_steps, n_rejected   (n,) steps of the integrator
     width      trajectories that were integrated at once on one processor core; note: why it is 1, where it is
     seconds    what the integration took
+    sensitivity   of runs that were asked for it: derivatives by name, see BatchSensitivity
     """
 
     metadata: ModuleMetadata
@@ -39,6 +77,7 @@ class BatchSolution:
     width: int = 1
     note: str = ""
     seconds: float = field(default=0.0, compare=False)
+    sensitivity: BatchSensitivity | None = None
 
     @property
     def q(self) -> np.ndarray:
@@ -53,11 +92,7 @@ class BatchSolution:
 
     def __getitem__(self, name: Key) -> np.ndarray:
         """One coordinate, speed or extra state by name or symbol, (n, n_t)."""
-        text = name_of(name)
-        if text not in self.metadata.x:
-            raise ArgumentError(f"{self.metadata.name}: there is no state {shown(text)}; there are "
-                                f"{', '.join(self.metadata.x)}")
-        return self.x[..., self.metadata.x.index(text)]
+        return self.x[..., _place(name_of(name), self.metadata.x, f"{self.metadata.name}: there is no state")]
 
     def __len__(self) -> int:
         return len(self.x)

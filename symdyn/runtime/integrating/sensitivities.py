@@ -46,30 +46,23 @@ class Asked:
         n_x = metadata.sizes.x
         if given is None:
             return cls((), (), np.zeros((0, n_x)), np.zeros(0))
-        if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
-            raise ArgumentError(f"{module.name}: sensitivities is {shown(given)}; pass a list of parameters, inputs and initial "
-                                f"values, such as [{metadata.parameters[0]!r}, '{metadata.x[0]}(0)']" if metadata.parameters else
-                                f"{module.name}: sensitivities is {shown(given)}; pass a list such as ['{metadata.x[0]}(0)']")
-        names, columns, starts, sizes = [], [], [], []
+        faults: list[str] = []
+        by = names_of(module, given, faults)
+        faults += [f"a sensitivity by the input {name} was asked for, which varies over time here; only constant inputs have one. "
+                   "Make what it follows a parameter of the system"
+                   for name in by if name in metadata.inputs and name in inputs.varying(metadata.inputs)]
+        if faults:
+            raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
         values = {**dict(zip(metadata.inputs, inputs.constant, strict=True)), **dict(zip(metadata.parameters, p, strict=True))}
-        for one in given:
-            name = name_of(one) if not isinstance(one, str) else one
-            initial = _INITIAL.fullmatch(name) if isinstance(name, str) else None
+        columns, starts, sizes = [], [], []
+        for name, state in by.items():
             start = np.zeros(n_x)
-            if initial and initial["name"].strip() in metadata.x:
-                start[metadata.x.index(initial["name"].strip())] = 1.0
-                columns.append("")
-                sizes.append(1.0)
-            elif isinstance(name, str) and name in values:
-                _check_input(module, name, inputs)
-                columns.append(name)
-                sizes.append(abs(float(values[name])) or 1.0)
-            else:
-                raise ArgumentError(_unknown(module, name))
-            if name in names:
-                raise ArgumentError(f"{module.name}: sensitivities name {name} twice; leave one out")
-            names.append(name)
+            if state:
+                start[metadata.x.index(state)] = 1.0
+            columns.append("" if state else name)
+            sizes.append(1.0 if state else abs(float(values[name])) or 1.0)
             starts.append(start)
+        names = list(by)
         return cls(tuple(names), tuple(columns), np.array(starts).reshape(len(names), n_x), np.array(sizes))
 
     def added_to(self, request: Request, controlled: bool, inputs: Sequence[str]) -> Request:
@@ -149,20 +142,35 @@ def _unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[st
     return []
 
 
-def _check_input(module: Module, name: str, inputs: Inputs) -> None:
-    """Raises ArgumentError for an input that is not constant."""
-    if name in module.metadata.inputs and name in inputs.varying(module.metadata.inputs):
-        raise ArgumentError(f"{module.name}: a sensitivity by the input {name} was asked for, which varies over time here; only "
-                            "constant inputs have one. Make what it follows a parameter of the system")
+def names_of(module: Module, given: Any, faults: list[str]) -> dict[str, str]:
+    """What sensitivities are by: parameters, inputs, initial values with the state they are of; faults are added."""
+    metadata = module.metadata
+    if isinstance(given, (str, bytes)) or not hasattr(given, "__iter__"):
+        parameter = f"{metadata.parameters[0]!r}, " if metadata.parameters else ""
+        faults.append(f"sensitivities is {shown(given)}; pass a list of parameters, inputs and initial values, such as "
+                      f"[{parameter}'{metadata.x[0]}(0)']")
+        return {}
+    found: dict[str, str] = {}
+    for one in given:
+        name = name_of(one) if not isinstance(one, str) else one
+        initial = _INITIAL.fullmatch(name) if isinstance(name, str) else None
+        if name in found:
+            faults.append(f"sensitivities name {name} twice; leave one out")
+        elif initial and initial["name"].strip() in metadata.x:
+            found[name] = initial["name"].strip()
+        elif isinstance(name, str) and name in (*metadata.parameters, *metadata.inputs):
+            found[name] = ""
+        else:
+            faults.append(_unknown(module, name))
+    return found
 
 
 def _unknown(module: Module, name: Any) -> str:
     metadata = module.metadata
     if name in metadata.x:
-        return (f"{module.name}: a sensitivity by {name} was asked for, which is a state; for that by its initial value pass "
-                f"'{name}(0)'")
+        return f"a sensitivity by {name} was asked for, which is a state; for that by its initial value pass '{name}(0)'"
     known = [*metadata.parameters, *metadata.inputs, *[f"{x}(0)" for x in metadata.x]]
     near = difflib.get_close_matches(str(name), known, 3)
-    return (f"{module.name}: a sensitivity by {shown(name)} was asked for, which is neither a parameter, an input nor the "
+    return (f"a sensitivity by {shown(name)} was asked for, which is neither a parameter, an input nor the "
             "initial value of a state; "
             + (f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known[:20])}"))
