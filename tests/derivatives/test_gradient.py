@@ -13,6 +13,7 @@ import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.integrating import gradient as backwards
+from symdyn.runtime.integrating import way_back
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -111,7 +112,7 @@ def test_input_and_function_of_time() -> None:
 
 
 def test_memory_grows_with_the_square_root_of_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(backwards, "STRETCH", 8)
+    monkeypatch.setattr(way_back, "STRETCH", 8)
     monkeypatch.setattr(backwards, "KEPT", 0)
     arguments = {"by": NAMES, "q": [-1.2, 0.3], "max_step": 0.01}
     runs = [module().gradient(sd.Loss(end=Q1), t=(0, end), **arguments) for end in (2, 8, 32)]
@@ -124,7 +125,7 @@ def test_stretches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = {"by": NAMES, "t": (0, 3), "q": [-1.2, 0.3], "max_step": 0.02}
     whole = module().gradient(LOSS, **arguments)
     for stretch, kept in ((1, 0), (2, 0), (7, 0), (7, 20_000), (7, 2**22)):
-        monkeypatch.setattr(backwards, "STRETCH", stretch)
+        monkeypatch.setattr(way_back, "STRETCH", stretch)
         monkeypatch.setattr(backwards, "KEPT", kept)
         parts = module().gradient(LOSS, **arguments)
         assert parts.n_steps == whole.n_steps
@@ -165,17 +166,6 @@ def test_what_has_no_gradient() -> None:
         module().gradient(sd.Loss(end=lambda t, x, p: (0.0, np.array([np.inf, 0, 0, 0]))), **asked)
     with pytest.raises(ArgumentError, match="the gradient has no 'm2'; it is by l1"):
         module().gradient(END, **asked)["m2"]
-    y = sd.coordinates("y")
-    m, g = sd.parameters("m g", positive=True)
-    system = sd.System("ball", gravity=[0, -g])
-    ball = system.add_body("ball", mass=m)
-    system.add_joint(sd.Prismatic("fall", system.ground, ball, y, axis=[0, 1]))
-    system.add_event("bounce", y, direction=-1, reset={y.dot: -y.dot})
-    system.defaults, system.initial = {m: 1, g: 9.81}, {y: 1}
-    falls = system.embedding().compile()
-    with pytest.raises(ArgumentError, match="the way back does not go across the events bounce; pass events=False"):
-        falls.gradient(sd.Loss(end=y), ["g"], (0, 1))
-    assert falls.gradient(sd.Loss(end=y), ["g"], (0, 1), events=False)["g"] == pytest.approx(-0.5, rel=1e-12)
 
 
 def test_motion_that_stops_early() -> None:

@@ -48,8 +48,8 @@ class Asked:
             return cls((), (), np.zeros((0, n_x)), np.zeros(0))
         faults: list[str] = []
         by = names_of(module, given, faults)
-        faults += [f"a sensitivity by the input {name} was asked for, which varies over time here; only constant inputs have one. "
-                   "Make what it follows a parameter of the system"
+        faults += [f"a sensitivity by the input {name} was asked for, which varies over time here; only constant inputs "
+                   "have one. Make what it follows a parameter of the system"
                    for name in by if name in metadata.inputs and name in inputs.varying(metadata.inputs)]
         if faults:
             raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
@@ -106,7 +106,7 @@ class Asked:
 
     def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
         """What to warn of: columns in which everything is zero all along, jumps that no event looks for."""
-        return [*self._without_effect(module, outcome), *_unseen_jumps(module, request, outcome)] if self.names else []
+        return [*self._without_effect(module, outcome), *unseen_jumps(module, request, outcome)] if self.names else []
 
     def _without_effect(self, module: Module, outcome: Outcome) -> list[str]:
         n_x = module.metadata.sizes.x
@@ -125,7 +125,7 @@ def _depends_on_state(request: Request) -> bool:
     return any(not np.array_equal(here, request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x)))) for way in (-1.0, 1.0))
 
 
-def _unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:
+def unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:
     """Where the right-hand side may have jumped between two rows of the motion without an event at that time."""
     known = module.metadata.switches
     if not known or len(outcome.t) < 2:

@@ -110,7 +110,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         if asked.columns:
             whole = asked.added_to(request, controlled, metadata.inputs)
         begun = clock.perf_counter()
-        outcome = _run(module, whole, method, bar)
+        outcome = integrate(module, whole, method, bar)
         unseen = not_seen(module, request.look, free.by_function(metadata.inputs), request.event_spacing)
         outcome = replace(outcome, doubts=(*outcome.doubts, *filter(None, [unseen])))
         free = free.recorded(outcome.record)
@@ -129,13 +129,14 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             warn(module, solution.rows(WATCHES), "in this motion", 3)
         if metadata.charts:
             warn_near_lock(module, replace(request, inputs=free), solution.t, solution.x,
-                           lambda part: _run(module, part, method), 3)
+                           lambda part: integrate(module, part, method), 3)
         return solution
 
 
-def _run(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
+def integrate(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
+    """A request, checked, by any method."""
     if request.inputs.are_held:
-        return run_held(module, request, lambda part: _run(module, part, method, bar), method)
+        return run_held(module, request, lambda part: integrate(module, part, method, bar), method)
     if method == "ggl":
         from symdyn.runtime.integrating.dae_run import run_ggl
 
@@ -154,7 +155,7 @@ def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) 
     begin, end = request.span
     ahead = times if end >= begin else times[::-1]
     whole = ahead if len(ahead) and ahead[0] == begin else np.append(begin, ahead)
-    outcome = _run(module, replace(request, times=np.ascontiguousarray(whole)), method)
+    outcome = integrate(module, replace(request, times=np.ascontiguousarray(whole)), method)
     if outcome.interrupted:
         raise KeyboardInterrupt
     if not np.array_equal(outcome.t[:len(whole)], whole):
@@ -179,7 +180,7 @@ def stabilization_of(module: Module, request: Request, method: Any, asked: Any) 
 
 def _trial(module: Module, request: Request, method: Any, stabilization: Any = None) -> Outcome:
     """A run that is thrown away."""
-    done = _run(module, replace(request, stabilization=stabilization_of(module, request, method, stabilization)), method)
+    done = integrate(module, replace(request, stabilization=stabilization_of(module, request, method, stabilization)), method)
     if done.interrupted:
         raise KeyboardInterrupt
     return done
