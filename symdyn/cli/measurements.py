@@ -107,9 +107,9 @@ MEASUREMENTS: dict[str, Measurement] = {
             _number("--count", "count", "motions (default: 1000000)"),
             _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
     "sensitivities": Measurement(
-        "symdyn.lab.sensitivities:run", "derivatives of motions: errors, and times beside CasADi's CVODES", (_ONLY,)),
+        "symdyn.lab.sensitivities:run", "derivatives of motions: errors, and times compared with CasADi's CVODES and diffrax", (_ONLY,)),
     "optimize": Measurement(
-        "symdyn.lab.optimize:run", "optimal motions: cost, iterations, time, beside the same problems in plain CasADi", (_ONLY,)),
+        "symdyn.lab.optimize:run", "optimal motions: cost, iterations, time, compared with the same problems in plain CasADi", (_ONLY,)),
     "turbine": Measurement(
         "symdyn.lab.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
     "flexible": Measurement(

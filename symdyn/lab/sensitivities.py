@@ -1,17 +1,24 @@
-"""Sensitivities of motions: errors, times beside CasADi's CVODES, the cost of gradients: `symdyn bench sensitivities`.
+"""Sensitivities of motions: errors, times beside CasADi's CVODES and diffrax's adjoints, the cost of gradients: `symdyn bench
+sensitivities`.
 
 All figures of one group come from one run. CVODES (Hindmarsh and others, ACM TOMS 31, 2005) gets the same right-hand side:
 symdyn's own statements as compiled C, with CasADi's derivatives of them; Adams' method with functional iteration, which is the
-quickest here; and errors of the sensitivities under control, as symdyn has them. Of each the best timing counts.
+quickest here; and errors of the sensitivities under control, as symdyn has them. diffrax (Kidger, On Neural Differential
+Equations, thesis, Oxford 2021) gets the statements as JAX traces them, its method of order 8, and the same tolerances. Of each
+the best timing counts, without compilation.
 """
 
 from __future__ import annotations
 
 import contextlib
+import importlib
+import importlib.util
 import tempfile
 import time as clock
+import warnings
 from collections.abc import Iterator, Sequence
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +26,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.bench.toolchain import package_folder
+from symdyn.errors import MissingExtra, SimulationWarning
 from symdyn.formulation.equations import Equations
 from symdyn.lab.casadi_field import casadi_field
 from symdyn.lab.figures import Figure, print_figures
@@ -115,6 +123,93 @@ def gradient() -> Iterator[Figure]:
         yield f"{name}: most memory kept", found.memory / 2**10, "KiB", ""
 
 
+def diffrax() -> Iterator[Figure]:
+    """A loss of PUMA's free fall for 1 s by the ten inertial parameters of its six links, beside diffrax's adjoints: the discrete
+    one, which is its default, and the continuous one, which integrates the motion backwards."""
+    missing = _missing()
+    if missing:
+        raise MissingExtra(f"the Python package {missing[0]} is not installed; run: pip install jax diffrax")
+    equations = sd.systems.get("puma560", general=True).equations()
+    module = equations.compile(backend="c")
+    metadata = module.metadata
+    by = [name for name in metadata.parameters if name[0] in "mcI"]
+    start, end = np.append(np.linspace(0.1, 0.6, 6), np.zeros(6)), 1.0
+    q1, q3, u2 = sp.symbols("q1 q3 q2_dot")
+    loss = sd.Loss(integral=q1**2 + u2**2, end=(q3 - 1) ** 2)
+    call = partial(module.gradient, loss, by, (0, end), start[:6], start[6:], rtol=1e-8)
+    found = call()
+    yield "numbers that the gradient is by", len(by), "", ""
+    yield "steps", found.n_steps, "", ""
+    yield "most memory kept", found.memory / 2**10, "KiB", ""
+    forward = partial(module.simulate, np.array([0.0, end]), start[:6], start[6:], rtol=1e-8, sensitivities=by)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # some parameters have no effect
+        compiled = _seconds(forward)
+        once, forwards = _in_turns(call, forward)
+    yield "time of the gradient", 1e3 * once, "ms", ""
+    yield "time of sensitivities forwards, by the same numbers", 1e3 * forwards, "ms", ""
+    yield "forwards: compilation, or loading", compiled, "s", ""
+    for adjoint in ("RecursiveCheckpointAdjoint", "BacksolveAdjoint"):
+        theirs = _ByDiffrax(equations, module.default_parameters, by, start, end, adjoint)
+        value, gradient = theirs()
+        yield f"{adjoint}: compilation", theirs.compiled, "s", ""
+        yield f"{adjoint}: steps", theirs.steps, "", ""
+        yield f"{adjoint}: memory for what lies between", theirs.memory / 2**10, "KiB", ""
+        yield "difference of the losses, relative", abs(value / found.value - 1), "", "< 1e-7"
+        yield "difference of the gradients, relative", np.abs(gradient - found.array).max() / np.abs(gradient).max(), "", "< 1e-6"
+        once, their_time = _in_turns(call, theirs)
+        yield f"{adjoint}: time", 1e3 * their_time, "ms", ""
+        yield f"{adjoint}: time by symdyn's", their_time / once, "", ">= 20"
+
+
+def _missing() -> list[str]:
+    """What the comparison with diffrax needs and is not installed."""
+    return [name for name in ("jax", "diffrax") if importlib.util.find_spec(name) is None]
+
+
+class _ByDiffrax:
+    """A loss and its gradient by diffrax, compiled by XLA.
+
+    compiled: time that it took, s; steps: of the motion, and tried ones; memory: bytes that XLA takes besides arguments and
+    results
+    """
+
+    def __init__(self, equations: Equations, values: np.ndarray, by: Sequence[str], start: np.ndarray, end: float,
+                 adjoint: str) -> None:
+        jax, solver = importlib.import_module("jax"), importlib.import_module("diffrax")
+        jnp = importlib.import_module("jax.numpy")
+        jax.config.update("jax_enable_x64", True)
+        symbols = equations.symbols
+        names = [s.name for s in (*symbols.coordinates, *symbols.speeds)]
+        parameters = [s.name for s in symbols.parameters]
+        places = np.array([parameters.index(name) for name in by])
+        words = SimpleNamespace(sin=jnp.sin, cos=jnp.cos, vertcat=lambda *entries: jnp.stack([jnp.asarray(e) for e in entries]))
+        n, costs = len(names), [names.index(name) for name in ("q1", "q2_dot", "q3")]
+
+        def field(t: Any, x: Any, p: Any) -> Any:
+            entries = [*[x[k] for k in range(n)], *[p[k] for k in range(len(values))]]
+            leaves = dict(zip([*names, *parameters], entries, strict=True))
+            return jnp.append(_field(words, equations, leaves), x[costs[0]] ** 2 + x[costs[1]] ** 2)
+
+        def loss(given: Any) -> Any:
+            p = jnp.asarray(values).at[places].set(given)
+            run = solver.diffeqsolve(solver.ODETerm(field), solver.Dopri8(), 0.0, end, None, jnp.append(jnp.asarray(start), 0.0),
+                                     args=p, stepsize_controller=solver.PIDController(rtol=1e-8, atol=1e-8),
+                                     adjoint=getattr(solver, adjoint)(), max_steps=4096)
+            return run.ys[-1, n] + (run.ys[-1, costs[2]] - 1) ** 2, run.stats["num_steps"]
+
+        begun = clock.perf_counter()
+        self._given = values[places]
+        self._call = jax.jit(jax.value_and_grad(loss, has_aux=True)).lower(self._given).compile()
+        self.compiled = clock.perf_counter() - begun
+        self.steps = int(self._call(self._given)[0][1])
+        self.memory = int(self._call.memory_analysis().temp_size_in_bytes)
+
+    def __call__(self) -> tuple[float, np.ndarray]:
+        (value, _), gradient = self._call(self._given)
+        return float(value), np.asarray(gradient)
+
+
 def memory() -> Iterator[Figure]:
     """What the gradient of a pendulum's swing keeps, over the number of steps."""
     module = sd.systems.pendulum().embedding().compile(backend="c")
@@ -124,9 +219,15 @@ def memory() -> Iterator[Figure]:
     yield "that of the last by that of the one before, of 16 times fewer", found[2].memory / found[1].memory, "", "< 5"
 
 
-GROUPS = (cvodes, gradient, memory)
+GROUPS = (cvodes, gradient, memory, diffrax)
 
 
 def run(only: Sequence[str] | None = None) -> int:
-    """Print every figure; returns the number of those that miss their bound."""
+    """Print every figure; returns the number of those that miss their bound. diffrax is left out where it is not installed,
+    unless it is asked for by name, which raises MissingExtra."""
+    missing = _missing()
+    if missing and not only:
+        count = print_figures(GROUPS[:-1])
+        print(f"diffrax: not measured, {' and '.join(missing)} not installed; run: pip install jax diffrax")
+        return count
     return print_figures(GROUPS, only)

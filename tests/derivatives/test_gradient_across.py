@@ -158,6 +158,9 @@ def test_what_has_no_gradient(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ArgumentError, match="events jump asked for; there are lands"):
         module.gradient(**asked, events=["jump"])
     assert module.gradient(**asked, events=False)["g"] == pytest.approx(-0.08, rel=1e-12)
+    monkeypatch.setattr(across, "ITERATIONS", 1)
+    with pytest.raises(EvaluationError, match=r"the step up to an event near t = 0\.7.* is not computed, since the motion is"):
+        block().gradient(sd.Loss(end=sp.Symbol("x")), ["mu"], (0, 1))
     monkeypatch.setattr(across, "TRIES", 0)
     with pytest.raises(EvaluationError, match=r"the event lands at t = 0\.319.* is not found again when the motion is cut there"):
         module.gradient(**asked)

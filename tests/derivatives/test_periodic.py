@@ -100,6 +100,41 @@ def test_rimless_wheel() -> None:
     assert 2 * (energy - 9.81 * np.cos(0.08 - 0.4)) == pytest.approx(c * d / (1 - c), rel=1e-9)
 
 
+@cache
+def walker() -> Any:
+    """The simplest walker, legs without mass on a hip with it, down a slope (Garcia, Chatterjee, Ruina and Coleman, J. Biomech.
+    Eng. 120, 1998): its equations for feet that weigh nothing, on two slides. The feet pass each other in mid-swing without
+    touching the ground; heel strike is where the quantity grows."""
+    theta, phi = sd.coordinates("theta phi")
+    slope = sd.parameters("slope")
+    system = sd.System("walker")
+    fall = sp.sin(theta - slope)
+    for q, rate in ((theta, fall), (phi, fall + (theta.dot**2 - sp.cos(theta - slope)) * sp.sin(phi))):
+        body = system.add_body(f"{q.name}_body", mass=1)
+        joint = system.add_joint(sd.Prismatic(f"{q.name}_slide", system.ground, body, axis=[1, 0], coordinate=q))
+        system.add_joint_force(joint, rate)
+    c = sp.cos(2 * theta)
+    system.add_event("heel_strike", phi - 2 * theta, direction=1, reset={
+        theta: -theta, phi: -2 * theta, theta.dot: c * theta.dot, phi.dot: c * (1 - c) * theta.dot})
+    system.defaults = {slope: 0.009}
+    return system.embedding().compile()
+
+
+@pytest.mark.parametrize(("angle", "speed", "period", "sizes"), [
+    (0.19393737, -0.20386693, 3.0961058680777, [4.00386436, 1, 0.45958959, 0]),
+    (0.20031090, -0.19983247, 3.8824637528, [1, 0.58911319, 0.58911319, 0])])
+def test_gaits_of_the_simplest_walker(angle: float, speed: float, period: float, sizes: list[float]) -> None:
+    """Short and long steps at a slope of 0.009 against published digits; the state after heel strike has two dimensions."""
+    after = [angle, 2 * angle + 1e-7], [speed, (1 - np.cos(2 * angle)) * speed]
+    middle = walker().simulate((0, 1.5), *after, rtol=1e-12).x[-1]
+    orbit = walker().periodic(3.5, middle[:2], middle[2:], rtol=1e-13) if period < 3.1 else \
+        walker().periodic(3.88, middle[:2], middle[2:], rtol=1e-13)
+    assert orbit.period == pytest.approx(period, abs=2e-9 if period > 3.1 else 1e-12)
+    assert np.abs(orbit.multipliers) == pytest.approx(sizes, abs=1e-7) and orbit.stable == (period > 3.1)
+    strike = orbit.simulate().events["heel_strike"].x[0]
+    assert [-strike[0], np.cos(2 * strike[0]) * strike[2]] == pytest.approx([angle, speed], abs=1e-8)
+
+
 def test_on_constraints() -> None:
     """A four-bar linkage that turns without loads: two multipliers are left, whose product is 1."""
     linkage = sd.systems.four_bar().augmented().compile()

@@ -37,6 +37,8 @@ ITERATIONS, ENOUGH = 60, 4e-16
 BESIDE = 1e-3
 # A quantity before an event that is so many times what its rate there gives grazes zero.
 GRAZES = 1e4
+# Relative change that iterations may end with.
+LEFT = 1e-12
 # Relative difference of slopes from which on the right-hand side jumps.
 JUMPS = 1e-7
 
@@ -128,10 +130,10 @@ class Bridge:
         for _ in range(ITERATIONS):
             stages = x + length * (A @ slopes)
             then = np.array([field(t + c * length, y) for c, y in zip(C, stages, strict=True)])
-            done = np.abs(then - slopes).max() <= ENOUGH * np.abs(then).max()
-            slopes = then
-            if done:
+            change, slopes = np.abs(then - slopes).max(), then
+            if change <= ENOUGH * np.abs(then).max():
                 break
+        _converged(way.module, t, change, slopes)
         return cls(way, t, x, length, x + length * (A @ slopes), x + length * slopes.mean(axis=0))
 
     def back(self, integral: Cost | None, weights: np.ndarray) -> float:
@@ -145,10 +147,10 @@ class Bridge:
             along = self.length * (weights[:n_x] / 2 + A.T @ gained)
             rows = np.array([way.weights("rhs_weights", t, y, a) for t, y, a in zip(times, self.stages, along, strict=True)])
             then = rows[:, :n_x] + (0.0 if costs is None else half * costs.by_x)
-            done = np.abs(then - gained).max() <= ENOUGH * np.abs(then).max()
-            gained = then
-            if done:
+            change, gained = np.abs(then - gained).max(), then
+            if change <= ENOUGH * np.abs(then).max():
                 break
+        _converged(way.module, self.t, change, gained)
         weights[:n_x] += gained.sum(axis=0)
         weights[n_x:] += rows[:, n_x:].sum(axis=0)
         if costs is None:
@@ -156,6 +158,13 @@ class Bridge:
         if costs.by is not None:
             weights[n_x:] += half * costs.by.sum(axis=0)
         return half * float(costs.values.sum())
+
+
+def _converged(module: Module, t: float, change: float, values: np.ndarray) -> None:
+    """Raises EvaluationError where an iteration has not come to an end."""
+    if not change <= LEFT * np.abs(values).max():
+        raise EvaluationError(f"{module.name}: the step up to an event near t = {t:.9g} s is not computed, since the motion is "
+                              "stiff or irregular there; take simulate(..., sensitivities=[...])")
 
 
 @dataclass
