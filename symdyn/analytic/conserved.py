@@ -4,14 +4,15 @@ Candidates are momenta dT/du_k; the components of linear and angular momentum of
 that move all bodies as one (Noether's theorem); T + V, or Jacobi's integral u . dL/du - L where motions are prescribed. Each is
 w . dT/du - ..., so that its rate along the motion is its rate at any accelerations less w . r, with what the equations make zero,
 r = M_tilde u_dot + k_tilde - F_tilde + C_r^T lam. That this is zero for all states and accelerations is decided exactly, and that
-C_r w is zero or, for w = u, C_t, which is -C_r u where the constraints hold.
+C_r w is zero or, for w = u, C_t, which is -C_r u where the constraints hold. Momenta of the whole are written by the sums over
+the bodies, which divide by nothing, also where w has poles, such as at gimbal lock; the proof holds there by continuity.
 Source: Goldstein, Poole, Safko, Classical Mechanics, 3rd ed., sections 2.6, 2.7 and 13.7.
 """
 
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -58,13 +59,17 @@ class Conserved:
 class ConservedQuantities:
     """What every motion keeps; a sequence of Conserved that prints as a list, and by name: found["energy"].
 
-    cyclic   coordinates that T and V do not hold; notes: why the energy is not kept, and what could not be decided
+    cyclic   coordinates that neither T and V hold nor the loads and constraints
+    notes    what changes the momenta of cyclic coordinates and the energy, coordinates that stand in loads or constraints alone,
+             and what could not be decided
+    undriven whether inputs are taken as zero
     """
 
     name: str
     found: tuple[Conserved, ...]
     cyclic: tuple[sp.Symbol, ...]
     notes: tuple[str, ...] = ()
+    undriven: bool = False
 
     def __len__(self) -> int:
         return len(self.found)
@@ -83,7 +88,9 @@ class ConservedQuantities:
                           + "".join(f"; {note}" for note in self.notes))
 
     def __str__(self) -> str:
-        lines = [f"{self.name}: {'conserved along every motion' if self.found else 'nothing conserved was found'}"]
+        motions = " with inputs at zero" if self.undriven else ""
+        what = "conserved along every motion" if self.found else "nothing conserved was found"
+        lines = [f"{self.name}: {what}{motions}"]
         lines += [f"  {quantity}" for quantity in self.found]
         lines += [f"  cyclic coordinates: {', '.join(map(str, self.cyclic))}"] if self.cyclic else []
         return "\n".join([*lines, *[f"  {note}" for note in self.notes]])
@@ -112,7 +119,8 @@ class _Candidate:
 def conserved(equations: Equations, undriven: bool = False) -> ConservedQuantities:
     """The conserved quantities among the candidates of this module, each proved.
 
-    undriven   True: with all inputs zero
+    undriven   True: with all inputs zero, those of prescribed motions (sd.motions) with their rates too; motions that are
+               functions of the time go on
     Raises SymdynError where loads depend on accelerations, multipliers or reactions.
     """
     flag(undriven, f"{equations.name}: undriven")
@@ -124,7 +132,7 @@ def conserved(equations: Equations, undriven: bool = False) -> ConservedQuantiti
 
 class _Search:
     def __init__(self, mechanics: Mechanics, undriven: bool) -> None:
-        self.m, self.equations = mechanics, mechanics.equations
+        self.m, self.equations, self.undriven = mechanics, mechanics.equations, undriven and bool(mechanics.inputs)
         self.off = dict.fromkeys(mechanics.inputs, 0) if undriven else {}
         self.symbols = self.equations.printed_leaves()
         self.units = [[self.equations.leaves[p] for p in group] for group in self.equations.unit_groups]
@@ -148,7 +156,8 @@ class _Search:
                 self.notes.append(f"{c.name}: not decided, {proof.reason}")
         if not any(q.name in ("energy", "jacobi") for q in found) and not any(n.startswith("energy") for n in self.notes):
             self.notes.append(self.why_no_energy(candidates[-1]))
-        return ConservedQuantities(self.equations.name, tuple(found), self.cyclic(), tuple(self.notes))
+        cyclic = self.cyclic(candidates)
+        return ConservedQuantities(self.equations.name, tuple(found), cyclic, tuple(self.notes), self.undriven)
 
     # -- candidates
 
@@ -177,6 +186,7 @@ class _Search:
         J = equations.quantity("J")
         positions = equations.quantity("positions")
         p = m.momenta()
+        sums = equations.quantity("momentum") if "momentum" in equations.quantities else None
         found = []
         for turning in (False, True):
             for axis in ((2,) if planar and turning else range(2 if planar else 3)):
@@ -190,12 +200,18 @@ class _Search:
                 if w is not None:
                     what = "angular momentum about" if turning else "linear momentum along"
                     where = "z" if planar and turning else AXES[axis]
-                    gaps = tuple(a - b for a, b in zip(J @ w, target, strict=True))
-                    found.append(_Candidate(f"{'H' if turning else 'P'}_{where}", f"{what} {where}", inner(w, p), w, gaps))
+                    gaps = [a - b for a, b in zip(J @ w, target, strict=True)]
+                    value = inner(w, p)
+                    if sums is not None:
+                        total = sums[(2 if planar else axis) if turning else 3 + axis]
+                        if _close(*self._numbers([total, value])):
+                            gaps, value = [*gaps, total - value], total
+                    found.append(_Candidate(f"{'H' if turning else 'P'}_{where}", f"{what} {where}", value, w, tuple(gaps)))
         return found
 
     def _speeds(self, J: np.ndarray, target: np.ndarray) -> np.ndarray | None:
-        """w with J w = target, by the rows that say it in the simplest way; None if there is none."""
+        """w with J w = target, by rows with orthonormal columns, such as rotations, which divide by nothing, or by those that say
+        it in the simplest way; None if there is none."""
         numbers = self._numbers([*J.ravel(), *target])
         A, b = np.array(numbers[:J.size]).reshape(J.shape).astype(float), np.array(numbers[J.size:]).astype(float)
         if not J.size or not np.any(b):
@@ -206,6 +222,11 @@ class _Search:
         columns = [k for k in range(len(w)) if abs(w[k]) > 1e-9]
         if len(columns) > MOVED:
             return None
+        if all(abs(w[k] - round(w[k])) < 1e-9 for k in columns):
+            return np.array([round(e) for e in w], dtype=object)
+        direct = self._by_rotations(J, A, target, columns)
+        if direct is not None:
+            return direct
         chosen: list[int] = []
         for row in sorted(range(len(J)), key=lambda i: (sum(isinstance(e, Node) for e in J[i, columns]), i)):
             if np.linalg.matrix_rank(A[np.ix_([*chosen, row], columns)], tol=1e-9) > len(chosen):
@@ -213,10 +234,27 @@ class _Search:
         if len(chosen) < len(columns):
             return None
         result = np.zeros(len(w), dtype=object)
-        if all(abs(w[k] - round(w[k])) < 1e-9 for k in columns):
-            result[columns] = [round(w[k]) for k in columns]
-            return result
         result[columns] = solve(J[np.ix_(chosen, columns)], target[chosen])
+        return result
+
+    def _by_rotations(self, J: np.ndarray, A: np.ndarray, target: np.ndarray, columns: Sequence[int]) -> np.ndarray | None:
+        """The same in turn by the angular or linear rows of a body in which those that are left are orthonormal; None where
+        there are none."""
+        size = (2, 1) if self.equations.planar else (3, 3)
+        rows = [np.arange(first, first + n) for body in range(0, len(J), sum(size))
+                for first, n in ((body + size[0], size[1]), (body, size[0]))]
+        left, result = list(columns), np.zeros(A.shape[1], dtype=object)
+        while left:
+            for own in rows:
+                used = [k for k in left if np.abs(A[own, k]).max() > 1e-9]
+                block = A[own][:, used]
+                if used and np.abs(block.T @ block - np.eye(len(used))).max() < 1e-9:
+                    done = [k for k in columns if k not in left]
+                    result[used] = J[own][:, used].T @ (target[own] - J[own][:, done] @ result[done])
+                    left = [k for k in left if k not in used]
+                    break
+            else:
+                return None
         return result
 
     # -- verdicts
@@ -248,16 +286,53 @@ class _Search:
         values = drawn_state(random.Random(3), tape.inputs, 0.2, self.symbols, self.units)
         return list(evaluate(tape, {leaf.args[1]: value for leaf, value in values.items()}, DIGITS)["entries"])[:-1]
 
-    def cyclic(self) -> tuple[sp.Symbol, ...]:
-        """Coordinates that T and V do not hold."""
+    def cyclic(self, candidates: Sequence[_Candidate]) -> tuple[sp.Symbol, ...]:
+        """Coordinates that neither T and V hold nor the loads and constraints; notes say what changes the momenta of these, and
+        which ones stand in loads or constraints alone."""
+        m, equations = self.m, self.equations
+        found = []
+        coordinates = equations.symbols.coordinates
+        # Where speeds are no rates of coordinates, T holds a coordinate that these rates hold.
+        in_energy = self._absent([m.T, *([] if self.by_hand else [m.V]), *m.rates])
+        C_dot: Any = equations.quantity("C_dot") if equations.constraints else []
+        F: Any = m.at(equations.quantity("F_tilde"), self.off) if "F_tilde" in equations.quantities else []
+        bound, loaded = self._absent(C_dot, in_energy), self._absent(F, in_energy)
+        for k in sorted(in_energy):
+            stands = [*["loads without potential"] * (k not in loaded), *["constraints"] * (k not in bound)]
+            if stands:
+                self.notes.append(f"{coordinates[k]} is not cyclic: it stands in {' and '.join(stands)}, though not in T and V")
+                continue
+            found.append(coordinates[k])
+            p = candidates[k]
+            if not m.plain or self.proof(p).proved:
+                continue
+            if equations.constraints and not self._vanish(equations.quantity("C_r")[:, k]):
+                self.notes.append(f"{p.name} is not conserved: forces of constraints change it")
+            else:
+                rate = self._shown(F[k])
+                self.notes.append(f"{p.name} is not conserved: its rate is {rate}" if rate
+                                  else f"{p.name} is not conserved: loads without potential change it")
+        return tuple(found)
+
+    def _absent(self, entries: Any, among: Iterable[int] | None = None) -> set[int]:
+        """Indices of coordinates that entries do not hold."""
         m = self.m
-        entries = [m.T] if self.by_hand else [m.T, m.V]
-        slopes = [m.by(entries, q) for q in m.q]
-        values = iter(self._numbers([e for row in slopes for e in row]))
-        still = [max([abs(next(values)) for _ in row]) < SAME for row in slopes]
-        return tuple(q for q, row, zero in zip(self.equations.symbols.coordinates, slopes, still, strict=True)
-                     if zero and decide(m.recorder, [(e, 0) for e in row], self.symbols,
-                                        unit_vectors=self.units, bound=BOUND).proved)
+        left = sorted(range(len(m.q)) if among is None else among)
+        slopes = {k: m.by(entries, m.q[k]) for k in left}
+        values = iter(self._numbers([e for k in left for e in slopes[k]]))
+        still = [k for k in left if max([abs(next(values)) for _ in slopes[k]], default=0) < SAME]
+        return {k for k in still if self._vanish(slopes[k])}
+
+    def _vanish(self, entries: Iterable[Any]) -> bool:
+        pairs = [(e, 0) for e in entries]
+        return not pairs or decide(self.m.recorder, pairs, self.symbols, unit_vectors=self.units, bound=BOUND).proved
+
+    def _shown(self, entry: Any) -> str:
+        """An entry written out; "" where it is too long."""
+        try:
+            return shown(written([entry], self.symbols, bound=WRITTEN)[0])
+        except SymdynError:
+            return ""
 
     def why_no_energy(self, energy: _Candidate) -> str:
         """What changes T + V."""
@@ -266,11 +341,9 @@ class _Search:
         rate, work, *held = self.claims(energy)
         if not all(map(is_zero, held)):
             return "energy: the constraints, which depend on the time, change T + V"
-        try:
-            power = written([self.m.recorder.sub(rate, work)], self.symbols, bound=WRITTEN)[0]
-        except SymdynError:
-            return "energy: loads without potential, or prescribed motions, change T + V"
-        return f"energy: the rate of T + V is {shown(power)}"
+        power = self._shown(self.m.recorder.sub(rate, work))
+        return (f"energy: the rate of T + V is {power}" if power
+                else "energy: loads without potential, or prescribed motions, change T + V")
 
 
 def _merged(momenta: Sequence[_Candidate], whole: Sequence[_Candidate]) -> list[_Candidate]:

@@ -98,6 +98,63 @@ def test_free_rigid_body_with_euler_parameters():
     assert len(names) == 8 and {"p_omega_z_joint", "H_x", "H_y", "H_z", "energy"} < set(names)
 
 
+@pytest.mark.parametrize("formulation", ["recursive", "embedding"])
+@pytest.mark.parametrize("joint", [sd.Spherical, sd.Free])
+def test_angular_momentum_with_euler_parameters_divides_by_nothing(joint, formulation):
+    """The sum over the bodies, R I omega + r_G x m v_G, with 50 digits, also where rows of R vanish."""
+    system = sd.System("top", gravity=[0, 0, -g])
+    body = system.add_body("top", mass=m, inertia=[A, A, C], com=[0, 0, l])
+    system.add_joint(joint("tip", system.ground, body, orientation=sd.EulerParameters()))
+    eq = getattr(system, formulation)()
+    found = eq.conserved()["H_z"]
+    assert found.proof.proved and sp.denom(sp.together(found.expression)).is_number
+    assert not found.expression.has(sp.Pow) or all(e.exp.is_positive for e in found.expression.atoms(sp.Pow))
+    q, u = eq.symbols.coordinates, eq.symbols.speeds
+    half = sp.sqrt(2) / 2
+    for e in ([1, 0, 0, 0], [half, half, 0, 0], [0, 0, half, half], [sp.Rational(1, 2)] * 4):
+        e0, axis = e[0], sp.Matrix(e[1:])
+        R = (2 * e0**2 - 1) * sp.eye(3) + 2 * axis * axis.T + 2 * e0 * axis.hat()
+        x = [sp.Rational(3, 7), sp.Rational(-2, 5), sp.Rational(1, 9)][:len(q) - 4]
+        v = [sp.Rational(5, 7), sp.Rational(2, 3), sp.Rational(-4, 9)][:len(q) - 4]
+        w = [sp.Rational(1, 3), sp.Rational(-6, 5), sp.Rational(7, 4)]
+        omega = R * sp.Matrix(w)
+        arm = R * sp.Matrix([0, 0, l])
+        center = sp.Matrix(x or [0, 0, 0]) + arm
+        velocity = sp.Matrix(v or [0, 0, 0]) + omega.cross(arm)
+        about = R * sp.Matrix([A * w[0], A * w[1], C * w[2]]) + m * center.cross(velocity)
+        here = {**dict(zip(q, [*x, *e], strict=True)), **dict(zip(u, [*v, *w], strict=True))}
+        numbers = {m: sp.Rational(13, 11), l: sp.Rational(2, 7), A: sp.Rational(5, 3), C: sp.Rational(3, 8)}
+        difference = (found.expression.subs(here) - about[2]).subs(numbers)
+        assert abs(difference.evalf(50, chop=True)) < 1e-45
+
+
+def test_coordinates_that_only_loads_or_constraints_hold_are_not_cyclic():
+    x = sd.coordinates("x")
+    k = sd.parameters("k", positive=True)
+    system = sd.System("mass_on_spring", planar=True)
+    body = system.add_body("body", mass=m)
+    rail = system.add_joint(sd.Prismatic("rail", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_joint_force(rail, -k * x)
+    found = system.embedding().conserved()
+    assert found.cyclic == () and len(found) == 0
+    assert "x is not cyclic: it stands in loads without potential, though not in T and V" in str(found)
+    rubbing = sd.systems.get("pendulum_absolute").augmented().conserved()
+    assert rubbing.cyclic == () and "x is not cyclic: it stands in constraints, though not in T and V" in str(rubbing)
+    skate = sd.systems.get("skate").augmented().conserved()
+    assert [str(q) for q in skate.cyclic] == ["x", "y"] and "p_x is not conserved: forces of constraints change it" in str(skate)
+    # T holds no Euler parameters where speeds are components of omega, but they are no cyclic coordinates.
+    free = sd.System("free")
+    free.add_joint(sd.Spherical("joint", free.ground, free.add_body("body", mass=m, inertia=[A, A, C]),
+                                orientation=sd.EulerParameters()))
+    assert free.recursive().conserved().cyclic == ()
+
+
+def test_what_is_conserved_with_inputs_at_zero_is_said_to_be_so():
+    cart_pole = sd.systems.get("cart_pole").embedding()
+    assert str(cart_pole.conserved(undriven=True)).startswith("cart_pole: conserved along every motion with inputs at zero\n")
+    assert str(top().recursive().conserved(undriven=True)).startswith("top: conserved along every motion\n")
+
+
 def test_bead_on_a_hoop_that_turns_keeps_jacobi_s_integral():
     """Goldstein, Poole, Safko, 3rd ed., section 2.7: the energy function is conserved and is not T + V."""
     theta = sd.coordinates("theta")
@@ -115,7 +172,7 @@ def test_what_is_not_conserved_is_said():
     eq = sd.systems.get("cart_pole").embedding()
     found = eq.conserved()
     assert len(found) == 0 and str(found) == ("cart_pole: nothing conserved was found\n  cyclic coordinates: q1\n"
-                                              "  energy: the rate of T + V is F*q1_dot")
+                                              "  energy: the rate of T + V is F*q1_dot\n  p_q1 is not conserved: its rate is F")
     assert "nothing conserved was found" in found._repr_latex_()
     with pytest.raises(SymdynError, match=r"cart_pole conserves no 'energy'; it conserves nothing; energy: the rate of T \+ V"):
         found["energy"]

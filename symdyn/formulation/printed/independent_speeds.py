@@ -128,8 +128,9 @@ class MotionEquations(Equations):
         return sp.ImmutableDenseNDimArray(list(self.explicit("christoffel")), (n, n, n))
 
     def conserved(self, undriven: bool = False) -> ConservedQuantities:
-        """Momenta and energy, or Jacobi's integral, that every motion keeps, each with its proof; undriven: with inputs zero.
+        """Momenta and energy, or Jacobi's integral, that every motion keeps, each with its proof.
 
+        undriven   True: with all inputs zero; motions that are functions of the time go on
         See symdyn.analytic.conserved. Raises SymdynError where loads depend on accelerations or reactions."""
         from symdyn.analytic.conserved import conserved
 
