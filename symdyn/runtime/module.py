@@ -822,6 +822,7 @@ class Module:
                       names or the equilibrium kept, but for the conditions of a trim; () holds nothing
 
         See symdyn.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
+        Raises ArgumentError for states off the constraints, and for those where the equations have a kink or a jump.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.linearize({"q1": 0.0}).A.round(4) + 0.0

@@ -20,6 +20,7 @@ from symdyn.runtime.solutions.validity import WATCHES, warn
 from symdyn.shown import name_of, shown
 from symdyn.statics.analysis import Analysis
 from symdyn.statics.gimbal import REMEDY, lock
+from symdyn.statics.kinks import kink, no_linear_equations
 from symdyn.statics.manifold import Manifold, in_motion
 from symdyn.statics.search import Search, Trial
 from symdyn.statics.selection import Selection, select
@@ -59,6 +60,9 @@ def judge(manifold: Manifold) -> Judged:
         singular = singular_configuration(manifold.point, manifold.selection)
         if singular:
             return Judged("not decided", singular, None)
+        broken = kink(manifold.point, manifold.selection)
+        if broken:
+            return Judged("not decided", no_linear_equations(broken), None)
         steady = steadiness(manifold)
         if steady.kind:
             analysis = Analysis(manifold)

@@ -16,6 +16,7 @@ from symdyn.shown import shown
 from symdyn.statics.analysis import WORDS, Analysis, held_note
 from symdyn.statics.equilibrium import Equilibrium, given_inputs
 from symdyn.statics.gimbal import demand_no_lock
+from symdyn.statics.kinks import kink, no_linear_equations
 from symdyn.statics.manifold import Manifold, in_motion
 from symdyn.statics.modes import Modes
 from symdyn.statics.selection import Selection, holding, listed, select
@@ -343,10 +344,20 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
                                 "out, or pass at=equilibrium.x")
         if at.module is not module:
             raise ArgumentError(f"{module.name}: the equilibrium is of {at.module.name}, another module; linearize with its own")
-        point = at.point if hold is None else in_motion(at.point, holding(at.selection, hold))
-        return Linearization(Manifold(point, holding(at.selection, hold), _independent(module, coordinates)), at)
+        selection = holding(at.selection, hold)
+        point = at.point if hold is None else in_motion(at.point, selection)
+        _demand_smooth(point, selection)
+        return Linearization(Manifold(point, selection, _independent(module, coordinates)), at)
     point, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    _demand_smooth(point, selection)
     return Linearization(Manifold(point, selection, _independent(module, coordinates)), None)
+
+
+def _demand_smooth(point: OperatingPoint, selection: Selection) -> None:
+    """Raises ArgumentError where the equations have a kink or a jump at the state."""
+    name = kink(point, selection)
+    if name:
+        raise ArgumentError(f"{point.module.name}: linear equations were requested, but {no_linear_equations(name)}")
 
 
 def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,

@@ -19,6 +19,7 @@ from symdyn.statics.equilibrium import Equilibrium, equilibrium
 from symdyn.statics.floquet import exponents, fundamental, monodromy, multipliers
 from symdyn.statics.frames import ROUNDED, Change, Observer, Seen, constant_change, spinning
 from symdyn.statics.gimbal import demand_no_lock
+from symdyn.statics.kinks import kink, no_linear_equations
 from symdyn.statics.manifold import Manifold, in_motion
 from symdyn.statics.modes import Modes, modes_of, ordered, settled_values
 from symdyn.statics.selection import holding
@@ -136,12 +137,15 @@ def of_manifold(manifold: Manifold, period: float | None = None, rotating: bool 
         return Stability(title, "", "rest" if not point.u.any() else "motion", None, nothing, None, Modes(title, []),
                          (*held_note(manifold), WORDS[""]), manifold.selection.held, None)
     demand_no_lock(point, "the stability was")
-    singular = singular_configuration(point, manifold.selection)
-    if singular:
+    undecided = singular_configuration(point, manifold.selection)
+    steady = steadiness(manifold) if not undecided else None
+    if steady is None or steady.kind:
+        broken = "" if undecided else kink(point, manifold.selection)
+        undecided = undecided or (no_linear_equations(broken) if broken else "")
+    if steady is None or undecided:
         nothing = np.zeros(0, dtype=complex)
         return Stability(title, "not decided", "rest" if not point.u.any() else "motion", None, nothing, None, Modes(title, []),
-                         (*held_note(manifold), singular), manifold.selection.held, None)
-    steady = steadiness(manifold)
+                         (*held_note(manifold), undecided), manifold.selection.held, None)
     if period is not None and fastest(point) * period > 2 * np.pi * MOST_TURNS:
         raise ArgumentError(f"{point.module.name}: a period of {period:g} s is more than {MOST_TURNS} turns of the fastest "
                             "speed; pass the period of the motion")

@@ -1,0 +1,71 @@
+"""States where the equations have a kink or a jump, such as dry friction at rest or the edge of a contact: no linear ones exist.
+
+The balance is evaluated at a few steps to both sides, coordinate by coordinate, speed by speed, and so on. Of a smooth function
+the slopes on both sides differ by less and less, in proportion to the step; at a kink they differ by the same at each step, and
+at a jump the values do. Rounding does neither: what it makes of the values is measured where they are the same but for it.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from symdyn.errors import EvaluationError, EvaluationWarning
+from symdyn.statics.manifold import held_indices
+from symdyn.statics.selection import Selection
+from symdyn.statics.terms import OperatingPoint
+
+# Steps, as parts of the value or of one unit; by how much differences at a kink or a jump may vary with them, and how far above
+# rounding they have to be. Parts by which steps vary where rounding is measured.
+STEPS, SAME, ABOVE = (1e-4, 1e-5, 1e-6), 0.1, 1e3
+SPREAD = (1.0, 1.0 + 1e-12, 1.0 - 1e-12)
+
+
+def kink(point: OperatingPoint, selection: Selection) -> str:
+    """What passes its value where the equations have a kink or a jump at a state with accelerations, as "x"; "" for none."""
+    metadata = point.module.metadata
+    coordinates, speeds = held_indices(point, selection)
+    held = {metadata.q[k] for k in coordinates} | {f"{metadata.q[k]}_dot" for k in coordinates}
+    held |= {metadata.u[k] for k in speeds} | set(selection.held)
+    entries = list(enumerate((*metadata.x, *metadata.inputs)))
+    for k, name in entries if metadata.not_smooth else entries[len(metadata.x):]:
+        if name not in held and _breaks(point, k):
+            return name
+    return ""
+
+
+def no_linear_equations(name: str) -> str:
+    """What to say of such a state; name: what passes its value."""
+    return (f"the equations have a kink or a jump at this state, where {name} passes its value, so that there are no linear "
+            "ones; take another state, or a smooth law such as tanh(x/eps) in place of sign(x)")
+
+
+def _breaks(point: OperatingPoint, k: int) -> bool:
+    """Whether the balance has a kink or jump at the value of entry k of [x; inputs]."""
+    n_x = len(point.x)
+    value = np.concatenate([point.x, point.inputs])
+    steps = np.array([sign * part * step for step in STEPS for sign in (1, -1) for part in SPREAD]) * max(1.0, abs(value[k]))
+    moved = np.tile(value, (len(steps) + 1, 1))
+    moved[1:, k] += steps
+    ud = np.concatenate([point.ud, point.lam])
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", EvaluationWarning)
+            found = point.module.evaluate("balance", point.t, moved[:, :n_x], point.p, moved[:, n_x:], ud)
+    except EvaluationError:
+        return False
+    middle = found[0]
+    sides = found[1:].reshape(len(STEPS), 2, len(SPREAD), -1)
+    rounding = np.ptp(sides, axis=2).max(axis=(0, 1)) + np.finfo(float).eps * np.abs(found).max(axis=0)
+    widths = steps.reshape(len(STEPS), 2, len(SPREAD))[:, 0, 0, None]
+    bent, across = sides[:, 0, 0] + sides[:, 1, 0] - 2 * middle, sides[:, 0, 0] - sides[:, 1, 0]
+    jumps = _constant(across) & (np.abs(across[-1]) > ABOVE * rounding)
+    kinks = _constant(bent / widths) & (np.abs(bent[0]) > ABOVE * rounding)
+    return bool((jumps | kinks).any())
+
+
+def _constant(rows: np.ndarray) -> np.ndarray:
+    """Which columns are the same in all rows, but for a part."""
+    found: np.ndarray = np.ptp(rows, axis=0) <= SAME * np.abs(rows).max(axis=0)
+    return found
