@@ -17,6 +17,7 @@ from typing import Any
 import sympy as sp
 
 from symdyn.exact.taken import recorded
+from symdyn.model.faults import plain_unit
 from symdyn.shown import shown
 from symdyn.tape.node import Node
 from symdyn.tape.sympy_bridge import expand
@@ -42,21 +43,40 @@ LISTED = 60
 
 
 def parsed(unit: str | None) -> Dimension | None:
-    """A unit such as "kg m^2/s^2" or "N m/rad"; None for one that is not known.
+    """A unit such as "kg m^2/s^2", "N·m/rad" or "N/(m/s)"; None for one that is not known.
 
     All that stands between a slash and the next divides."""
-    if not unit:
-        return None
+    tokens = re.findall(r"[A-Za-z]+|1|[/()]|\^ *\(? *-? *\d+ *\)?|[^\s*]", plain_unit(unit or ""))
+    found = _product_of(tokens) if tokens else None
+    return None if found is None or tokens else {base: n for base, n in found.items() if n}
+
+
+def _product_of(tokens: list[str]) -> Dimension | None:
+    """What the first tokens say, up to a bracket that closes; these are removed. None for what is no unit."""
     total: Dimension = {}
-    for k, part in enumerate(unit.replace("*", " ").replace("·", " ").split("/")):
-        for token in part.split():
-            found = re.fullmatch(r"\(?([A-Za-z1]+)(?:\^\(?(-?\d+)\)?)?\)?", token)
-            if found is None or found[1] not in NAMED:
+    sign, factors = 1, 0
+    while tokens and tokens[0] != ")":
+        token = tokens.pop(0)
+        if token == "/":
+            sign = -1
+            if not tokens or tokens[0] in ("/", ")"):
                 return None
-            power = int(found[2] or 1) * (-1 if k else 1)
-            for base, n in zip(BASE, NAMED[found[1]], strict=False):
-                total[base] = total.get(base, Fraction(0)) + n * power
-    return {base: n for base, n in total.items() if n}
+            continue
+        factor: Dimension | None
+        if token == "(":
+            factor = _product_of(tokens)
+            if not tokens:
+                return None
+            tokens.pop(0)
+        else:
+            factor = dict(zip(BASE, map(Fraction, NAMED[token]), strict=False)) if token in NAMED else None
+        if factor is None:
+            return None
+        power = int(re.sub(r"[\^() ]", "", tokens.pop(0))) if tokens and len(tokens[0]) > 1 and tokens[0][0] == "^" else 1
+        for base, n in factor.items():
+            total[base] = total.get(base, Fraction(0)) + n * power * sign
+        factors += 1
+    return total if factors else None
 
 
 def text(dimension: Dimension | None) -> str:

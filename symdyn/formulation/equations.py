@@ -146,7 +146,7 @@ class Equations:
                 reason = "".join(f": {note}" for note in self.notes
                                  if note.startswith("no ") and name.partition("_")[0].lower() in note.lower())
                 raise SymdynError(f"{self.name} ({self.formulation}) has no quantity {shown(name)}{reason}; it has "
-                                  f"{', '.join(self.quantities)}")
+                                  f"{', '.join((*self.quantities, *QUANTITIES))}")
             self._recorded[name] = np.asarray(self.quantities[name](), dtype=object)
         return self._recorded[name]
 

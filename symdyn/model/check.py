@@ -16,7 +16,7 @@ from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import check_events
-from symdyn.model.faults import NAME, Faults
+from symdyn.model.faults import NAME, Faults, plain_unit
 from symdyn.model.joints import Joint, Modal
 from symdyn.model.loads import Force, JointForce
 from symdyn.model.loop_check import idle_coordinate_faults, loop_faults, with_carriers
@@ -295,10 +295,10 @@ class _Checker:
             if name not in symbols:
                 self.faults.append(f"units has one for {shown(name)}, which is no symbol of the system"
                                    f"{self._nearest(name, symbols)}")
-            elif not isinstance(unit, str) or not NAME.fullmatch(unit):
+            elif not isinstance(unit, str) or not NAME.fullmatch(plain_unit(unit)):
                 self.faults.append(f"units: that of {name} is {shown(unit)}; pass text such as 'N m'")
             else:
-                units[symbols[name]] = unit
+                units[symbols[name]] = plain_unit(unit)
         return units
 
     def _number(self, value: Any, what: str) -> float | None:

@@ -17,6 +17,9 @@ from symdyn.shown import shown
 
 # Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
 NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
+# Signs that units are written with, and what they are in plain text.
+_SIGNS = str.maketrans({"\u00b7": " ", "\u22c5": " ", "\u2212": "-", "\u03a9": "ohm", "\u2126": "ohm", "\u00b0": "deg"})
+_RAISED = dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-", strict=True))
 
 
 class Faults(list[str]):
@@ -111,3 +114,9 @@ class Faults(list[str]):
 
 def _is_row(value: Any) -> bool:
     return isinstance(value, (list, tuple))
+
+
+def plain_unit(unit: str) -> str:
+    """A unit in plain text: "kg·m²" as "kg m^2"."""
+    raised = re.sub(f"[{''.join(_RAISED)}]+", lambda found: "^" + "".join(_RAISED[c] for c in found[0]), unit)
+    return raised.translate(_SIGNS).replace("**", "^")

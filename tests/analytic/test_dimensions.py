@@ -4,6 +4,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.errors import ModelError
 from symdyn.exact.dimensions import parsed, text, units_of_expressions
 
 m, g, l, k = sd.parameters("m g l k", positive=True)
@@ -11,14 +12,16 @@ m, g, l, k = sd.parameters("m g l k", positive=True)
 
 @pytest.mark.parametrize(("unit", "written"), [
     ("kg m^2/s^2", "N m"), ("N m/rad", "N m"), ("rad/s", "1/s"), ("1", "1"), ("J", "N m"), ("N s/m", "N s/m"),
-    ("kg/m^3", "kg/m^3"),
+    ("kg/m^3", "kg/m^3"), ("N·m", "N m"), ("N*m", "N m"), ("kg·m²", "kg m^2"), ("m/s²", "m/s^2"), ("m/s**2", "m/s^2"),
+    ("s⁻¹", "1/s"), ("N⋅s/m", "N s/m"), ("N/(m/s)", "N s/m"), ("kg/(m s)", "kg/m s"), ("(kg m)^2/s", "kg^2 m^2/s"),
+    ("kg (m/s)^2", "N m"), ("Ω·A", "kg m^2/s^3 A"), ("m^(-1)", "1/m"),
     ("m^-1", "1/m"), ("W", "W"), ("kg*m", "kg m"), ("m/s/s", "m/s^2"), ("V", "kg m^2/s^3 A"), ("kg m^2", "kg m^2"), ("Pa", "Pa")])
 def test_units_are_read_and_written(unit, written):
     assert text(parsed(unit)) == written
     assert parsed(written) == parsed(unit)
 
 
-@pytest.mark.parametrize("unit", ["", None, "mm", "N m!", "furlong"])
+@pytest.mark.parametrize("unit", ["", None, "mm", "N m!", "furlong", "N/", "(N m", "N m)", "()", "m^", "m 2", "m//s"])
 def test_units_that_are_not_known(unit):
     assert parsed(unit) is None and text(None) == "?"
 
@@ -123,3 +126,16 @@ def test_named_intermediates_carry_their_units():
     units = {step.meaning.split(" ")[0]: step.unit for step in steps}
     assert units["constant"] == "kg m^2" and units["sine"] == "1" and "?" not in {step.unit for step in steps}
     assert {step.unit for step in steps if "q3_dot" in str(step.expression)} == {"1/s^2"}
+
+
+def test_signs_of_units_in_a_system():
+    system = sd.systems.pendulum()
+    length, = [p for p in system.check().parameters if p.name == "l"]
+    for unit, plain in (("N·m", "N m"), ("kg·m²", "kg m^2"), ("N m", "N m"), ("N*m", "N*m"), ("m/s²", "m/s^2")):
+        system.units = {length: unit}
+        assert system.check().units[length] == plain
+    system.units = {length: "m"}
+    assert system.embedding().check_units()
+    with pytest.raises(ModelError, match="units: that of l is 3; pass text such as 'N m'"):
+        system.units = {length: 3}
+        system.check()

@@ -171,3 +171,9 @@ def test_determinants_and_solutions():
         determinant(np.eye(11, dtype=object))
     with pytest.raises(ZeroDivisionError, match="singular"):
         solve(np.zeros((1, 1), dtype=object), np.ones(1, dtype=object))
+
+
+def test_energies_are_among_the_quantities_that_an_error_lists() -> None:
+    eq = sd.systems.pendulum().embedding()
+    with pytest.raises(SymdynError, match=r"no quantity 'kinetic'; it has M_tilde, .*, T, V, lagrangian, momenta"):
+        eq.explicit("kinetic")
