@@ -211,7 +211,7 @@ class _Search:
         unknown = self.unknown_leaves
         for k, (sine, cosine) in enumerate(exact.sines):
             nodes = {node for term in exact.bases[k] for node in term}
-            own = nodes & unknown
+            own = unknown & nodes
             if not own and all(n.op == "leaf" or n.op == "pi" for n in nodes):
                 continue
             if any(len(term) > 1 and set(term) & own for term in exact.bases[k]) or not own:

@@ -2,20 +2,36 @@
 
 The argument of a sine is a sum of terms with rational factors: coordinates, products such as Omega t, multiples of pi, numbers.
 Each term is divided by a number that makes all its factors integers, so that half angles are covered, and arguments that occur
-are taken as base angles before single terms: for links with parallel axes these are the sums in which equations are short.
+are taken as base angles before single terms: for links with parallel axes these are the sums in which equations are short. Sums
+over a common divisor, such as (x - d)/l, are sums of quotients.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
-from typing import Any
+from typing import Any, ClassVar
 
 from symdyn.tape.node import Node, exact
 
-# A product of nodes, in order of recording: what stands in a term of an argument.
-Term = tuple[Node, ...]
+
+@dataclass(frozen=True)
+class Inverse:
+    """One over a node, as a factor of a term."""
+
+    node: Node
+    op: ClassVar[str] = "inverse"
+
+    @property
+    def index(self) -> int:
+        """That of the node."""
+        return self.node.index
+
+
+# A product of nodes and inverses of nodes, in order of recording: what stands in a term of an argument.
+Term = tuple[Node | Inverse, ...]
 Linear = dict[Term, Fraction]
 # Arguments with more terms than this are one angle each; the same for multiples above it.
 TERMS, MULTIPLES = 12, 8
@@ -46,8 +62,16 @@ def arguments(steps: Sequence[Node]) -> dict[Any, Linear]:
             result = {}
             for one, a in form(args[0]).items():
                 for two, b in form(args[1]).items():
-                    term = tuple(sorted(one + two, key=lambda n: n.index))
+                    term = _product(one, two)
                     result[term] = result.get(term, Fraction(0)) + a * b
+        elif op == "div" and form(args[1]):
+            below = form(args[1])
+            divisor, number = next(iter(below.items())) if len(below) == 1 else ((args[1],), Fraction(1))
+            inverse = tuple(n.node if isinstance(n, Inverse) else Inverse(n) for n in divisor)
+            result = {}
+            for one, a in form(args[0]).items():
+                term = _product(one, inverse)
+                result[term] = result.get(term, Fraction(0)) + a / number
         elif op == "neg":
             result = {term: -factor for term, factor in form(args[0]).items()}
         elif op == "guard":
@@ -56,6 +80,18 @@ def arguments(steps: Sequence[Node]) -> dict[Any, Linear]:
             result = {term: factor for term, factor in result.items() if factor}
         forms[node] = {(node,): Fraction(1)} if result is None or len(result) > TERMS else result
     return {a: form(a) for a in sorted(wanted, key=lambda a: (isinstance(a, Node), a.index if isinstance(a, Node) else a))}
+
+
+def _product(one: Term, two: Term) -> Term:
+    """The product of two terms, without what cancels."""
+    left = list(one)
+    for factor in two:
+        opposite = factor.node if isinstance(factor, Inverse) else Inverse(factor)
+        if opposite in left:
+            left.remove(opposite)
+        else:
+            left.append(factor)
+    return tuple(sorted(left, key=lambda n: (n.index, isinstance(n, Inverse))))
 
 
 class Angles:

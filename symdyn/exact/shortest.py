@@ -16,6 +16,7 @@ from typing import Any
 import sympy as sp
 
 from symdyn.errors import SymdynError, UnsupportedExpression
+from symdyn.exact.angles import Inverse
 from symdyn.exact.arrange import Arranger, Letter, Polynomial, Sum, Tree, total
 from symdyn.exact.ideal import Ideal
 from symdyn.exact.reduce import relations_in_letters, shortened
@@ -78,12 +79,17 @@ class Writer:
             for k, n in enumerate(vector):
                 for term, factor in self.exact.bases[k].items() if n else ():
                     total[term] = total.get(term, Fraction(0)) + n * factor
-            self._angles[vector] = sp.Add(*[number(factor) * sp.Mul(*[self._node(node) for node in term])
-                                            for term, factor in total.items() if factor])
+            e = sp.Add(*[number(factor) * sp.Mul(*[self._node(node) for node in term])
+                         for term, factor in total.items() if factor])
+            if any(isinstance(node, Inverse) for term in total for node in term):
+                e = min(e, sp.together(e), key=sp.count_ops)
+            self._angles[vector] = e
         return self._angles[vector]
 
-    def _node(self, node: Node) -> sp.Expr:
-        """What stands in an angle: a symbol, or something that the angle cannot be taken apart at."""
+    def _node(self, node: Node | Inverse) -> sp.Expr:
+        """What stands in an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
+        if isinstance(node, Inverse):
+            return 1 / self._node(node.node)
         if node.op == "leaf":
             return self.symbols.get(node, sp.Symbol(node.args[1]))
         return expand(Output.of("angle", node), self.symbols)
