@@ -51,6 +51,20 @@ def relations_of(on: Any, claimed: Sequence[sp.Expr] = ()) -> list[sp.Expr]:
     return [on]
 
 
+def eliminated(relations: Sequence[sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
+    """Symbols that relations in turn give by the others, where they stand linearly with a factor that is not zero."""
+    found: dict[sp.Symbol, sp.Expr] = {}
+    for relation in relations:
+        e = sp.expand(relation.xreplace(found))
+        for s in sorted(e.free_symbols, key=str):
+            factor = e.coeff(s)
+            value = sp.expand((factor * s - e) / factor) if factor.is_nonzero else s
+            if s not in value.free_symbols:
+                found = {**{k: v.xreplace({s: value}) for k, v in found.items()}, s: value}
+                break
+    return found
+
+
 def nonzero_parameters(on: Any) -> set[sp.Expr]:
     """Parameters of the equations that are passed as `on`: constraints are those of a mechanism, in which they are not zero."""
     if isinstance(on, (list, tuple)):

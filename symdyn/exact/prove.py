@@ -20,11 +20,11 @@ from sympy.core.function import AppliedUndef
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.exact.common import without_common_steps
 from symdyn.exact.ideal import Ideal
-from symdyn.exact.manifold import States, nonzero_parameters, relations_of
+from symdyn.exact.manifold import States, eliminated, nonzero_parameters, relations_of
 from symdyn.exact.ring import BOUND, TooLarge
 from symdyn.exact.shortest import Writer, not_negative
 from symdyn.exact.taken import recorded, value_unknown
-from symdyn.exact.walk import Exact
+from symdyn.exact.walk import Exact, never_zero
 from symdyn.model.symbols import Timed, described, parts_of, symbols_of, take_over
 from symdyn.shown import shown
 from symdyn.tape.evaluate import evaluate
@@ -48,11 +48,14 @@ DECIMAL = "decimal numbers are the binary fractions next to them, with which the
 UNIT, LONG = Fraction(1, 10**50), (10**50, 10**70)
 ON = "on the relations"
 CONTRADICTING = "the relations contradict each other: nothing fulfils them, and anything would follow"
+UNFULFILLED = "no real values were found that fulfil the relations; from what nothing fulfils anything would follow"
 DIRECTIONS = "for axes of decimal numbers, divided by their length exactly"
 # Terms that a product may have where what both sides share is replaced: where that suffices, normal forms are short.
 SHARED = 20_000
-# A difference with more terms than this is not written out in a reason.
-WRITTEN = 60
+# Digits to which relations are fulfilled where that is all that is asked.
+FULFILLED = 16
+# A difference with more terms than this, or letters, is not written out in a reason.
+WRITTEN, LETTERS = 60, 200
 
 
 @dataclass(frozen=True)
@@ -120,14 +123,40 @@ def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
     n = len(left)
     recorder = _recorder(nodes)
     pairs = [(x if isinstance(x, Node) else recorder.add(x, 0), y) for x, y in zip(nodes[:n], nodes[n:])]
-    proof = decide(recorder, pairs, symbols, columns=columns, relations=[e for e in nodes[2 * n:] if isinstance(e, Node)],
-                   nonzero=nonzero_parameters(on))
+    zeros, nonzero = [e for e in nodes[2 * n:] if isinstance(e, Node)], nonzero_parameters(on)
+    proof = decide(recorder, pairs, symbols, columns=columns, relations=zeros, nonzero=nonzero)
+    if proof.proved and proof.reason == ON and not nonzero and not _fulfilled(recorder, zeros, symbols):
+        return Proof(False, reason=UNFULFILLED)
+    if relations and proof.verdict == "undecided" and _proved_by_elimination(left, right, relations):
+        return Proof(True, reason=ON)
     if not proof.refuted:
         return proof
     letters = [s for s in proof.state if value_unknown(s) and (proof.difference is None or proof.difference.has(s))]
     if letters:
         return Proof(False, reason=f"the sides differ unless {shown(letters[0])} has a certain value; take it with .doit()")
     return replace(proof, reason=_told(proof, left, right))
+
+
+def _fulfilled(recorder: Recorder, relations: Sequence[Node], symbols: Mapping[Node, sp.Expr]) -> bool:
+    """Whether states are found that fulfil relations."""
+    states, draw = States(recorder, relations, symbols), random.Random(1)
+    leaves = Tape.of(recorder, zero=list(relations)).inputs
+    return any(states.near(drawn_state(draw, leaves, -2.0 if attempt % 2 else 0.2, symbols), FULFILLED) is not None
+               for attempt in range(STATES))
+
+
+def _proved_by_elimination(left: Sequence[sp.Expr], right: Sequence[sp.Expr], relations: Sequence[sp.Expr]) -> bool:
+    """Whether the sides are equal with symbols that the relations give by others, also within functions."""
+    values = eliminated(relations)
+    if not values:
+        return False
+    one, other, rest = ([e.xreplace(values) for e in side] for side in (left, right, relations))
+    if any(e.has(sp.nan, sp.zoo, sp.oo) for e in (*one, *other, *rest)):
+        return False
+    rest = [e for e in map(sp.expand, rest) if e != 0]
+    if any(e.is_number for e in rest):
+        return False
+    return prove(sp.Matrix(one), sp.Matrix(other), rest or None).proved
 
 
 def _told(proof: Proof, left: Sequence[sp.Expr], right: Sequence[sp.Expr]) -> str:
@@ -259,6 +288,10 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
         doubtful = [k for k, value in enumerate(exact.values[:len(pairs)]) if len(value.num)]
         if not doubtful:
             return Proof(True)
+        never = next((value for value in exact.values[len(pairs):] if never_zero(value.num, exact.not_negative)), None)
+        if never is not None:
+            text = shown(Writer(exact, symbols).write(never))
+            return Proof(False, reason=f"nothing real fulfils the relations: {text} is never zero")
         if relations:
             ideal = _ideal(exact, exact.values[len(pairs):], symbols, nonzero)
             if ideal.contains(exact.ring.one.num):
@@ -268,7 +301,7 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
                 return Proof(True, reason=ON)
         if _proved_for_directions([differences[k] for k in doubtful], bound, unit_vectors, symbols):
             return Proof(True, reason=DIRECTIONS)
-        reason = "the normal forms differ, at no state that was tried do the values"
+        reason = f"the normal forms differ{_by(exact, symbols, doubtful[0])}, at no state that was tried do the values"
         reason += _without_relations(exact)
     except TooLarge as error:
         if _proved_apart(pairs, differences, bound, unit_vectors, not_negative(symbols)):
@@ -282,16 +315,25 @@ def decide(recorder: Recorder, pairs: Sequence[tuple[Any, Any]], symbols: Mappin
                           nonzero)
     if k is None and relations and not state:
         return Proof(False, reason="no state was found that fulfils the relations, and no multiples of them add up to the "
-                                   "difference of the sides")
+                                   f"difference of the sides{_by(exact, symbols, doubtful[0], ', ')}")
     if k is None and decimal and exact is not None:
-        return Proof(False, reason=f"the sides differ by no more than the rounding of decimal numbers, {ROUNDED:g} of their size")
+        return Proof(False, reason=f"the sides differ by no more than the rounding of decimal numbers, {ROUNDED:g} of their "
+                                   "size; pass fractions, such as sp.Rational('0.1') for 0.1", index=index(doubtful[0]))
     if k is None:
-        return Proof(False, reason=reason)
+        return Proof(False, reason=reason, index=index(doubtful[0]) if exact is not None else None)
     where = {symbols.get(leaf, sp.Symbol(leaf.args[1])): float(value) for leaf, value in state.items()}
     if exact is None or len(exact.values[k].num) > WRITTEN:
         return Proof(False, True, "the values differ", index(k), where)
     difference = Writer(exact, symbols).write(exact.values[k])
     return Proof(False, True, f"the sides differ by {difference}", index(k), where, difference)
+
+
+def _by(exact: Exact | None, symbols: Mapping[Node, sp.Expr], k: int, before: str = " by ") -> str:
+    """What is left of the difference of a pair; "" where that is long."""
+    if exact is None or len(exact.values[k].num) > WRITTEN:
+        return ""
+    text = shown(Writer(exact, symbols).write(exact.values[k]))
+    return f"{before}{text}" if len(text) <= LETTERS else ""
 
 
 def _ideal(exact: Exact, relations: Sequence[Any], symbols: Mapping[Node, sp.Expr], nonzero: Collection[sp.Expr]) -> Ideal:

@@ -159,7 +159,7 @@ class Ring:
             powers: dict[int, int] = {}
         else:
             unit, parts = a.num.factor() if len(a.num) <= FACTORED else (fmpq(1), [(a.num, 1)])
-            unit, parts = self._with_sines(unit, [(factor, int(n)) for factor, n in parts])
+            unit, parts = self.with_sines(unit, [(factor, int(n)) for factor, n in parts])
             num = self.context.constant(1 / unit)
             powers = {}
             for factor, n in parts:
@@ -195,7 +195,7 @@ class Ring:
                 num = self.product(num, self.factors[k])
         return num
 
-    def _with_sines(self, unit: fmpq, parts: list[tuple[Any, int]]) -> tuple[fmpq, list[tuple[Any, int]]]:
+    def with_sines(self, unit: fmpq, parts: list[tuple[Any, int]]) -> tuple[fmpq, list[tuple[Any, int]]]:
         """Factors (c - 1) (c + 1) as -s^2."""
         for s, c in self.sines:
             less, more = self.generators[c] - 1, self.generators[c] + 1

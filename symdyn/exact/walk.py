@@ -31,6 +31,8 @@ _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)
 _BITS = 80
 # Roots that one is taken apart to, at most; that of a number.
 ROOTS, NUMBER_ROOTS = 4, 8
+# Absolute values that one is taken apart to, above and below the bar.
+SIZES = 4
 _TRUTH = ("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not")
 
 
@@ -50,6 +52,7 @@ class Exact:
     values   of the entries, in order
     ring     their arithmetic; leaves: generator -> leaf; atoms: generator -> atom
     bases    base angles, each a sum of terms; sines: generators of sine and cosine of each
+    not_negative   generators that never are negative
     """
 
     def __init__(self, entries: Sequence[Any], bound: int = BOUND, unit_vectors: Sequence[Sequence[Node]] = (),
@@ -98,16 +101,26 @@ class Exact:
         def number(a: Any) -> Any:
             return a if isinstance(a, bool) else taken_as.get(exact(a)) or ring.number(exact(a))
 
-        free_of_sign = {k for k, leaf in self.leaves.items() if leaf in positive}
+        self.not_negative = free_of_sign = {k for k, leaf in self.leaves.items() if leaf in positive}
         same: dict[str, list[tuple[Value, Value]]] = {}
 
         def function(node: Node, args: tuple[Any, ...]) -> Value:
             if node.op == "sqrt" and len(args[0].num):
-                result, below = root_taken_apart(ring, args[0], free_of_sign, _roots(node))
+                result, below, size = root_taken_apart(ring, args[0], free_of_sign, _roots(node))
                 for inside in below:
                     result = ring.mul(result, of_atom(Atom("sqrt", (inside,))))
-                return result
+                return ring.mul(result, absolute(size))
+            if node.op == "abs":
+                return absolute(args[0])
             return of_call(args, node.args[1]) if node.op == "item" else of_atom(Atom(node.op, args))
+
+        def absolute(value: Value) -> Value:
+            result, above, below = absolute_taken_apart(ring, value, free_of_sign)
+            for inside in above:
+                result = ring.mul(result, of_atom(Atom("abs", (inside,))))
+            for inside in below:
+                result = ring.div(result, of_atom(Atom("abs", (inside,))))
+            return result
 
         def of_call(args: tuple[Any, ...], item: int) -> Value:
             kernel, *values = args
@@ -133,7 +146,7 @@ class Exact:
                 known[key] = ring.generator(k)
                 if len(args) == 1 and isinstance(args[0], Value):
                     same[f"{atom.op}{item}"].append((args[0], known[key]))
-                if atom.op == "sqrt":
+                if atom.op in ("sqrt", "abs", "exp"):
                     free_of_sign.add(k)
                 squared = atom.op in ("sqrt", "abs") and not args[0].under
                 if squared:
@@ -205,8 +218,8 @@ class _Polynomials(Arithmetic):
 
 def _generators(of_calls: bool, node: Node) -> int:
     """The most generators that a function needs; a call has one for each result that others are expressed by."""
-    if node.op == "sqrt":
-        return _roots(node)
+    if node.op in ("sqrt", "abs"):
+        return _roots(node) + 2 * SIZES if node.op == "sqrt" else 2 * SIZES
     if node.op != "call":
         return 1
     return node.args[0].n_out if of_calls else 1
@@ -216,9 +229,29 @@ def _roots(node: Node) -> int:
     return ROOTS if isinstance(node.args[0], Node) else NUMBER_ROOTS
 
 
-def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: int = ROOTS) -> tuple[Value, list[Value]]:
-    """x and what stands under roots, with sqrt(value) = x sqrt(..) sqrt(..) ...: numbers, and factors that are never negative,
-    have roots of their own, so that sqrt(a b) is sqrt(a) sqrt(b) and sqrt(a / b^2) is sqrt(a) / b.
+def absolute_taken_apart(ring: Ring, value: Value, positive: Collection[int]) -> tuple[Value, list[Value], list[Value]]:
+    """x and factors a, b with |value| = x |a| |a'| ... / (|b| |b'| ...): what is never negative stands in x."""
+    num, outside = value.num, ring.one
+    if any(printed_as_decimal(fraction(c)) for c in num.coeffs()) or len(num) > FACTORED or not len(num):
+        return outside, [value], []
+    unit, parts = ring.with_sines(*num.factor())
+    outside = ring.number(abs(fraction(unit)))
+    sides: tuple[list[Value], list[Value]] = [], []
+    factors = [(factor, int(n), 0) for factor, n in sorted(parts, key=lambda part: str(part[0]))]
+    for factor, n, side in (*factors, *[(ring.factors[k], n, 1) for k, n in value.under]):
+        whole = n if _never_negative(factor, positive) else n - n % 2
+        for _ in range(whole):
+            outside = ring.mul(outside, Value(factor)) if not side else ring.div(outside, Value(factor))
+        sides[side].extend([Value(factor)] * (n - whole))
+    for row in sides:
+        while len(row) > SIZES:
+            row[-2:] = [ring.mul(*row[-2:])]
+    return outside, *sides
+
+
+def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: int = ROOTS) -> tuple[Value, list[Value], Value]:
+    """x, what stands under roots, and y, with sqrt(value) = x sqrt(..) sqrt(..) ... |y|: numbers, and factors that are never
+    negative, have roots of their own, so that sqrt(a b) is sqrt(a) sqrt(b), sqrt(a / b^2) is sqrt(a) / b, and sqrt(c^2) is |c|.
 
     positive   generators that are not negative; most: roots on the right
     """
@@ -230,8 +263,9 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: 
             for _ in range(int(powers[k]) // 2):
                 outside = ring.mul(outside, ring.generator(k))
                 num = divmod(num, ring.generators[k] ** 2)[0]
-        return outside, [Value(num, value.under)]
+        return outside, [Value(num, value.under)], ring.one
     under = []
+    size = ring.one
     for k, n in value.under:
         factor = ring.factors[k]
         if _never_negative(factor, positive):
@@ -240,8 +274,9 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: 
                 num = ring.product(num, factor)
             outside = ring.mul(outside, Value(ring.one.num, ((k, (n + 1) // 2),)))
         else:
-            under.append((k, n))
-    unit, parts = num.factor()
+            size = ring.div(size, Value(factor ** (n // 2)))
+            under += [(k, 1)] * (n % 2)
+    unit, parts = ring.with_sines(*num.factor())
     number = fraction(unit)
     root = _root_of_square_in(abs(number.numerator) * number.denominator)
     outside = ring.mul(outside, ring.number(Fraction(root, number.denominator)))
@@ -254,13 +289,19 @@ def root_taken_apart(ring: Ring, value: Value, positive: Collection[int], most: 
             outside = ring.mul(outside, Value(ring.reduced(factor ** (int(n) // 2))))
             found += [Value(factor)] * (int(n) % 2)
         else:
-            rest = ring.reduced(rest * factor ** int(n))
+            size = ring.mul(size, Value(ring.reduced(factor ** (int(n) // 2))))
+            rest = ring.reduced(rest * factor ** (int(n) % 2))
     found += [ring.number(prime) for prime, _ in _factors(left)]
     if not rest.is_one() or under:
         found.append(Value(rest, tuple(under)))
     while len(found) > most:
         found[-2:] = [ring.mul(*found[-2:])]
-    return outside, found
+    return outside, found, size
+
+
+def never_zero(p: Any, positive: Collection[int]) -> bool:
+    """Whether a polynomial is a number with terms of its sign, squares times what is not negative."""
+    return any(not any(exponents) for exponents, _ in p.terms()) and any(_never_negative(q, positive) for q in (p, -p))
 
 
 def _never_negative(p: Any, positive: Collection[int]) -> bool:

@@ -296,7 +296,7 @@ class System:
         >>> rail = system.add_joint(sd.Prismatic("rail", system.ground, block, axis=[1, 0, 0]))
         >>> system.add_spring_damper(system.ground, block, point_a=[-1, 0, 0], stiffness=50, length=1)
         >>> system.embedding().F_tilde
-        Matrix([[(-50 + 50/sqrt((q_rail + 1)**2))*(q_rail + 1)]])
+        Matrix([[(-50 + 50/Abs(q_rail + 1))*(q_rail + 1)]])
         """
         label = self._label(name, f"spring_{len(self.loads) + 1}")
         f = self._faults

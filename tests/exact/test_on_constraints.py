@@ -50,11 +50,35 @@ def test_proved_without_the_relations_says_so():
 
 @pytest.mark.parametrize(("on", "reason"), [
     ([x, x - 1], "undecided: the relations contradict each other: nothing fulfils them, and anything would follow"),
-    (x**2 + y**2 + 1, "undecided: no state was found that fulfils the relations, and no multiples of them add up to the "
-                      "difference of the sides"),
+    (x**2 + y**2 + 1, "undecided: nothing real fulfils the relations: x**2 + y**2 + 1 is never zero"),
+    (sp.sqrt(x) + 1, "undecided: nothing real fulfils the relations: sqrt(x) + 1 is never zero"),
+    (-l - sp.exp(x) - 2, "undecided: nothing real fulfils the relations: -l - exp(x) - 2 is never zero"),
+    (s(x) - 2, "undecided: no state was found that fulfils the relations, and no multiples of them add up to the difference of "
+               "the sides, x - y"),
 ])
 def test_relations_that_nothing_fulfils_prove_nothing(on, reason):
     assert str(sd.prove(x, y, on=on)) == reason
+
+
+def test_multiples_of_relations_that_nothing_real_fulfils_are_no_proof():
+    assert str(sd.prove(x * (s(y) - 2), 0, on=s(y) - 2)) == (
+        "undecided: no real values were found that fulfil the relations; from what nothing fulfils anything would follow")
+    assert str(sd.prove(x * (s(y) - 1), 0, on=s(y) - 1)) == "proved: on the relations"
+
+
+@pytest.mark.parametrize(("a", "b", "on"), [
+    (s(x), 0, x), (c(x + y), c(y), x), (s(x), s(y), x - y), (c(x), c(y), x + y), (sp.exp(x), 1, x), (sp.sqrt(x), 1, x - 1),
+    (s(x) + y, s(4) + 2, [x - 2 * y, y - 2]), (sp.Matrix([s(x), c(x)]), sp.Matrix([0, 1]), sp.Eq(x, 0)),
+    (s(x / l), s(y), x - l * y), (s(x) * y**2, s(x), [x - y, y**2 - 1])])
+def test_relations_reach_into_functions(a, b, on):
+    assert str(sd.prove(a, b, on=on)) == "proved: on the relations" and not sd.prove(a, b)
+
+
+def test_relations_reach_into_functions_only_where_they_hold():
+    assert sd.prove(s(x), s(y), on=x**2 - y**2).refuted and sd.prove(c(x), 1, on=x - y).refuted
+    assert sd.prove(s(x), s(y), on=x * y).refuted  # x y = 0 gives neither
+    z = sp.Symbol("z", real=True)
+    assert not sd.prove(s(x), s(y), on=z * (x - y)).proved  # z may be zero
 
 
 def test_closed_loop_of_four_bars(four_bar):
