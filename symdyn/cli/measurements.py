@@ -74,7 +74,9 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.pipeline:run", "the pipeline, from description to motion: times, operations, energy errors", (_ONLY,)),
     "peers": Measurement(
         "symdyn.lab.peers.command:run", "accelerations compared with Pinocchio and CasADi's C code, in one run", (
-            _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON)),
+            _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON,
+            Option("of_derivatives", "--derivatives", {"action": "store_true", "help": "derivatives of the accelerations by q "
+                   "and u, in place of the accelerations"}))),
     "robots": Measurement(
         "symdyn.lab.robots.command:run", "robots from URDF files compared with Pinocchio: agreement, operations, times", (
             _names("--only", "only", "some of the robots; names with * and ?", "ROBOT"),

@@ -50,10 +50,12 @@ class Loop:
                       ctypes.c_void_p(self.evaluator.x.ctypes.data))
 
 
-def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 0, name: str = "rhs") -> Loop:
+def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 0, name: str = "rhs",
+                  last: int | None = None) -> Loop:
     """The right-hand side at the state x (default: small numbers), parameters at their defaults, 0.5 and more without one.
 
     name   of another function whose result begins with x_dot
+    last   the entry of the result that the next evaluation depends on; default: the last of x_dot
     """
     source = emit(equations, "c", (name,), standalone=False, integrator=False)
     metadata = source.metadata
@@ -63,7 +65,7 @@ def compiled_loop(equations: Equations, x: np.ndarray | None = None, fed: int = 
               "inputs": "frame->inputs", "p": "frame->p", "c": "frame->c"}
     call = ", ".join([*[places[g] for g in function.arguments], "frame->out"])
     text = next(iter(source.files.values())) + _LOOP.format(
-        name=metadata.name, function=name, call=call, last=sizes.x - 1)
+        name=metadata.name, function=name, call=call, last=sizes.x - 1 if last is None else last)
     unit = CUnit(text, metadata, require_compiler())
     evaluator = unit.evaluator(name)
     evaluator.set_params(np.array([0.5 + 0.01 * k if v is None else v for k, v in enumerate(metadata.defaults)]))

@@ -6,7 +6,9 @@
 //                                         PX PY PZ or S; X Y Z its place on the parent, parent axes, m
 //   turned PARENT KIND  X Y Z  R11 R12 R13 R21 ... R33  X Y Z    the same with the axis, which only kinds of the reader's own look
 //                                         at, and the axes on the parent
-//   body JOINT M  X Y Z  XX XY XZ YY YZ ZZ   mass, kg; centre of mass, m, and inertia about it, kg m^2, in joint axes
+//   frame JOINT  R11 R12 R13 R21 ... R33  X Y Z    the axes of the body that the joint moves, in those of the joint: what is on
+//                                         this body is given in them, in the lines that follow
+//   body JOINT M  X Y Z  XX XY XZ YY YZ ZZ   mass, kg; centre of mass, m, and inertia about it, kg m^2, in axes of the body
 
 #include <istream>
 #include <map>
@@ -51,6 +53,14 @@ public:
         return v;
     }
 
+    Eigen::Matrix<Scalar, 3, 3> matrix()
+    {
+        Eigen::Matrix<Scalar, 3, 3> m;
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) m(i, j) = number();
+        return m;
+    }
+
     Eigen::Matrix<Scalar, 3, 3> symmetric()
     {
         Eigen::Matrix<Scalar, 3, 3> m;
@@ -84,6 +94,7 @@ pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std:
         {"PY", typename Collection::JointModelPY()}, {"PZ", typename Collection::JointModelPZ()},
         {"S", typename Collection::JointModelSpherical()}};
     pinocchio::ModelTpl<Scalar, 0, Joints> model;
+    std::map<std::size_t, Place> frames;
     Reader<Scalar> reader(text, parameters);
     std::string what;
     while (reader.next(what)) {
@@ -95,19 +106,26 @@ pinocchio::ModelTpl<Scalar, 0, Joints> build(const std::string &text, const std:
             Place place = Place::Identity();
             if (what == "turned") {
                 others.add(kinds, reader.vector());
-                for (int i = 0; i < 3; i++)
-                    for (int j = 0; j < 3; j++) place.rotation()(i, j) = reader.number();
+                place.rotation() = reader.matrix();
             }
             const auto kind = kinds.find(name);
             if (kind == kinds.end()) throw std::runtime_error("unknown kind of joint '" + name + "'");
             place.translation() = reader.vector();
+            if (frames.count(parent)) place = frames.at(parent) * place;
             model.addJoint(parent, kind->second, place, "joint" + std::to_string(model.njoints));
         } else if (what == "body") {
             const std::size_t joint = reader.index();
             const Scalar mass = reader.number();
             const auto com = reader.vector();
             const pinocchio::Symmetric3Tpl<Scalar> inertia(reader.symmetric());
-            model.inertias.at(joint) = pinocchio::InertiaTpl<Scalar>(mass, com, inertia);
+            const pinocchio::InertiaTpl<Scalar> own(mass, com, inertia);
+            model.inertias.at(joint) = frames.count(joint) ? frames.at(joint).act(own) : own;
+        } else if (what == "frame") {
+            const std::size_t joint = reader.index();
+            Place place = Place::Identity();
+            place.rotation() = reader.matrix();
+            place.translation() = reader.vector();
+            frames[joint] = place;
         } else {
             throw std::runtime_error("unknown line '" + what + "'");
         }

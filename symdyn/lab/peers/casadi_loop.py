@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,8 @@ from symdyn.lab.peers.program import Program, State, address, unsorted
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import Compiler
 
+# What the function in a loop is called.
+EVALUATION = "evaluation"
 _LOOP = """
 CASADI_SYMBOL_EXPORT void prepare(const double *p, double *c)
 {{
@@ -31,7 +33,7 @@ CASADI_SYMBOL_EXPORT void loop(long n, long fed, double *q, const double *u, con
     // CasADi's code asks whether an argument is there, wherever it takes an entry; here the compiler knows.
     if (!q || !u || !p || !c || !out) return;
     for (long i = 0; i < n; i++) {{
-        accelerations(arg, res, iw, w, 0);
+        evaluation(arg, res, iw, w, 0);
         q[fed] = start + 1e-9 * out[{last}];
     }}
     q[fed] = start;
@@ -41,14 +43,14 @@ CASADI_SYMBOL_EXPORT void loop(long n, long fed, double *q, const double *u, con
 
 @dataclass(frozen=True)
 class Form:
-    """One of the ways in which CasADi can compute accelerations.
+    """One of the ways in which CasADi can compute accelerations, or their derivatives.
 
-    accelerations   CasADi function (q, u, p, c) -> u_dot, or [u_dot; lam]; prologue (p) -> c, or None
-    operations      that depend on q or u
+    evaluation   CasADi function (q, u, p, c) -> u_dot, or [u_dot; lam], or derivatives of u_dot; prologue (p) -> c, or None
+    operations   that depend on q or u
     """
 
     name: str
-    accelerations: Any
+    evaluation: Any
     prologue: Any
     operations: int
 
@@ -58,7 +60,7 @@ def hoisted(casadi: Any, name: str, function: Any) -> Form:
     q, u, p = function.sx_in()
     rest, symbols, values = casadi.extract_parametric(function(q, u, p), p)
     c = casadi.vertcat(*symbols)
-    main = casadi.Function("accelerations", [q, u, p, c], [rest])
+    main = casadi.Function(EVALUATION, [q, u, p, c], [rest])
     return Form(name, main, casadi.Function("prologue", [p], [casadi.vertcat(*values)]), operations(casadi, main))
 
 
@@ -82,25 +84,36 @@ def operations(casadi: Any, function: Any) -> int:
 
 
 def casadi_program(casadi: Any, compiler: Compiler, form: Form, state: State, p: np.ndarray, q_order: Sequence[int],
-                      u_order: Sequence[int]) -> Program:
-    """The C code of a form, compiled, at a state; orders as in Description. p (n_p,): must outlive the program."""
-    functions = [form.accelerations] + ([form.prologue] if form.prologue else [])
+                   u_order: Sequence[int]) -> Program:
+    """The C code of a form of the accelerations, compiled, at a state; orders as in Description. p (n_p,): must outlive the
+    program."""
+    n_u = len(u_order)
+    run, out = casadi_loop(casadi, compiler, form, state, p, q_order, u_order, n_u - 1)
+    return Program(form.name, run, lambda: unsorted(out[:n_u], tuple(u_order)),
+                   (lambda: out[n_u:].copy()) if len(out) > n_u else None)
+
+
+def casadi_loop(casadi: Any, compiler: Compiler, form: Form, state: State, p: np.ndarray, q_order: Sequence[int],
+                u_order: Sequence[int], last: int) -> tuple[Callable[[int], None], np.ndarray]:
+    """The C code of a form, compiled, in a loop at a state: run(n), and where the result of the last evaluation is.
+
+    last   the entry of the result that a coordinate of the next evaluation depends on
+    """
+    functions = [form.evaluation] + ([form.prologue] if form.prologue else [])
     generator = casadi.CodeGenerator("peer")
     for function in functions:
         generator.add(function)
-    n_u = len(u_order)
     sizes = {f"sz_{what}": max(4, *[getattr(f, f"sz_{what}")() for f in functions]) for what in ("arg", "res", "iw", "w")}
-    evaluation = "int accelerations("
+    evaluation = f"int {EVALUATION}("
     text = generator.dump().replace(f"CASADI_SYMBOL_EXPORT {evaluation}", f"static {evaluation}") + _LOOP.format(
-        **sizes, last=n_u - 1, prologue="prologue(arg, res, iw, w, 0);" if form.prologue else "")
+        **sizes, last=last, prologue="prologue(arg, res, iw, w, 0);" if form.prologue else "")
     library = cache.load(text, "casadi_peer", compiler)
     c = np.zeros(max(1, form.prologue.numel_out(0) if form.prologue else 1))
     library.prepare(address(p), address(c))
     q, u = state.q[list(q_order)], state.u[list(u_order)]
-    out, fed = np.zeros(form.accelerations.numel_out(0)), q_order.index(state.fed)
+    out, fed = np.zeros(form.evaluation.numel_out(0)), q_order.index(state.fed)
 
     def run(n: int) -> None:
         library.loop(ctypes.c_long(n), ctypes.c_long(fed), address(q), address(u), address(p), address(c), address(out))
 
-    return Program(form.name, run, lambda: unsorted(out[:n_u], tuple(u_order)),
-                      (lambda: out[n_u:].copy()) if len(out) > n_u else None)
+    return run, out

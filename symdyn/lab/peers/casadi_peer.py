@@ -6,9 +6,9 @@ from typing import Any
 
 from symdyn.bench.pinocchio_casadi import Generator
 from symdyn.bench.toolchain import c_compiler
-from symdyn.lab.peers.casadi_loop import Form, casadi_program, hoisted, operations
+from symdyn.lab.peers.casadi_loop import EVALUATION, Form, casadi_loop, casadi_program, hoisted, operations
 from symdyn.lab.peers.description import Description
-from symdyn.lab.peers.program import Program, State
+from symdyn.lab.peers.program import Program, State, unsorted_derivatives
 
 
 class CasadiPeer:
@@ -32,9 +32,25 @@ class CasadiPeer:
         function = self.generator.function(description.text, description.values, runtime)
         # What CasADi offers to make code shorter is used.
         q, u, _, p = function.sx_in()
-        return self.casadi.Function("accelerations", [q, u, p], [function(q, u, [], p)], {"cse": True})
+        return self.casadi.Function(EVALUATION, [q, u, p], [function(q, u, [], p)], {"cse": True})
+
+    def derivatives_form(self, description: Description) -> Form:
+        """The derivatives of the accelerations by q and u, parameters as arguments."""
+        ca = self.casadi
+        function = self._function(description, True)
+        q, u, p = function.sx_in()
+        by = ca.densify(ca.jacobian(function(q, u, p), ca.vertcat(q, u)))
+        made = ca.Function(EVALUATION, [q, u, p], [by], {"cse": True})
+        return Form("casadi", made, None, operations(ca, made))
+
+    def derivatives_program(self, form: Form, description: Description, state: State) -> Program:
+        """Their C code, compiled, at a state."""
+        n, u_order = len(description.u_order), list(description.u_order)
+        run, out = casadi_loop(self.casadi, self.compiler, form, state, description.values, description.q_order, u_order,
+                               2 * n * n - 1)
+        return Program(form.name, run, lambda: unsorted_derivatives(out.reshape(2 * n, n).T, description))
 
     def program(self, form: Form, description: Description, state: State) -> Program:
         """The C code of a form, compiled, at a state."""
         return casadi_program(self.casadi, self.compiler, form, state, description.values, description.q_order,
-                                 description.u_order)
+                              description.u_order)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from symdyn.bench.toolchain import version
 from symdyn.errors import MissingExtra, SymdynError
 from symdyn.formulation.equations import Equations
-from symdyn.lab.peers import arm
+from symdyn.lab.peers import arm, derivatives
 from symdyn.lab.peers.benchmark import benchmark, fastest
 from symdyn.lab.peers.casadi_peer import CasadiPeer
 from symdyn.lab.peers.four_bar import four_bar_benchmark
@@ -20,7 +20,7 @@ from symdyn.lab.peers.kkt_peer import KktPeer
 from symdyn.lab.peers.loop_table import LEGEND as LOOP_LEGEND
 from symdyn.lab.peers.loop_table import loop_lines, loop_record
 from symdyn.lab.peers.models import Case, cases
-from symdyn.lab.peers.pinocchio_peer import PinocchioLoopPeer, PinocchioPeer
+from symdyn.lab.peers.pinocchio_peer import PinocchioDerivativesPeer, PinocchioLoopPeer, PinocchioPeer
 from symdyn.lab.peers.table import LEGEND, heading, line, record
 from symdyn.model.system import System
 from symdyn.runtime.building.compiler import require_compiler
@@ -38,6 +38,11 @@ def find_peers() -> tuple[list[Peer], list[str]]:
 def find_loop_peers() -> tuple[list[LoopPeer], list[str]]:
     """The same for a mechanism with a closed loop. SymPy is always there."""
     return _found((("CasADi", KktPeer), ("SymPy's Kane's method", KanePeer), ("Pinocchio", PinocchioLoopPeer)))
+
+
+def find_derivatives_peers() -> tuple[list[derivatives.Peer], list[str]]:
+    """The same for derivatives."""
+    return _found((("CasADi", CasadiPeer), ("Pinocchio", PinocchioDerivativesPeer)))
 
 
 def _found(kinds: Sequence[tuple[str, Callable[[], Made]]]) -> tuple[list[Made], list[str]]:
@@ -61,28 +66,34 @@ def _in_one_line(fault: SymdynError) -> str:
 
 
 def run(names: Sequence[str] | None = None, repeats: int = 40, to_json: Path | None = None,
-        make_equations: Callable[[System], Equations] = fastest) -> int:
+        make_equations: Callable[[System], Equations] | None = None, of_derivatives: bool = False) -> int:
     """Measure the named mechanisms (default: all) and print a line of each; returns how many miss their bounds.
 
     repeats          timings of each program, of which the best counts
     to_json          file for everything that was measured
-    make_equations   symdyn's equations of a System
+    make_equations   symdyn's equations of a System; default: the fastest
+    of_derivatives   of the accelerations by q and u, in place of the accelerations
     """
-    chosen, loop = cases(names)
+    differentiated = derivatives.cases(names) if of_derivatives else {}
+    chosen, loop = ({}, False) if of_derivatives else cases(names)
     if repeats < 1:
         raise SymdynError(f"{repeats} repeats were asked for; pass 1 or more")
     compiler = require_compiler()
     result: dict[str, Any] = {
         "machine": platform.machine(), "compiler": compiler.version, "repeats": repeats, "notes": [],
-        "versions": {name: version(name) for name in ("symdyn", "pin", "casadi", "sympy")}, "models": [], "loops": []}
+        "versions": {name: version(name) for name in ("symdyn", "pin", "casadi", "sympy")}, "models": [], "loops": [],
+        "derivatives": []}
     if chosen:
-        _trees(chosen, repeats, make_equations, result)
+        _trees(chosen, repeats, make_equations or fastest, result)
     if loop:
-        _loop(repeats, make_equations, result)
+        _loop(repeats, make_equations or fastest, result)
+    if differentiated:
+        _derivatives(differentiated, repeats, make_equations, result)
     if to_json is not None:
         to_json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
         print(f"wrote {to_json}")
-    return sum(bool(row["missed"]) for row in (*result["models"], *result["loops"])) + bool(chosen and arm.misses())
+    rows = (*result["models"], *result["loops"], *result["derivatives"])
+    return sum(bool(row["missed"]) for row in rows) + bool(chosen and arm.misses())
 
 
 def _trees(chosen: Mapping[str, Case], repeats: int, make_equations: Callable[[System], Equations],
@@ -106,6 +117,19 @@ def _loop(repeats: int, make_equations: Callable[[System], Equations], result: d
     row = four_bar_benchmark(peers, repeats, make_equations)
     print("\n".join([*loop_lines(row), LOOP_LEGEND]))
     result["loops"].append(loop_record(row))
+
+
+def _derivatives(chosen: Mapping[str, derivatives.Case], repeats: int, make_equations: Callable[[System], Equations] | None,
+                 result: dict[str, Any]) -> None:
+    """The same for derivatives of the accelerations."""
+    peers, notes = find_derivatives_peers()
+    _noted(notes, result)
+    print(derivatives.heading(), flush=True)
+    for name, case in chosen.items():
+        row = derivatives.benchmark(name, case, peers, repeats, make_equations)
+        print(derivatives.line(row), flush=True)
+        result["derivatives"].append(derivatives.record(row))
+    print(derivatives.LEGEND)
 
 
 def _noted(notes: Sequence[str], result: dict[str, Any]) -> None:

@@ -85,15 +85,19 @@ class _Writer:
 
     def joint(self, joint: Joint, parent: int) -> int:
         """Add the simple joints that a joint consists of, with massless bodies between; returns the last one's number."""
-        if joint.parent_rotation != sp.Matrix(IDENTITY) or joint.child_rotation != joint.parent_rotation or any(
-                joint.child_point):
-            raise SymdynError(f"joint {joint.name!r} of {self.model.name} has turned frames or a place on its child; the peers "
-                              "take joints at the child's origin, in frames that are not turned")
         coordinates, place = list(joint.coordinates), tuple(joint.parent_point)
+        turned = _turned(joint)
         for kind in self.kinds(joint):
-            self.line(f"joint {parent} {kind}", *place)
+            if turned:
+                assert isinstance(joint, (Revolute, Prismatic))
+                self.line(f"turned {parent} {kind}", *joint.axis, *joint.parent_rotation, *place)
+            else:
+                self.line(f"joint {parent} {kind}", *place)
             self.joints += 1
-            parent, place = self.joints, (0, 0, 0)
+            parent, place, turned = self.joints, (0, 0, 0), False
+        if joint.child_rotation != sp.Matrix(IDENTITY) or any(joint.child_point):
+            R = joint.child_rotation.T
+            self.line(f"frame {parent}", *R, *(-R * sp.Matrix(joint.child_point)))
         if isinstance(joint, Free) and isinstance(joint.orientation, EulerParameters):
             coordinates.append(coordinates.pop(3))  # Pinocchio has theta0 last
         self.coordinates += coordinates
@@ -104,12 +108,17 @@ class _Writer:
         """The words for a joint, first to last."""
         if isinstance(joint, (Revolute, Prismatic)) and tuple(joint.axis) in _AXES:
             return [("R" if isinstance(joint, Revolute) else "P") + _AXES[tuple(joint.axis)]]
-        if isinstance(joint, Free) and not joint.body_velocity:
+        if isinstance(joint, Free) and not joint.body_velocity and not _turned(joint):
             orientation = joint.orientation
             if isinstance(orientation, EulerParameters):
                 return ["PX", "PY", "PZ", "S"]
             if not orientation.angular_velocity:
                 return ["PX", "PY", "PZ", *[f"R{letter}" for letter in orientation.sequence]]
         raise SymdynError(f"joint {joint.name!r} of {self.model.name} is {joint.kind}; the peers take revolute and prismatic "
-                          "joints about and along coordinate axes, and free ones with Euler parameters or with the derivatives "
-                          "of Euler angles as speeds")
+                          "joints about and along coordinate axes, and free ones in frames that are not turned, with Euler "
+                          "parameters or with the derivatives of Euler angles as speeds")
+
+
+def _turned(joint: Joint) -> bool:
+    """Whether a joint's axes are turned on the body before."""
+    return bool(joint.parent_rotation != sp.Matrix(IDENTITY))

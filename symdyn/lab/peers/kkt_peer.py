@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from symdyn.bench.toolchain import c_compiler, package_folder
-from symdyn.lab.peers.casadi_loop import Form, casadi_program, hoisted, operations
+from symdyn.lab.peers.casadi_loop import EVALUATION, Form, casadi_program, hoisted, operations
 from symdyn.lab.peers.program import Program, State
 
 PARAMETERS = tuple("g m1 lc1 I1 m2 lc2 I2 m3 lc3 I3 l1 l2 l3 d".split())
@@ -36,10 +36,10 @@ class KktPeer:
         D, LT, order = ca.ldl(A, False)
         V, R, beta, rows, columns = ca.qr_sparse(A)
         solved = {"solve": ca.solve(A, b), "qr": ca.qr_solve(b, V, R, beta, rows, columns), "ldl": ca.ldl_solve(b, D, LT, order)}
-        functions = {f"casadi {way}": ca.Function("accelerations", [q, u, p], [x], {"cse": True}) for way, x in solved.items()}
+        functions = {f"casadi {way}": ca.Function(EVALUATION, [q, u, p], [x], {"cse": True}) for way, x in solved.items()}
         forms = [Form(name, f, None, operations(ca, f)) for name, f in functions.items()]
         leanest = min(forms, key=lambda form: form.operations)
-        return [*forms, hoisted(ca, f"{leanest.name} hoisted", leanest.accelerations)]
+        return [*forms, hoisted(ca, f"{leanest.name} hoisted", leanest.evaluation)]
 
     def _system(self, q: Any, u: Any, v: Mapping[str, Any]) -> tuple[Any, Any]:
         """Matrix and right side, from the positions of the bars; with absolute angles, which takes the fewest operations."""

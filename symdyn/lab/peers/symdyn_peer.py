@@ -31,3 +31,10 @@ def constrained_program(equations: Equations, state: State) -> Program:
     loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed, "rhs_lam")
     out = loop.evaluator.out
     return Program("symdyn with multipliers", loop.run, lambda: out[n_q:n].copy(), lambda: out[n:].copy())
+
+
+def derivatives_program(equations: Equations, state: State) -> Program:
+    """The derivative of the accelerations by q and u, from that of the right-hand side by x, as symdyn_program."""
+    n_q, n = len(state.q), len(state.q) + len(state.u)
+    loop = compiled_loop(equations, np.concatenate([state.q, state.u]), state.fed, "jacobian_x", n * n - 1)
+    return Program("symdyn", loop.run, lambda: loop.evaluator.out.reshape(n, n)[n_q:].copy())

@@ -14,14 +14,14 @@ from symdyn.timing.loops import best_times
 AGREEMENT = 1e-7
 
 
-def agree(programs: Sequence[Program], model: str) -> float:
-    """Largest difference of the programs' accelerations from those of the first, relative to their norm.
+def agree(programs: Sequence[Program], model: str, what: str = "accelerations") -> float:
+    """Largest difference of the programs' results from those of the first, relative to their norm; what: they are called.
 
     The same of multipliers, of those that compute them. Raises SymdynError if they do not compute the same.
     """
     for program in programs:
         program.run(1)
-    worst = _difference([(c.name, c.accelerations()) for c in programs], "accelerations", model)
+    worst = _difference([(c.name, c.result()) for c in programs], what, model)
     return max(worst, _difference([(c.name, c.multipliers()) for c in programs if c.multipliers], "multipliers", model))
 
 
