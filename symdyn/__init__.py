@@ -19,6 +19,7 @@ _HOME = {
                             "Spherical", "Universal"),
     "symdyn.model.elements.added_mass": ("AddedMass",),
     "symdyn.model.closures": ("Gear", "Rod"),
+    "symdyn.model.contacts.contact": ("Contact",),
     "symdyn.model.elements": ("Box", "Buoyancy", "Drag", "LinearDamping", "LinearStiffness", "MooringLine", "Thrust",
                               "WaveExcitation"),
     "symdyn.model.orientation": ("EulerAngles", "EulerParameters"),
@@ -49,7 +50,8 @@ _HOME = {
 }
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {
-    name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")} | {"shapes": "symdyn.model.shapes"}
+    name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")} | {
+    "contacts": "symdyn.model.contacts.shapes", "shapes": "symdyn.model.shapes"}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]
 

@@ -113,6 +113,7 @@ from symdyn.frames import rate as rate
 from symdyn.model import shapes as shapes
 from symdyn.model.closures import Gear as Gear
 from symdyn.model.closures import Rod as Rod
+from symdyn.model.contacts.contact import Contact as Contact
 from symdyn.model.elements import (
     Box as Box,
 )

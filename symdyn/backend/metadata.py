@@ -115,6 +115,25 @@ class EventRecord(NamedTuple):
     unproved: str = ""
 
 
+class ContactRecord(NamedTuple):
+    """A rigid contact in one place: the contact that it is of, its number of rows, the parameters that its mode is set by ("" and
+    none without friction), what its events are called after its name, its law of impacts."""
+
+    name: str
+    contact: str
+    rows: int
+    closed: str
+    sticking: str
+    sliding: tuple[str, ...]
+    events: tuple[str, ...]
+    impact: str
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The parameters that a run sets."""
+        return (self.closed, *([self.sticking] if self.sticking else ()), *self.sliding)
+
+
 class Chart(NamedTuple):
     """Euler angles of a joint: their sequence, the kind of its speeds, the coordinate of the second angle."""
 
@@ -158,6 +177,7 @@ class ModuleMetadata(Metadata):
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
     output_units           of outputs that are points
+    contacts               rigid ones, see ContactRecord
     """
 
     functions: tuple[str, ...] = ()
@@ -184,6 +204,7 @@ class ModuleMetadata(Metadata):
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
     output_units: Mapping[str, str] = field(default_factory=dict)
+    contacts: tuple[ContactRecord, ...] = ()
 
 
 def _plain(value: Any) -> Any:

@@ -83,6 +83,7 @@ class Equations:
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     events       what is looked for along a motion (see model.event), in the order of the quantity events
+    contacts     rigid ones, place by place (see model.contacts.lowering)
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
@@ -112,6 +113,7 @@ class Equations:
     flexible: tuple[Mapping[str, Any], ...] = ()
     watched: Callable[[], Sequence[Any]] = tuple
     events: tuple[Any, ...] = ()
+    contacts: tuple[Any, ...] = ()
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from symdyn.backend.metadata import Chart, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
+from symdyn.backend.metadata import Chart, ContactRecord, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
@@ -89,7 +89,10 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         watches=tuple(ValidityRange(w.label, w.least, w.most, w.message) for w in equations.watched()),
         switches=tuple(JumpRecord(**description(jump, equations.printed_leaves())) for jump in switches(equations)),
         not_smooth=not_smooth(equations.quantity("rhs").tolist()),
-        drawn=tuple(equations.drawn), flexible=tuple(equations.flexible), output_units=dict(equations.symbols.point_units))
+        drawn=tuple(equations.drawn), flexible=tuple(equations.flexible), output_units=dict(equations.symbols.point_units),
+        contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name,
+                                     c.switches[1].name if len(c.rows) > 1 else "", tuple(s.name for s in c.sliding), c.events,
+                                     c.impact) for c in equations.contacts))
 
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:

@@ -14,6 +14,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body
+from symdyn.model.contacts.lowering import with_contacts
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import check_events
 from symdyn.model.faults import NAME, Faults, plain_unit
@@ -39,7 +40,7 @@ def check(system: System) -> Model:
 
     Raises ModelError that lists every fault; warns (ModelWarning) of inertias that no real body has.
     """
-    return _Checker(with_carriers(system)).model()
+    return _Checker(with_contacts(with_carriers(system))).model()
 
 
 class _Checker:
@@ -95,7 +96,7 @@ class _Checker:
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units},
-            tuple(s.shapes), self.events, distinct)
+            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts))
 
     # -- names
 
@@ -110,6 +111,7 @@ class _Checker:
                             ("constraints", [c.name for c in s.constraints]),
                             ("outputs", [o.name for o in s.outputs]), ("events", [e.name for e in s.events]),
                             ("states", [z.symbol.name for z in s.states]),
+                            ("contacts", [c.name for c in s.contacts]),
                             ("loads", [load.label for load in s.loads])):
             for name, count in Counter(map(_hashable, names)).items():
                 if count > 1 and kind != "loads":
@@ -240,7 +242,7 @@ class _Checker:
             if measure.of[0] not in joints:
                 self.faults.append(f"{where} uses {quantity}, but the system has no joint {measure.of[0]!r}; joints: "
                                    f"{', '.join(joints) or 'none'}{self._nearest(measure.of[0], joints)}")
-        elif measure.kind != "multiplier":
+        elif measure.kind not in ("multiplier", "contact"):
             for name in measure.of:
                 self._resolve(name, f"{where}: body of {quantity}")
         if measure.frame is not None:

@@ -67,7 +67,7 @@ class Quantity(Timed):
     def level(self) -> int:
         """What it takes: 0 coordinates, 1 speeds, too, 2 accelerations or forces, too."""
         kind, order = self.measure.kind, self.measure.order
-        return 2 if kind in ("multiplier", "reaction") else order + (kind == "angular_velocity")
+        return 2 if kind in ("multiplier", "reaction", "contact") else order + (kind == "angular_velocity")
 
     @property
     def unit(self) -> str:
@@ -75,6 +75,8 @@ class Quantity(Timed):
         m = self.measure
         if m.kind == "reaction":
             return "N" if m.index[0] < 3 else "N m"
+        if m.kind == "contact":
+            return "N"
         return "" if m.kind == "multiplier" else _UNITS[m.kind][m.order]
 
     @property
@@ -108,6 +110,8 @@ class Quantity(Timed):
             return rf"{_accent(m.order, 'd')}_{{{of}}}"
         if m.kind == "multiplier":
             return rf"\lambda_{{{of}}}"
+        if m.kind == "contact":
+            return rf"F_{{{of},{m.index[0] + 1}}}"
         if m.kind == "reaction":
             return rf"{'F' if m.index[0] < 3 else 'M'}_{{{of},{'xyz'[m.index[0] % 3]}}}"
         if m.kind == "rotation_matrix":

@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.counting import counted
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
+from symdyn.model.contacts.lowering import RigidContact
 from symdyn.model.event import Event
 from symdyn.model.joints import Joint
 from symdyn.model.shapes import Drawn
@@ -45,6 +46,7 @@ class Model:
     units         symbol -> unit
     shapes        what bodies look like
     doubts        sentences on what is possible, but hardly meant
+    contacts      rigid ones, place by place; their forces are among the loads, their events among the events
     """
 
     name: str
@@ -71,6 +73,7 @@ class Model:
     shapes: tuple[Drawn, ...] = ()
     events: tuple[Event, ...] = ()
     doubts: tuple[str, ...] = ()
+    contacts: tuple[RigidContact, ...] = ()
 
     def __str__(self) -> str:
         rows = [f"{self.name}: {'planar' if self.planar else 'spatial'} mechanism, no faults found",
@@ -87,7 +90,8 @@ class Model:
         without = f"; no default for {_first(missing)}" if missing else ", each with a default" if self.parameters else ""
         named = f": {_first(self.parameters)}" if self.parameters else ""
         rows.append(f"  {_number(self.parameters, 'parameter')}{named}{without}")
-        rows += [f"  {_number(things, one)}" for things, one in ((self.outputs, "output"), (self.events, "event")) if things]
+        rows += [f"  {_number(things, one)}" for things, one in ((self.outputs, "output"), (self.events, "event"),
+                                                                       (self.contacts, "rigid contact")) if things]
         rows += [f"  doubtful: {doubt}" for doubt in self.doubts]
         return "\n".join(rows)
 

@@ -17,6 +17,8 @@ from symdyn.errors import ModelError
 from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
+from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.lowering import RigidContact
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import Event, make_event
 from symdyn.model.faults import Faults
@@ -95,6 +97,8 @@ class System:
         self.constraints: list[Constraint] = []
         self.events: list[Event] = []
         self.loops: list[Joint | Gear] = []
+        self.contacts: list[Contact] = []
+        self.rigid_contacts: list[RigidContact] = []
         self.ground_motion: Joint | None = None
         self.shapes: list[Drawn] = []
         self.extra_coordinates: list[sp.Symbol] = []
@@ -339,6 +343,21 @@ class System:
             load.label = load.label or f"{load.kind}_{len(self.loads) + 1}"
             self.loads.append(load)
         return load
+
+    def add_contact(self, contact: Contact) -> Contact:
+        """Add a contact between two bodies, see Contact; its results are `Solution.contacts[name]`.
+
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> ball = system.add_body("ball", mass=1.0)
+        >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, axis=[0, 1]))
+        >>> system.add_contact(sd.Contact("floor", ball, system.ground, restitution=0.8)).name
+        'floor'
+        """
+        if not isinstance(contact, Contact):
+            self._faults.append(f"add_contact was given {shown(contact)}; pass sd.Contact(...)")
+        else:
+            self.contacts.append(contact)
+        return contact
 
     # -- outputs, states, constraints
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.closures import Gear, Rod
+from symdyn.model.contacts.lowering import SOFTNESS
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
@@ -71,6 +72,11 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
         else:
             value = output.value
             yield f"output {shown(output.name)}", value if isinstance(value, tuple) else [value], Scope.FORCES
+    for contact in s.rigid_contacts:
+        yield f"contact {contact.name}", contact.expressions, Scope.MOTION
+        yield f"contact {contact.name}: friction and restitution", contact.constants, Scope.PARAMETERS
+    if s.rigid_contacts:
+        yield "contacts", [SOFTNESS], Scope.PARAMETERS
     for event in s.events:
         yield f"event {shown(event.name)}", event.expressions, Scope.FORCES
     for state in s.states:

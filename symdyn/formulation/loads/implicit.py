@@ -51,7 +51,8 @@ _JUMPING = (sp.sign, sp.Heaviside, sp.floor, sp.ceiling, sp.Piecewise)
 
 def implicit(expressions: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Those of the expressions that hold accelerations, multipliers or reactions, each once."""
-    return [e for e in dict.fromkeys(expressions) if any(q.level == 2 for q in quantities_in([e]))]
+    return [e for e in dict.fromkeys(expressions)
+            if any(q.level == 2 and q.measure.kind != "contact" for q in quantities_in([e]))]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,6 +21,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.elements import Action, Element, Watch
 from symdyn.model.joints.modal import exactly
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
+from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.spatial.vectors import cross, dot, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import SEED, Node, exact, is_zero
@@ -60,10 +61,12 @@ class Applied:
 class Loads:
     """Records the loads of a model on its tree."""
 
-    def __init__(self, tree: Tree, kinematics: Kinematics | None = None,
-                 settle: Callable[[], Settled] | None = None) -> None:
-        """settle   gives the values of loads that depend on accelerations, multipliers and reactions; None: leaves stand for them
+    def __init__(self, tree: Tree, kinematics: Kinematics | None = None, settle: Callable[[], Settled] | None = None,
+                 touching: Callable[[], Mapping[Quantity, Any]] | None = None) -> None:
+        """settle     gives the values of loads that depend on accelerations, multipliers and reactions
+        touching   gives the forces of rigid contacts; None, of both: leaves stand for them
         """
+        self._touching = touching
         self.tree = tree
         self._settle = settle
         self.kinematics = kinematics or Kinematics(tree)
@@ -137,11 +140,21 @@ class Loads:
 
     def value(self, e: sp.Expr) -> Any:
         """The value of an expression of a load."""
+        if self.model.contacts and any(q in self.contact_forces for q in quantities_in([e])):
+            return self.algebra.within(self.contact_forces).expression(e)
         if e not in self.implicit:
             return self.algebra.expression(e)
         if self._settle is None:
             return self.implicit[e]
         return self.settled.values[e]
+
+    @cached_property
+    def contact_forces(self) -> Mapping[Quantity, Any]:
+        """Forces of rigid contacts, or leaves that stand for them, in the order of their rows."""
+        if self._touching is not None:
+            return self._touching()
+        forces = [force for contact in self.model.contacts for force in contact.forces]
+        return {force: self.algebra.recorder.leaf(f"contact_{k + 1}", SEED) for k, force in enumerate(forces)}
 
     @cached_property
     def settled(self) -> Settled:

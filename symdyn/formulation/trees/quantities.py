@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -13,6 +14,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.formulation.accelerations import Motion
 from symdyn.formulation.identification.quantities import Identification
+from symdyn.formulation.loads.contacts import ContactRows
 from symdyn.formulation.loads.implicit import Settled, solve
 from symdyn.formulation.loads.recorded import Loads
 from symdyn.formulation.probes.inertia_faults import demand_mass_matrix
@@ -45,7 +47,7 @@ class TreeQuantities(Motion):
         self.model = model
         self.lockable = tree.lockable
         self.kinematics = Kinematics(tree)
-        self.loads = Loads(tree, self.kinematics, self._settled)
+        self.loads = Loads(tree, self.kinematics, self._settled, self._touching if model.contacts else None)
         self.identification = Identification(tree, self.speed_rates)
         self.notes: list[str] = [] if tree.rigid else [
             "no regressor, base parameters or momenta: added mass and elastic bodies are no inertias of rigid bodies"]
@@ -56,6 +58,25 @@ class TreeQuantities(Motion):
         trial = self._apart({"accelerations": self.speed_rates} if given else {})
         trial.loads = Loads(self.tree, self.kinematics)
         return solve(self.algebra, self.model.name, trial.loads.implicit, trial.measured)
+
+    def _touching(self) -> Mapping[Quantity, Any]:
+        """The forces of rigid contacts."""
+        return self.recall("contact_rows").solved()  # type: ignore[no-any-return]
+
+    def contact_rows(self) -> ContactRows:
+        """Relative accelerations in rigid contacts as they follow from the forces there."""
+        trial = self._apart({})
+        trial.loads = Loads(self.tree, self.kinematics)
+        accelerations = trial.recall("accelerations")
+        along = {**self.by_time(), **dict(zip(self._leaves(self.speeds), accelerations, strict=True))}
+        return ContactRows(self.algebra, self.model.contacts, trial.loads.contact_forces, accelerations,
+                           lambda values: forward(self.algebra.recorder, list(values), along))
+
+    def contacts(self) -> np.ndarray:
+        """What a run with rigid contacts takes at a state, see ContactRows.numbers."""
+        leaves = self._leaves(self.speeds)
+        return self.recall("contact_rows").numbers(self.loads.contact_forces, lambda change: forward(  # type: ignore[no-any-return]
+            self.algebra.recorder, self.rates, dict(zip(leaves, change, strict=True))))
 
     def _apart(self, memory: dict[str, Any]) -> Self:
         """The same quantities, to be recorded apart from these."""
@@ -88,6 +109,8 @@ class TreeQuantities(Motion):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation
+        if self.model.contacts:
+            own["contacts"] = self.contacts
         if self.model.events:
             own["events"] = self.events
         if any(event.reset for event in self.model.events):
@@ -225,6 +248,8 @@ class TreeQuantities(Motion):
     def measured(self, quantity: Quantity) -> Any:
         """A quantity that takes accelerations or forces. Raises ModelError for multipliers of what is no constraint."""
         measure = quantity.measure
+        if measure.kind == "contact":
+            return self.loads.contact_forces[quantity]
         if measure.kind == "multiplier":
             raise ModelError([f"{quantity} is requested of equations without multipliers; use system.augmented()"],
                              self.model.name)

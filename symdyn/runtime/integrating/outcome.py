@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,25 @@ from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.inputs.sampled import Record
 from symdyn.runtime.integrating.events import Carried, Happened
 from symdyn.runtime.integrating.stabilization import Corrections, Stabilization
+
+
+class Phase(NamedTuple):
+    """A part of a motion in one mode of every rigid contact: from when on, the parameters that say so, the modes."""
+
+    t: float
+    p: np.ndarray
+    modes: tuple[str, ...]
+
+
+class Impact(NamedTuple):
+    """An impact: when, the impulses along the rows of all contacts (n,), N s, and their velocities before and after it; rest:
+    contacts that no longer leave, with the time at which their flights have come to their end."""
+
+    t: float
+    impulses: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    rest: Mapping[int, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -72,6 +93,7 @@ class Outcome:
     no_series  why the right-hand side, which can be evaluated, has no Taylor series where the run stopped, if that ended it
     next_step  length of the step that would be tried next, s; 0: not known
     record     inputs as controllers held them; None: without controllers
+    phases, impacts   of rigid contacts; row_phases: index of the phase of every row, (n_t,)
     """
 
     t: np.ndarray
@@ -93,3 +115,6 @@ class Outcome:
     no_series: str = ""
     next_step: float = 0.0
     record: Record | None = None
+    phases: Sequence[Phase] = ()
+    impacts: Sequence[Impact] = ()
+    row_phases: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))

@@ -24,6 +24,7 @@ from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.automatic import automatic
 from symdyn.runtime.integrating.charts import warn_near_lock
 from symdyn.runtime.integrating.compiled import run_compiled
+from symdyn.runtime.integrating.contacts import check_overlap, run_contacts
 from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
@@ -80,6 +81,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                       max_steps, len(start), look=wanted(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
     asked, controlled = Asked.of(module, sensitivities, p, free), flag(sensitivity_control, f"{module.name}: sensitivity_control")
+    if metadata.contacts and request.look is not None:  # theirs are looked for as their modes say
+        own = {f"{c.name}_{what}" for c in metadata.contacts for what in c.events}
+        request = replace(request, look=request.look & np.array([e.name not in own for e in metadata.events]))
     if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
@@ -90,6 +94,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             stack.enter_context(module.noting(lambda label: bar.set_description(_underway(module, label))))
         with contextlib.suppress(InputRaised):  # the run ends with it, as with what raises later
             check_start(module, span[0], start, p)
+            if metadata.contacts:
+                check_overlap(module, span[0], start, p, free.at(span[0], start))
         why = ""
         if isinstance(method, str) and method == "auto":
             blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())
@@ -135,8 +141,15 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
 
 def integrate(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
     """A request, checked, by any method."""
+    if module.metadata.contacts:
+        return run_contacts(module, request, lambda part: _run_smooth(module, part, method, bar))
+    return _run_smooth(module, request, method, bar)
+
+
+def _run_smooth(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
+    """Without rigid contacts, or in one mode of them."""
     if request.inputs.are_held:
-        return run_held(module, request, lambda part: integrate(module, part, method, bar), method)
+        return run_held(module, request, lambda part: _run_smooth(module, part, method, bar), method)
     if method == "ggl":
         from symdyn.runtime.integrating.dae_run import run_ggl
 

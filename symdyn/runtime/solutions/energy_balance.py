@@ -20,7 +20,7 @@ def reset_energy(solution: Solution, happened: list[Happened]) -> dict[str, np.n
     At the time of a reset itself a row counts as before or after it by the state it has.
     """
     records = solution.module.metadata.events
-    resetting = [one for one in happened if records[one.event].reset]
+    resetting = [one for one in happened if records[one.event].reset or not np.array_equal(one.before, one.after)]
     groups = [list(group) for _, group in groupby(resetting, key=lambda one: (one.t, one.before.tobytes()))]
     changes: dict[str, np.ndarray] = {}
     if not groups:

@@ -7,7 +7,7 @@ import csv
 import difflib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ from symdyn.runtime.inputs.sampled import SampleRows
 from symdyn.runtime.integrating.events import EventRows, rows_of
 from symdyn.runtime.integrating.outcome import Outcome
 from symdyn.runtime.paths import as_path, writing
+from symdyn.runtime.solutions.contacts import ContactMotion, contact_motions
 from symdyn.runtime.solutions.energy_balance import reset_energy
 from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
 from symdyn.runtime.solutions.sensitivity import Sensitivity
@@ -84,6 +85,8 @@ class Solution:
         self._input_rows = np.broadcast_to(inputs.rows(self.t, self.x), (len(self.t), len(inputs.constant)))
         self.events: dict[str, EventRows] = rows_of(module, outcome.happened, module.metadata.sizes.x)
         self._happened = list(outcome.happened)
+        self._phases, self._impacts = outcome.phases, outcome.impacts
+        self._row_phases = outcome.row_phases
         self._n_c = len(names(module))
 
     def __call__(self, t: Times) -> np.ndarray:
@@ -235,6 +238,16 @@ class Solution:
         {}
         """
         return reset_energy(self, self._happened) if len(self.energies) else {}
+
+    @cached_property
+    def contacts(self) -> Mapping[str, ContactMotion]:
+        """What rigid contacts did: name -> mode, gap, force, slip and impulse over time, impacts, see ContactMotion.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> dict(solution.contacts)
+        {}
+        """
+        return contact_motions(self, self._phases, self._row_phases, self._impacts) if self.module.metadata.contacts else {}
 
     @property
     def energy_balance(self) -> dict[str, np.ndarray]:
@@ -619,14 +632,22 @@ class Solution:
         inputs = self.inputs
         for k, (t, x) in enumerate(zip(self.t, self.x, strict=True)):
             with contextlib.suppress(EvaluationError):
-                found[k] = self.module.evaluate(name, t, x, self.params, inputs[k])
+                p = self._phases[self._row_phases[k]].p if self._phases else self.params
+                found[k] = self.module.evaluate(name, t, x, p, inputs[k])
         return found
 
     def _rows(self, name: str) -> np.ndarray:
         if len(self.t) == 0:
             return np.zeros((0, *self.module.shape(name)))
-        return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(
-            len(self.t), *self.module.shape(name))
+        shape = self.module.shape(name)
+        if not self._phases:
+            return self.module.evaluate(name, self.t, self.x, self.params, self._input_rows).reshape(len(self.t), *shape)
+        result = np.empty((len(self.t), *shape))
+        for k in np.unique(self._row_phases):
+            rows = self._row_phases == k
+            result[rows] = self.module.evaluate(name, self.t[rows], self.x[rows], self._phases[k].p,
+                                                self._input_rows[rows]).reshape(-1, *shape)
+        return result
 
     def __repr__(self) -> str:
         end = f" to t = {self.t[-1]:.6g} s" if len(self.t) else ""

@@ -1,0 +1,97 @@
+"""Forces of rigid contacts: rows that parameters switch, solved at every state as a small system of linear equations.
+
+With the forces lam along the rows, the relative accelerations there are r = r_0 + D lam, D = J M^-1 J^T (with the constraints
+of the mechanism in M^-1). A row that holds has r = 0; a tangential one that does not has lam_T = s lam_N with the friction s of
+sliding, 0 in an open contact. Elimination without exchange of rows is right for every mode that a motion can be in: where the
+accelerations follow from the forces in one way only, D with the friction of sliding is a P-matrix, whose pivots are positive in
+every order. A pivot that vanishes is the edge of Painleve's region.
+
+Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, chapters 5 and 8; Cottle, Pang and Stone, The Linear
+Complementarity Problem, section 3.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from symdyn.formulation.algebra import TapeAlgebra
+from symdyn.model.contacts.lowering import SOFTNESS, RigidContact
+from symdyn.model.quantity import Quantity
+from symdyn.spatial.vectors import vector, zeros
+from symdyn.tape.differentiate import jacobian
+from symdyn.tape.node import is_zero
+from symdyn.tape.passes import substitute
+
+
+class ContactRows:
+    """What rigid contacts need at a state, apart from each other's modes.
+
+    leaves          of the forces, in the order of the rows
+    accelerations   u_dot as it follows from the leaves, (n_u,); rate: the derivative by time of recorded values at these
+    """
+
+    def __init__(self, algebra: TapeAlgebra, contacts: Sequence[RigidContact], leaves: Mapping[Quantity, Any],
+                 accelerations: np.ndarray, rate: Callable[[Sequence[Any]], Sequence[Any]]) -> None:
+        self.algebra, self.contacts, recorder = algebra, contacts, algebra.recorder
+        self.forces = list(leaves)
+        with algebra.section("contacts: relative velocities and accelerations"):
+            unknown, n = list(leaves.values()), len(leaves)
+            self.slips = vector(*[algebra.expression(e) for c in contacts for e in c.rows])
+            relative = list(rate(self.slips.tolist()))
+            self.free = vector(*substitute(tuple(relative), dict.fromkeys(unknown, 0), recorder))
+            self.D = jacobian(recorder, relative, unknown, "forward").reshape(n, n)
+            self.directions = jacobian(recorder, accelerations.tolist(), unknown, "forward").reshape(-1, n)
+
+    def solved(self) -> dict[Quantity, Any]:
+        """The forces in the mode that the parameters say."""
+        a = self.algebra
+        with a.section("contacts: forces"):
+            held = [a.expression(s) for c in self.contacts for s in c.switches]
+            n = len(held)
+            H: np.ndarray = np.eye(n, dtype=int).astype(object)
+            reasons, first = [], 0
+            for c in self.contacts:
+                for k, s in enumerate(c.slide, start=first + 1):
+                    H[k, first] = (1 - held[k]) * a.expression(s)
+                reasons += [f"contact {c.name}: its friction jams, there is no acceleration with a finite force (Painleve)"] * (
+                    1 + len(c.slide))
+                first += 1 + len(c.slide)
+            A, shared = self.D @ H, a.expression(SOFTNESS)
+            for i in range(n):
+                A[i, i] = A[i, i] + shared * self.D[i, i]
+                A[i] = held[i] * A[i]
+                A[i, i] = A[i, i] + (1 - held[i])
+            least = [a.rounding * held[i] * self.D[i, i] for i in range(n)]
+            x = self._eliminated(A, vector(*[-h * f for h, f in zip(held, self.free, strict=True)]), least, reasons)
+            return dict(zip(self.forces, a.name("contact_force", H @ x), strict=True))
+
+    def _eliminated(self, A: np.ndarray, b: np.ndarray, least: Sequence[Any], reasons: Sequence[str]) -> np.ndarray:
+        """x with A x = b, by elimination without exchange of rows."""
+        n, A, b, pivots = len(b), A.copy(), b.copy(), []
+        for k in range(n):
+            pivots.append(self.algebra.divisor(A[k, k], least[k], reasons[k]))
+            for i in range(k + 1, n):
+                if not is_zero(A[i, k]):
+                    factor = A[i, k] / pivots[k]
+                    A[i, k + 1:] = A[i, k + 1:] - factor * A[k, k + 1:]
+                    b[i] = b[i] - factor * b[k]
+        x = zeros(n)
+        for k in reversed(range(n)):
+            x[k] = (b[k] - sum((A[k, j] * x[j] for j in range(k + 1, n) if not is_zero(A[k, j])), 0)) / pivots[k]
+        return x
+
+    def numbers(self, forces: Mapping[Quantity, Any], rates_along: Callable[[np.ndarray], Sequence[Any]]) -> np.ndarray:
+        """[gap, static, kinetic, restitution of each contact; slips; free accelerations; forces; D; M^-1 J^T; N M^-1 J^T] row by
+        row.
+
+        rates_along   q_dot that belongs to a change of the speeds
+        """
+        a = self.algebra
+        with a.section("contacts"):
+            of_contacts = [a.expression(e) for c in self.contacts for e in (c.gap, *c.constants)]
+            moved = np.array([list(rates_along(column)) for column in self.directions.T], dtype=object).T
+            return vector(*of_contacts, *self.slips, *self.free, *forces.values(), *self.D.ravel(), *self.directions.ravel(),
+                          *moved.ravel())

@@ -1,0 +1,119 @@
+"""Contact: what a user describes, and its faults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
+from symdyn.model.faults import Faults
+from symdyn.real_numbers import length_of
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import BodyOrName, Scalar
+    from symdyn.model.contacts.shapes import Counterpart, Shape
+
+LAWS, IMPACTS = ("rigid",), ("newton", "poisson")
+ORIGIN_OF_A = Point()
+ON_A, ON_B = (Point, Sphere, Disc, Cylinder, Box), (Plane, Sphere, Curve, Surface)
+
+
+class Contact:
+    """Where two bodies may touch: one-sided, with dry friction and impacts.
+
+    name          of the contact; events, parameters and results are named after it
+    a             the body that carries the shape; b: the body that it touches, which may be the ground
+    shape         of sd.contacts: that on a (Point, Sphere, Disc, Cylinder, Box), or a pair of it and that on b (Plane, Sphere,
+                  Curve, Surface); default on b: the plane y = 0 of a planar system, z = 0 in space
+    friction      coefficient of Coulomb friction, or (static, kinetic); numbers or expressions of parameters
+    restitution   normal velocity after an impact by that before it, 0 to 1, likewise
+    law           "rigid": no penetration; open, sticking and sliding are modes that change at located events
+    impact        law of impacts: "newton" (velocities) or "poisson" (impulses of compression and expansion)
+
+    A rigid contact is open as long as its gap is positive. Closed, it transmits a normal force N >= 0 and in its tangential
+    directions (one in a plane, two in space) a friction force of at most static times N while it sticks, and of kinetic times N
+    against the slip while it slides. See docs/contact.md.
+
+    >>> contact = sd.Contact("heel", "foot", "ground", shape=sd.contacts.Point([0, -1]), friction=0.5)
+    >>> contact.name, contact.law
+    ('heel', 'rigid')
+    """
+
+    def __init__(self, name: str, a: BodyOrName, b: BodyOrName, shape: Shape | tuple[Shape, Counterpart] = ORIGIN_OF_A,
+                 friction: Scalar | tuple[Scalar, Scalar] = 0, restitution: Scalar = 0, law: str = "rigid",
+                 impact: str = "newton") -> None:
+        self.name, self.a, self.b, self.law, self.impact = name, a, b, law, impact
+        self.faults = faults = Faults()
+        self.where = where = f"contact {shown(name)}"
+        if not isinstance(name, str) or not name.isidentifier():
+            faults.append(f"a contact is named {shown(name)}; pass an identifier such as 'heel'")
+        pair = tuple(shape) if isinstance(shape, (tuple, list)) else (shape, Plane())
+        if len(pair) != 2 or not isinstance(pair[0], ON_A) or not isinstance(pair[1], ON_B):
+            faults.append(f"{where}: shape is {shown(shape)}; pass one of sd.contacts for body a "
+                          f"({', '.join(kind.__name__ for kind in ON_A)}), or a pair of it and one for body b "
+                          f"({', '.join(kind.__name__ for kind in ON_B)})")
+            pair = (Point(), Plane())
+        self.on_a: Any = pair[0]
+        self.on_b: Any = pair[1]
+        given = list(friction) if isinstance(friction, Sequence) and not isinstance(friction, str) else [friction] * 2
+        if len(given) != 2:
+            faults.append(f"{where}: friction is {shown(friction)}; pass a coefficient, or a pair (static, kinetic)")
+            given = [0, 0]
+        self.static, self.kinetic = (faults.expression(mu, f"{where}: friction") for mu in given)
+        self.restitution = faults.expression(restitution, f"{where}: restitution")
+        if law not in LAWS:
+            faults.append(f"{where}: law is {shown(law)}; there are {', '.join(map(repr, LAWS))}")
+        if impact not in IMPACTS:
+            faults.append(f"{where}: impact is {shown(impact)}; there are {', '.join(map(repr, IMPACTS))}")
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether there is no friction by structure."""
+        return self.static == 0 and self.kinetic == 0
+
+    def number_faults(self, defaults: dict[Any, float]) -> list[str]:
+        """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
+        found = []
+        values = {"static friction": self.static, "kinetic friction": self.kinetic, "restitution": self.restitution}
+        for what, shape in (("on a", self.on_a), ("on b", self.on_b)):
+            for kind in ("radius", "length"):
+                if hasattr(shape, kind):
+                    values[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
+        by_name = {getattr(key, "name", key): value for key, value in defaults.items()}
+        numbers: dict[str, float] = {}
+        for what, expression in values.items():
+            try:
+                numbers[what] = float(expression.xreplace({s: sp.Float(by_name[s.name]) for s in expression.free_symbols
+                                                           if s.name in by_name}))
+            except (TypeError, ValueError):
+                continue
+            if numbers[what] < 0:
+                found.append(f"{self.where}: {what} is {numbers[what]:g}; pass a number that is not negative")
+        if numbers.get("restitution", 0) > 1:
+            found.append(f"{self.where}: restitution is {numbers['restitution']:g}, which would gain energy in every impact; "
+                         "pass a number from 0 to 1")
+        if numbers.get("kinetic friction", 0) > numbers.get("static friction", 0) >= 0:
+            found.append(f"{self.where}: kinetic friction {numbers['kinetic friction']:g} is above static friction "
+                         f"{numbers.get('static friction', 0):g}; pass (static, kinetic) with static not below kinetic")
+        return found
+
+    def structure_faults(self, planar: bool) -> list[str]:
+        """Shapes that do not fit each other or the plane."""
+        a, b, found = self.on_a, self.on_b, []
+        kind_a, kind_b = type(a).__name__, type(b).__name__
+        if planar and isinstance(a, (Disc, Cylinder)):
+            found.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")
+        if planar != isinstance(b, Curve) and isinstance(b, (Curve, Surface)):
+            found.append(f"{self.where}: a {kind_b} belongs to a {'spatial' if planar else 'planar'} system; pass a "
+                         f"{'Curve' if planar else 'Surface'}")
+        if isinstance(a, (Disc, Cylinder)) and not isinstance(b, Plane):
+            found.append(f"{self.where}: the edge of a {kind_a} touches a Plane, found a {kind_b} on body b; pass a Plane")
+        if isinstance(a, Sphere) and isinstance(b, (Curve, Surface)):
+            found.append(f"{self.where}: a {kind_b} is touched by points; pass a Point or a Box, or the curve at the distance of "
+                         "the radius")
+        if isinstance(a, Box) and length_of(a.size) not in ((2,) if planar else (3,)):
+            found.append(f"{self.where}: size is {shown(a.size)}; pass {'two' if planar else 'three'} lengths")
+        return found

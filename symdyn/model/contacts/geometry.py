@@ -1,0 +1,239 @@
+"""Gap, normal, tangents and point of a contact as expressions of positions and orientations of its bodies.
+
+The gap g is the distance along the normal n, which points from body b to body a. The rows of a contact are the components of the
+relative velocity of the material points that touch, along n and the tangents; for distances that along n is the rate of the gap,
+since the touching points move along their surfaces only (envelope theorem).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import sympy as sp
+
+from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface
+from symdyn.model.faults import Faults
+from symdyn.model.quantity import Measure, Place, Quantity
+
+Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One place where bodies may touch.
+
+    name       of the contact, with a number where a shape has several
+    at         the point of body a that the force is applied from, body axes; lever: from there to the place, n-frame
+    gap        m; normal, tangents: n-frame
+    """
+
+    name: str
+    at: Place
+    lever: Triple
+    gap: sp.Expr
+    normal: Triple
+    tangents: tuple[Triple, ...]
+
+
+class Geometry:
+    """Expressions of one contact.
+
+    fixed    whether the ground does not move
+    faults   what is wrong with numbers and directions is added to it
+    """
+
+    def __init__(self, contact: Contact, planar: bool, fixed: bool, faults: Faults) -> None:
+        self.contact, self.planar, self.fixed, self.faults = contact, planar, fixed, faults
+        self.a, self.b = (str(getattr(body, "name", body)) for body in (contact.a, contact.b))
+
+    def touches(self) -> list[Touch]:
+        """The places of the contact, each with its expressions."""
+        shape: Shape = self.contact.on_a
+        name = self.contact.name
+        if isinstance(shape, Box):
+            half = [self._number(e, "size") / 2 for e in shape.size]
+            center = self._vector(shape.center, "center")
+            half += [sp.S.Zero] * (3 - len(half))
+            signs = product((-1, 1), (-1, 1), (0,) if self.planar else (-1, 1))
+            corners = [[c + s * h for c, s, h in zip(center, one, half, strict=True)] for one in signs]
+            return [self._touch(f"{name}_{k + 1}", tuple(corner), sp.S.Zero) for k, corner in enumerate(corners)]
+        if isinstance(shape, Point):
+            return [self._touch(name, self._vector(shape.at, "point"), sp.S.Zero)]
+        radius, center = self._number(shape.radius, "radius"), self._vector(shape.center, "center")
+        if isinstance(shape, Sphere):
+            return [self._touch(name, center, radius)]
+        axis = _unit(self._vector(shape.axis, "axis"))
+        if axis is None:
+            self.faults.append(f"{self.contact.where}: the axis is zero; pass a direction")
+            axis = (sp.S.Zero, sp.S.Zero, sp.S.One)
+        if isinstance(shape, Disc):
+            return [self._edge(name, center, axis, radius)]
+        assert isinstance(shape, Cylinder)
+        half_length = self._number(shape.length, "length") / 2
+        ends = [_add(center, _scaled(axis, s * half_length)) for s in (1, -1)]
+        return [self._edge(f"{name}_{k + 1}", end, axis, radius) for k, end in enumerate(ends)]
+
+    def rows(self, touch: Touch) -> tuple[sp.Expr, ...]:
+        """Relative velocity of the touching points along the normal, then along the tangents."""
+        velocity_a = _add(self._velocity(self.a, touch.at), _cross(self._omega(self.a), touch.lever))
+        place = _add(self._position(self.a, touch.at), touch.lever)
+        origin = (sp.S.Zero,) * 3
+        if self._still(self.b):
+            relative = velocity_a
+        else:
+            arm = _add(place, self._position(self.b, origin), -1)
+            velocity_b = _add(self._velocity(self.b, origin), _cross(self._omega(self.b), arm))
+            relative = _add(velocity_a, velocity_b, -1)
+        return tuple(_dot(direction, relative) for direction in (touch.normal, *touch.tangents))
+
+    # -- kinds
+
+    def _touch(self, name: str, at: Place, radius: sp.Expr) -> Touch:
+        """A point or sphere of body a against what body b has."""
+        other, place = self.contact.on_b, self._position(self.a, at)
+        if isinstance(other, Plane):
+            gap, normal, tangents = self._from_plane(other, place)
+        elif isinstance(other, Sphere):
+            center = self._position(self.b, self._vector(other.center, "center on b"))
+            arm = _add(place, center, -1)
+            distance = sp.sqrt(_dot(arm, arm))
+            gap = distance - self._number(other.radius, "radius on b")
+            normal = _scaled(arm, 1 / distance)
+            tangents = self._tangents(normal)
+        else:
+            gap, normal, tangents = self._from_graph(other, place)
+        return Touch(name, at, _scaled(normal, -radius), gap - radius, normal, tangents)
+
+    def _edge(self, name: str, center: Place, axis: Triple, radius: sp.Expr) -> Touch:
+        """The lowest point of a circle above a plane: from the centre -r (n - (n e) e)/sqrt(1 - (n e)^2)."""
+        plane = self.contact.on_b
+        assert isinstance(plane, Plane)
+        gap, normal, tangents = self._from_plane(plane, self._position(self.a, center))
+        e = self._turned(self.a, axis)
+        along = _dot(normal, e)
+        steep = sp.sqrt(1 - along**2)
+        lever = _scaled(_add(normal, _scaled(e, along), -1), -radius / steep)
+        return Touch(name, center, lever, gap - radius * steep, normal, tangents)
+
+    def _from_plane(self, plane: Plane, place: Triple) -> tuple[sp.Expr, Triple, tuple[Triple, ...]]:
+        default = (0, 1, 0) if self.planar else (0, 0, 1)
+        unit = _unit(self._vector(default if plane.normal is None else plane.normal, "normal"))
+        if unit is None:
+            self.faults.append(f"{self.contact.where}: the normal of the plane is zero; pass a direction")
+            unit = _unit(default)
+            assert unit is not None
+        point = self._vector(plane.point, "point of the plane")
+        gap = _dot(self._turned(self.b, unit), _add(place, self._position(self.b, point), -1))
+        own = ((unit[1], -unit[0], sp.S.Zero),) if self.planar else _across(unit)
+        return gap, self._turned(self.b, unit), tuple(self._turned(self.b, t) for t in own)
+
+    def _from_graph(self, graph: Any, place: Triple) -> tuple[sp.Expr, Triple, tuple[Triple, ...]]:
+        """Above a curve or surface of body b."""
+        arm = _add(place, self._position(self.b, (sp.S.Zero,) * 3), -1)
+        local = arm if self._still(self.b) else tuple(_dot(column, arm) for column in self._columns(self.b))
+        height = self.faults.expression(graph.height, f"{self.contact.where}: height")
+        symbols = [graph.x] if isinstance(graph, Curve) else [graph.x, graph.y]
+        if not all(isinstance(s, sp.Symbol) for s in symbols):
+            self.faults.append(f"{self.contact.where}: the curve's abscissa is {symbols}; pass the symbols that its height is "
+                               "written in")
+            return local[1], (sp.S.Zero, sp.S.One, sp.S.Zero), ()
+        at = dict(zip(symbols, local, strict=False))
+        slopes = [height.diff(s).xreplace(at) for s in symbols]
+        size = sp.sqrt(1 + sum(s**2 for s in slopes))
+        if isinstance(graph, Surface):
+            normal = (-slopes[0] / size, -slopes[1] / size, 1 / size)
+            tangents = self._tangents(normal)
+        else:
+            normal = (-slopes[0] / size, 1 / size, sp.S.Zero)
+            tangents = ((normal[1], -normal[0], sp.S.Zero),)
+        gap = (local[len(symbols)] - height.xreplace(at)) / size
+        return gap, self._turned(self.b, normal), tuple(self._turned(self.b, t) for t in tangents)
+
+    def _tangents(self, n: Triple) -> tuple[Triple, ...]:
+        """Across a normal that turns: in space without a singularity but n = -z.
+
+        Source: Frisvad, Building an orthonormal basis from a 3D unit vector without normalization, 2012.
+        """
+        if self.planar:
+            return ((n[1], -n[0], sp.S.Zero),)
+        x, y, z = n
+        return (1 - x**2 / (1 + z), -x * y / (1 + z), -x), (-x * y / (1 + z), 1 - y**2 / (1 + z), -y)
+
+    # -- bodies
+
+    def _still(self, body: str) -> bool:
+        return body == "ground" and self.fixed
+
+    def _columns(self, body: str) -> tuple[Triple, ...]:
+        def entry(i: int, j: int) -> sp.Expr:
+            if self.planar and 2 in (i, j):
+                return sp.Integer(i == j)
+            return Quantity(Measure("rotation_matrix", (body,), index=(i, j)))
+
+        return tuple((entry(0, j), entry(1, j), entry(2, j)) for j in range(3))
+
+    def _turned(self, body: str, v: Triple) -> Triple:
+        """A vector in body axes in the n-frame."""
+        if self._still(body):
+            return v
+        columns = self._columns(body)
+        return _add(_add(_scaled(columns[0], v[0]), _scaled(columns[1], v[1])), _scaled(columns[2], v[2]))
+
+    def _position(self, body: str, at: Place) -> Triple:
+        return tuple(at) if self._still(body) else self._components("position", body, at, 0)
+
+    def _velocity(self, body: str, at: Place) -> Triple:
+        return self._components("position", body, at, 1)
+
+    def _components(self, kind: str, body: str, at: Place, order: int) -> Triple:
+        found = [Quantity(Measure(kind, (body,), (tuple(at),), (k,), order)) for k in range(2 if self.planar else 3)]
+        return (*found, sp.S.Zero)[:3]
+
+    def _omega(self, body: str) -> Triple:
+        found = [Quantity(Measure("angular_velocity", (body,), index=(k,))) for k in range(3)]
+        return (sp.S.Zero, sp.S.Zero, found[2]) if self.planar else (found[0], found[1], found[2])
+
+    # -- numbers
+
+    def _number(self, value: Any, what: str) -> sp.Expr:
+        return self.faults.expression(value, f"{self.contact.where}: {what}")
+
+    def _vector(self, value: Any, what: str) -> Triple:
+        return tuple(self.faults.vector(value, f"{self.contact.where}: {what}", self.planar))
+
+
+def _add(a: Sequence[Any], b: Sequence[Any], sign: int = 1) -> Triple:
+    return tuple(x + sign * y for x, y in zip(a, b, strict=True))
+
+
+def _scaled(a: Sequence[Any], k: Any) -> Triple:
+    return tuple(k * x for x in a)
+
+
+def _dot(a: Sequence[Any], b: Sequence[Any]) -> sp.Expr:
+    return sp.Add(*[x * y for x, y in zip(a, b, strict=True)])
+
+
+def _cross(a: Sequence[Any], b: Sequence[Any]) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(v: Sequence[Any]) -> Triple | None:
+    size = sp.sqrt(_dot([sp.sympify(e) for e in v], v))
+    return None if size == 0 else _scaled([sp.sympify(e) for e in v], 1 / size)
+
+
+def _across(n: Triple) -> tuple[Triple, Triple]:
+    """Two directions across a constant one: from the axis that it has the smallest component along, where these are numbers."""
+    sizes = [abs(float(e)) if e.is_number else 1.0 for e in n]
+    k = sizes.index(min(sizes))
+    if n == (0, 0, 1):
+        return (sp.S.One, sp.S.Zero, sp.S.Zero), (sp.S.Zero, sp.S.One, sp.S.Zero)
+    axis = tuple(sp.Integer(i == k) for i in range(3))
+    first = _unit(_cross(axis, n))
+    assert first is not None
+    return first, _cross(n, first)

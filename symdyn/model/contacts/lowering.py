@@ -1,0 +1,160 @@
+"""What contacts become: forces between their bodies, events, and for the rigid law rows that parameters switch.
+
+A rigid contact has one row along its normal and one along each tangent. The force along row k is the quantity contact(NAME)[k].
+Parameters say which rows hold, NAME_closed and NAME_sticking (1 or 0 each), and which way it slides, NAME_sliding, in space
+NAME_sliding_x and NAME_sliding_y. All are 0 by default: the contact is open. A run sets them in every phase.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.geometry import Geometry, Touch
+from symdyn.model.event import Event
+from symdyn.model.faults import Faults
+from symdyn.model.loads import Force, Torque
+from symdyn.model.quantity import Measure, Quantity
+
+if TYPE_CHECKING:
+    from symdyn.model.system import System
+
+CLOSES, OPENS, STICKS, SLIPS, TURNS = "closes", "opens", "sticks", "slips", "turns"
+# A speed, m/s, with which the direction of friction is still known where a contact begins to slip.
+SLOW = sp.Rational(1, 10**12)
+# Added to the diagonal of the rows that hold, by their size, where they depend on each other.
+SOFTNESS = sp.Symbol("contacts_shared", real=True)
+
+
+@dataclass(frozen=True)
+class RigidContact:
+    """A rigid contact in one place.
+
+    gap       m; rows: relative velocities along the normal and the tangents, m/s
+    forces    quantities of the forces along the rows
+    switches  parameters: for each row whether it holds
+    slide     coefficients of the tangential forces by the normal force while the contact slides
+    sliding   parameters of the direction of slip, one for each tangent
+    events    what its events are called after its name
+    """
+
+    name: str
+    contact: str
+    gap: sp.Expr
+    rows: tuple[sp.Expr, ...]
+    forces: tuple[Quantity, ...]
+    switches: tuple[sp.Symbol, ...]
+    slide: tuple[sp.Expr, ...]
+    sliding: tuple[sp.Symbol, ...]
+    static: sp.Expr
+    kinetic: sp.Expr
+    restitution: sp.Expr
+    impact: str
+    events: tuple[str, ...]
+
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """All that a motion evaluates."""
+        return [self.gap, *self.rows, *self.slide, *self.switches, *self.sliding]
+
+    @property
+    def constants(self) -> list[sp.Expr]:
+        """What depends on parameters alone."""
+        return [self.static, self.kinetic, self.restitution]
+
+
+def contact_force(name: str, row: int) -> Quantity:
+    """The force of a rigid contact along one of its rows, N."""
+    return Quantity(Measure("contact", (name,), index=(row,)))
+
+
+def with_contacts(system: System) -> System:
+    """The system with what its contacts become; the same one where it has none."""
+    if not system.contacts:
+        return system
+    result = copy.copy(system)
+    result._faults = faults = Faults(system._faults)
+    result.loads, result.events, result.rigid_contacts = list(system.loads), list(system.events), []
+    result.defaults = dict(system.defaults)
+    known = {"ground", *[b.name for b in system.bodies if isinstance(b.name, str)]}
+    for contact in system.contacts:
+        before = len(faults)
+        faults.extend([*contact.faults, *contact.structure_faults(system.planar), *contact.number_faults(system.defaults),
+                       *_body_faults(contact, known)])
+        if len(faults) == before:
+            geometry = Geometry(contact, system.planar, system.ground_motion is None, faults)
+            for touch in geometry.touches():
+                _add(result, contact, geometry, touch)
+    if result.rigid_contacts:
+        added = [SOFTNESS, *[s for c in result.rigid_contacts for s in (*c.switches, *c.sliding)]]
+        result.defaults.update(dict.fromkeys(added, 0.0))
+        if system.declared is not None:
+            result.declared = (*system.declared, *added)
+    return result
+
+
+def _body_faults(contact: Contact, known: set[str]) -> list[str]:
+    a, b = (getattr(body, "name", body) for body in (contact.a, contact.b))
+    if a == b:
+        return [f"{contact.where}: {a} is in contact with itself; pass two different bodies"]
+    if a == "ground":
+        return [f"{contact.where}: body a is the ground; pass the body that moves first, and the ground as b"]
+    strange = [str(body) for body in (a, b) if body not in known]
+    return [f"{contact.where} is between {', '.join(map(repr, strange))}, which the system does not have; bodies: "
+            f"{', '.join(sorted(known))}"] if strange else []
+
+
+def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> None:
+    """Loads, events and rows of a rigid contact in one place."""
+    directions = [touch.normal, *(() if contact.frictionless else touch.tangents)]
+    name, rows = touch.name, geometry.rows(touch)[:len(directions)]
+    forces = tuple(contact_force(name, k) for k in range(len(rows)))
+    closed, sticking = sp.Symbol(f"{name}_closed", real=True), sp.Symbol(f"{name}_sticking", real=True)
+    switches = (closed, *[sticking] * (len(rows) - 1))
+    sliding = (sp.Symbol(f"{name}_sliding", real=True),) if len(rows) == 2 else tuple(
+        sp.Symbol(f"{name}_sliding_{axis}", real=True) for axis in "xy"[:len(rows) - 1])
+    slide, of_sliding = _sliding(contact.kinetic, rows[1:], sliding)
+    events = {CLOSES: touch.gap, OPENS: forces[0], **of_sliding}
+    if len(rows) > 1:
+        events[SLIPS] = (contact.static * forces[0]) ** 2 - sp.Add(*[f**2 for f in forces[1:]])
+    system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
+                                              contact.static, contact.kinetic, contact.restitution, contact.impact,
+                                              tuple(events)))
+    _act(system, geometry, touch, directions, forces)
+    for what, value in events.items():
+        system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
+
+
+def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],
+             sliding: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Expr, ...], dict[str, sp.Expr]]:
+    """Tangential forces by the normal force, and the events of sliding.
+
+    In a plane friction is along the given direction. In space it is against the slip, written by its parts a along and b across
+    the given direction as (d + (b/a) d')/sqrt(1 + (b/a)^2), which goes on smoothly where a slip along a line passes zero.
+    """
+    if not slips:
+        return (), {}
+    if len(slips) == 1:
+        return (-kinetic * sliding[0],), {STICKS: sliding[0] * slips[0]}
+    (x, y), (v, w) = sliding, slips
+    along, across = v * x + w * y, w * x - v * y
+    ratio = across / (along + SLOW)
+    size = sp.sqrt(1 + ratio**2)
+    forces = (-kinetic * (x - ratio * y) / size, -kinetic * (y + ratio * x) / size)
+    return forces, {STICKS: along, TURNS: along**2 - across**2}
+
+
+def _act(system: System, geometry: Geometry, touch: Touch, directions: list[Any], forces: tuple[Any, ...]) -> None:
+    """The force on body a and the opposite on body b, at one place."""
+    force = [sp.Add(*[f * d[k] for f, d in zip(forces, directions, strict=True)]) for k in range(3)]
+    other = None if geometry.b == "ground" else geometry.b
+    label = f"contact {touch.name}"
+    system.loads.append(Force(geometry.a, sp.ImmutableMatrix(force), sp.ImmutableMatrix(touch.at), None, other, label))
+    if any(e != 0 for e in touch.lever):
+        (x, y, z), (f, g, h) = touch.lever, force
+        moment = sp.ImmutableMatrix([y * h - z * g, z * f - x * h, x * g - y * f])
+        system.loads.append(Torque(geometry.a, moment, None, other, f"{label}: moment"))

@@ -1,0 +1,478 @@
+"""Runs with rigid contacts: one smooth phase after the other, each in one mode of every contact, put together.
+
+A phase is integrated by the same compiled code as every other motion: parameters say which contact rows hold. It ends where an
+event of a contact is located: the gap closes, the normal force or the slip passes zero, the friction cone is left. There contacts
+that hold are put back onto their surfaces, impacts are made, and the mode of every contact that is closed is chosen from the
+accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symdyn.backend.metadata import ContactRecord
+from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, impact, solutions
+from symdyn.runtime.integrating.events import Happened
+from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request
+from symdyn.runtime.integrating.stabilization import Corrections
+from symdyn.runtime.integrating.stops import describe_stop
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+Part = Callable[[Request], Outcome]
+CONTACTS, SHARED = "contacts", "contacts_shared"
+# Gaps, m, and velocities, m/s, that count as none at the start.
+TOUCHING = 1e-9
+# Gaps, by the size of the state, that close together with another contact.
+TOGETHER = 1e-11
+# A flight shorter than this part of the run is one of infinitely many that end in finite time (Zeno): the contact stays closed.
+SHORTEST_FLIGHT = 1e-10
+# Velocities below this part of those before an impact, or of the largest rate, are none.
+NO_SPEED = 1e-11
+# So many switches within SAME_TIME of the run: the modes do not settle.
+MOST_SWITCHES, SAME_TIME = 50, 1e-13
+# What is added to the diagonal of rows that depend on each other, by its size.
+SOFTNESS = 1e-11
+# Part of the run in which an event that has just been dealt with is not looked for again.
+GRACE = 1e-9
+STILL = np.zeros(0)
+
+
+class Numbers(NamedTuple):
+    """What the function "contacts" gives: per contact gap, coefficients of friction, restitution; per row the slip, the
+    acceleration without contact forces, the force; D (n, n), M^-1 J^T (n_u, n) and N M^-1 J^T (n_q, n)."""
+
+    gap: np.ndarray
+    static: np.ndarray
+    kinetic: np.ndarray
+    restitution: np.ndarray
+    slip: np.ndarray
+    free: np.ndarray
+    force: np.ndarray
+    D: np.ndarray
+    speeds: np.ndarray
+    coordinates: np.ndarray
+
+
+def rows_of(records: Sequence[ContactRecord]) -> list[tuple[int, ...]]:
+    """Places of the rows of each contact."""
+    ends = np.cumsum([0, *[record.rows for record in records]])
+    return [tuple(range(a, b)) for a, b in pairwise(ends.tolist())]
+
+
+def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> Numbers:
+    """What the laws of contact take at a state."""
+    sizes, k = module.metadata.sizes, len(module.metadata.contacts)
+    n = sum(record.rows for record in module.metadata.contacts)
+    values = module.evaluate(CONTACTS, t, x[:sizes.x], p, inputs)
+    of_contacts, rest = values[:4 * k].reshape(k, 4).T, values[4 * k:]
+    parts = np.split(rest, np.cumsum([n, n, n, n * n, sizes.u * n]))
+    gap, static, kinetic, restitution = of_contacts
+    slip, free, force = parts[:3]
+    return Numbers(gap, static, kinetic, restitution, slip, free, force, parts[3].reshape(n, n), parts[4].reshape(-1, n),
+                   parts[5].reshape(-1, n))
+
+
+def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
+    """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not."""
+    at = numbers(module, t, x, p, inputs)
+    deep = [k for k in range(len(at.gap)) if at.gap[k] < -TOUCHING]
+    if not deep:
+        return
+    first = [rows[0] for rows in rows_of(module.metadata.contacts)]
+    moved, n_q = x.copy(), module.metadata.sizes.q
+    for _ in range(20):
+        now = numbers(module, t, moved, p, inputs)
+        below = [k for k in range(len(now.gap)) if now.gap[k] < 0]
+        if not below:
+            break
+        places = [first[k] for k in below]
+        push = np.linalg.lstsq(now.D[np.ix_(places, places)], -now.gap[below], rcond=1e-10)[0]
+        moved[:n_q] += now.coordinates[:, places] @ push
+    told = ", ".join(f"{module.metadata.contacts[k].name} by {-at.gap[k]:.6g} m" for k in deep)
+    names = module.metadata.q
+    lifted = bool((numbers(module, t, moved, p, inputs).gap >= -TOUCHING).all())
+    remedy = "start from q = {" + ", ".join(f"{name}: {value:.9g}" for name, value, old in zip(
+        names, moved[:n_q], x[:n_q], strict=True) if value != old) + "}, where they touch" if lifted else "start further apart"
+    raise ArgumentError(f"{module.name}: contacts overlap at the start: {told}; {remedy}")
+
+
+def run_contacts(module: Module, request: Request, part: Part) -> Outcome:
+    """Integrate with rigid contacts; part: integrates a request in one mode.
+
+    Raises ArgumentError for what contacts do not take.
+    """
+    begin, end = request.span
+    if end < begin:
+        raise ArgumentError(f"{module.name}: rigid contacts lose energy, so that motions with them do not run backward in time; "
+                            "pass an end after the start")
+    if request.columns:
+        raise ArgumentError(f"{module.name}: sensitivities do not go across the switches of rigid contacts; leave them out")
+    return _Phases(module, request, part).through()
+
+
+class _Stop(Exception):
+    """Ends a run with its reason."""
+
+
+@dataclass
+class _Phases:
+    module: Module
+    request: Request
+    part: Part
+    ts: list[np.ndarray] = field(default_factory=list)
+    xs: list[np.ndarray] = field(default_factory=list)
+    done: list[Outcome] = field(default_factory=list)
+    phases: list[Phase] = field(default_factory=list)
+    impacts: list[Impact] = field(default_factory=list)
+    happened: list[Happened] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        metadata = self.module.metadata
+        self.records = metadata.contacts
+        self.rows = rows_of(self.records)
+        self.normal = [rows[0] for rows in self.rows]
+        self.n_steps = 0
+        place = {name: k for k, name in enumerate(metadata.parameters)}
+        missing = [name for record in self.records for name in record.parameters if name not in place]
+        if missing:
+            raise ArgumentError(f"{self.module.name}: the parameters {', '.join(missing)} say in which mode contacts are, and a "
+                                "run sets them; leave them out of specialize")
+        self.place = place
+        events = {event.name: k for k, event in enumerate(metadata.events)}
+        self.events = [{what: events[f"{record.name}_{what}"] for what in record.events} for record in self.records]
+        self.of_event = {k: (j, what) for j, own in enumerate(self.events) for what, k in own.items()}
+        n = len(self.records)
+        self.modes = [OPEN] * n
+        self.directions = [np.zeros(record.rows - 1) for record in self.records]
+        self.still = [False] * n  # whether the slip of a closed contact is zero
+        self.shared = False
+        begin, end = self.request.span
+        self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
+        self.at_once = 0
+        self.ruled_out: dict[int, set[str]] = {}  # modes at this time
+        self.unlooked: set[int] = set()
+        self.until = np.inf  # and until when these events are not looked for
+
+    # -- the run
+
+    def through(self) -> Outcome:
+        """To the end, or as far as it gets."""
+        request = self.request
+        t, end = request.span
+        last = end if request.times is None else float(request.times[-1])
+        x, message, cause, interrupted, over = request.x0.copy(), "", None, False, False
+        fired: list[tuple[int, str]] = []
+        begun = True
+        try:
+            while True:
+                x = self._switch(t, x, fired, begun)
+                begun = False
+                outcome = self._phase(t, x)
+                if not outcome.success:
+                    break
+                x = outcome.x[-1]
+                latest = [one for one in outcome.happened if one.t == outcome.happened[-1].t] if outcome.happened else []
+                fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
+                if any(self.module.metadata.events[one.event].stop and one.event not in self.of_event for one in latest):
+                    over = True
+                    message = outcome.message
+                    break
+                until = float(latest[-1].t) if fired else min(self.until, end)
+                if fired:
+                    x = latest[-1].before.copy()
+                elif until >= last:
+                    break
+                self._count(until - t, until, fired)
+                t = until
+                if request.max_steps is not None and self.n_steps >= request.max_steps:
+                    raise _Stop(f"{self.n_steps} steps were done, as asked")
+        except KeyboardInterrupt:
+            interrupted, message = True, describe_stop(self.module.metadata, t, x[:request.n_state], "interrupted")
+        except (_Stop, EvaluationError) as error:
+            why = str(error).removeprefix(f"{self.module.name}: ")
+            message, cause = describe_stop(self.module.metadata, t, x[:request.n_state], why), error.__cause__
+        return self._whole(t, x, message, cause, interrupted, over)
+
+    def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
+        """Note how often the modes change without time passing; raise _Stop where that does not end."""
+        if passed > self.same:
+            self.at_once, self.ruled_out, self.unlooked, self.until = 0, {}, set(), np.inf
+            return
+        self.at_once += 1
+        self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}
+        begin, end = self.request.span
+        self.until = t + GRACE * (end - begin)
+        if self.at_once >= MOST_SWITCHES:
+            names = ", ".join(dict.fromkeys(self.records[k].name for k, _ in fired))
+            raise _Stop(f"the modes of contacts do not settle: {self.at_once} switches within {self.same:.3g} s, the latest of "
+                        f"{names}; a compliant element where they touch, or other coefficients, leave one mode")
+
+    def _phase(self, t: float, x: np.ndarray) -> Outcome:
+        """From one switch to the next."""
+        request = self.request
+        end = min(request.span[1], self.until)
+        wanted, times = None, None
+        if request.times is not None:
+            wanted = request.times[(request.times >= t if not self.done else request.times > t) & (request.times <= end)]
+            times = np.unique(np.concatenate([[t], wanted, [end]]))
+        left = None if request.max_steps is None else request.max_steps - self.n_steps
+        p = self._parameters()
+        self.phases.append(Phase(t, p, tuple(self.modes)))
+        outcome = self.part(replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for()))
+        rows = np.ones(len(outcome.t), dtype=bool)
+        if wanted is not None:
+            rows = np.isin(outcome.t, wanted)
+            ended = outcome.happened and outcome.happened[-1].event not in self.of_event and self.module.metadata.events[
+                outcome.happened[-1].event].stop
+            if len(rows) and (not outcome.success or ended):
+                rows[-1] = True
+        self.ts.append(outcome.t[rows])
+        self.xs.append(outcome.x[rows])
+        self.done.append(outcome)
+        self.happened += outcome.happened
+        self.n_steps += outcome.n_steps
+        return outcome
+
+    def _parameters(self) -> np.ndarray:
+        """The parameters with the modes of all contacts."""
+        p = self.request.p.copy()
+        for record, mode, direction in zip(self.records, self.modes, self.directions, strict=True):
+            p[self.place[record.closed]] = mode != OPEN
+            if record.sticking:
+                p[self.place[record.sticking]] = mode == STICKING
+                for name, value in zip(record.sliding, direction, strict=True):
+                    p[self.place[name]] = value if mode == SLIDING else 0.0
+        p[self.place[SHARED]] = SOFTNESS if self.shared else 0.0
+        return p
+
+    def _looked_for(self) -> np.ndarray:
+        """Events of the user, and those of contacts that their modes can end with."""
+        request = self.request
+        n = len(self.module.metadata.events)
+        look = np.zeros(n, dtype=bool) if request.look is None else request.look.copy()
+        for own, mode, record in zip(self.events, self.modes, self.records, strict=True):
+            wanted = {OPEN: ("closes",), STICKING: ("opens", "slips"), SLIDING: ("opens", "sticks", "turns")}[mode]
+            for what, k in own.items():
+                look[k] = what in wanted and k not in self.unlooked
+            if mode == SLIDING and record.sticking and not self.directions[self.records.index(record)].any():
+                for what in ("sticks", "turns"):
+                    if what in own:
+                        look[own[what]] = False
+        return look
+
+    # -- switches
+
+    def _numbers(self, t: float, x: np.ndarray) -> Numbers:
+        request = self.request
+        inputs = request.inputs.at(t, x[:request.n_state])
+        return numbers(self.module, t, x, self._parameters(), inputs)
+
+    def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
+        """The state after impacts, and the modes of the next phase."""
+        x = x.copy()
+        for k, what in fired:
+            if what == "sticks":
+                self.still[k] = True
+            elif what in ("opens", "slips"):
+                self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
+        x = self._onto_surfaces(t, x)
+        at = self._numbers(t, x)
+        closing = {k for k, what in fired if what == "closes"}
+        near = TOUCHING if start else TOGETHER * max(1.0, float(np.abs(x[:self.request.n_state]).max(initial=0.0)))
+        for k, mode in enumerate(self.modes):
+            v = at.slip[self.normal[k]]
+            if mode == OPEN and k not in closing and abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0):
+                closing.add(k)
+        hit = [k for k in closing if at.slip[self.normal[k]] < (-TOUCHING if start else 0.0)]
+        touching = [k for k, mode in enumerate(self.modes) if mode != OPEN or k in closing]
+        rebound: list[int] = []
+        if hit:
+            x, rebound = self._impact(t, x, at, touching, hit)
+            at = self._numbers(t, x)
+        else:
+            for k in closing:
+                self.still[k] = self._slow(at, k)
+        closed = [k for k in touching if k not in rebound]
+        self._choose(t, at, closed)
+        resting = self._zeno(t, at, rebound, hit)
+        if resting:
+            closed = sorted({*closed, *resting})
+            for k in resting:
+                self.modes[k], self.still[k] = SLIDING, self._slow(at, k)
+            x = self._onto_surfaces(t, x)
+            self._choose(t, self._numbers(t, x), closed)
+        return x
+
+    def _slow(self, at: Numbers, k: int) -> bool:
+        """Whether a contact does not slip."""
+        tangents = list(self.rows[k][1:])
+        return bool(np.abs(at.slip[tangents]).max(initial=0.0) <= max(TOUCHING, NO_SPEED * np.abs(at.slip).max(initial=0.0)))
+
+    def _onto_surfaces(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Closed contacts back to gap zero without normal velocity, sticking ones without slip, by the smallest change in the
+        metric of the mass matrix."""
+        closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
+        if not closed:
+            return x
+        n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
+        at = self._numbers(t, x)
+        normal = [self.normal[k] for k in closed]
+        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[closed], rcond=1e-10)[0]
+        if np.abs(push).max(initial=0.0) > 0:
+            x[:n_q] += at.coordinates[:, normal] @ push
+            at = self._numbers(t, x)
+        held = normal + [row for k in closed if self.still[k] for row in self.rows[k][1:]]
+        stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
+        x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
+        return x
+
+    def _impact(self, t: float, x: np.ndarray, at: Numbers, touching: Sequence[int],
+                hit: Sequence[int]) -> tuple[np.ndarray, list[int]]:
+        """The state after an impact, and the contacts that leave."""
+        places = [row for k in touching for row in self.rows[k]]
+        sites = self._sites(at, touching, impact=True)
+        v = at.slip[places]
+        law = self.records[hit[0]].impact
+        found = impact(at.D[np.ix_(places, places)], v, at.restitution[list(touching)].tolist(), sites, law)
+        names = ", ".join(self.records[k].name for k in hit)
+        if not found:
+            raise _Stop(f"the impact of {names} has no solution under Coulomb's law and impact='{law}'; take the other law of "
+                        "impacts, or less friction")
+        if len(found) > 1:
+            self.doubts.append(f"{self.module.name}: the impact of {names} at t = {t:.9g} s has {len(found)} solutions; the one "
+                               f"in which contacts are {self._named(touching, found[0])} was taken")
+        one = found[0]
+        n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
+        after = x.copy()
+        after[n_q:n_q + n_u] += at.speeds[:, places] @ one.lam
+        gained = float((v + one.w) @ one.lam) / 2
+        size = float(np.abs(v) @ np.abs(one.lam))
+        if gained > 1e-9 * size:
+            self.doubts.append(f"{self.module.name}: the impact of {names} at t = {t:.9g} s adds {gained:.3g} J, as Newton's law "
+                               "may with friction or several contacts; pass impact='poisson'")
+        impulses = np.zeros(len(at.slip))
+        impulses[places] = one.lam
+        self.impacts.append(Impact(t, impulses, at.slip, self._numbers(t, after).slip))
+        stays = NO_SPEED * np.abs(v).max()
+        rebound, k_row = [], 0
+        for k, mode in zip(touching, one.modes, strict=True):
+            w = one.w[k_row:k_row + self.records[k].rows]
+            k_row += self.records[k].rows
+            self.still[k] = mode.kind == STICKING or bool(np.abs(w[1:]).max(initial=0.0) <= stays)
+            if w[0] > stays:
+                rebound.append(k)
+        event = self.events[hit[0]]["closes"]
+        known = [i for i, one in enumerate(self.happened) if one.t == t and one.event in (self.events[k]["closes"] for k in hit)]
+        if known:
+            for i in known:
+                self.happened[i] = self.happened[i]._replace(before=x, after=after)
+        else:
+            self.happened.append(Happened(event, t, x.copy(), after))
+        for k in rebound:
+            self.modes[k] = OPEN
+        for k in touching:
+            if k not in rebound and self.modes[k] == OPEN:
+                self.modes[k] = SLIDING
+        return self._onto_surfaces(t, after), rebound
+
+    def _sites(self, at: Numbers, chosen: Sequence[int], impact: bool = False) -> list[Site]:
+        """The contacts of a problem, with their rows among themselves."""
+        sites, first = [], 0
+        for k in chosen:
+            rows = tuple(range(first, first + self.records[k].rows))
+            first += len(rows)
+            slip = None
+            v = at.slip[list(self.rows[k][1:])]
+            if not impact and not self.still[k] and len(v):
+                size = np.linalg.norm(v)
+                slip = v / size if size > 0 else self.directions[k] if self.directions[k].any() else None
+            sites.append(Site(rows, float(at.static[k]), float(at.kinetic[k]), slip,
+                              excluded=() if impact else tuple(self.ruled_out.get(k, ()))))
+        return sites
+
+    def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> None:
+        """The modes of the contacts that are closed, from the accelerations; the others are open."""
+        places = [row for k in closed for row in self.rows[k]]
+        D, b = at.D[np.ix_(places, places)], at.free[places]
+        found = solutions(D, b, self._sites(at, closed)) if places else []
+        if places and not found and self.ruled_out:
+            self.ruled_out = {}
+            found = solutions(D, b, self._sites(at, closed))
+        if places and not found:
+            names = ", ".join(self.records[k].name for k in closed)
+            raise _Stop(f"contacts {names}: no accelerations fulfil the laws of contact and friction (Painleve's paradox: "
+                        "friction pushes the bodies into each other faster than any force separates them); less friction, or "
+                        "elasticity where they touch, leaves a solution")
+        if len(found) > 1:
+            self.doubts.append(f"{self.module.name}: at t = {t:.9g} s the laws of contact and friction allow {len(found)} "
+                               f"motions (Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
+        self.modes = [OPEN] * len(self.records)
+        self.shared = bool(found) and found[0].shared
+        for k, mode in zip(closed, found[0].modes if found else (), strict=True):
+            self.modes[k] = mode.kind
+            self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].rows - 1)
+            self.still[k] = mode.kind == STICKING
+
+    def _named(self, chosen: Sequence[int], one: Solved) -> str:
+        return ", ".join(f"{self.records[k].name} {mode.kind}" for k, mode in zip(chosen, one.modes, strict=True))
+
+    def _zeno(self, t: float, at: Numbers, rebound: Sequence[int], hit: Sequence[int]) -> list[int]:
+        """Contacts whose next flights are too short to be followed: they stay closed. The time at which the flights have come to
+        their end is noted: for a ball it is the sum of a geometric series."""
+        closed = [k for k, mode in enumerate(self.modes) if mode != OPEN]
+        places = [row for k in closed for row in self.rows[k]]
+        lam = np.zeros(len(at.free))
+        if places:
+            found = solutions(at.D[np.ix_(places, places)], at.free[places], self._sites(at, closed))
+            lam[places] = found[0].lam if found else 0.0
+        w = at.free + at.D @ lam
+        begin, end = self.request.span
+        shortest = max(SHORTEST_FLIGHT * (end - begin), 1e4 * np.finfo(float).eps * abs(t))
+        resting = []
+        for k in rebound:
+            row, e = self.normal[k], float(at.restitution[k])
+            if w[row] >= 0 or e >= 1:
+                continue
+            flight = -2 * float(at.slip[row]) / float(w[row])
+            if flight < shortest:
+                resting.append(k)
+                self.impacts[-1] = self.impacts[-1]._replace(rest={**self.impacts[-1].rest, k: t + flight / (1 - e)})
+        return resting
+
+    # -- the result
+
+    def _whole(self, t: float, x: np.ndarray, message: str, cause: BaseException | None, interrupted: bool,
+               over: bool) -> Outcome:
+        width = len(self.request.x0)
+        times = np.concatenate(self.ts) if self.ts else np.array(self.request.span[:1])
+        states = np.concatenate(self.xs) if self.xs else self.request.x0[None, :].copy()
+        phase_of = np.repeat(np.arange(len(self.ts)), [len(one) for one in self.ts])
+        notes: dict[str, Any] = {"phases": tuple(self.phases), "impacts": tuple(self.impacts)}
+        happened = sorted(self.happened, key=lambda one: one.t)
+        if not self.done:
+            return Outcome(times, states.reshape(-1, width), False, message, interrupted, 0, 0, 0, cause=cause,
+                           happened=happened, doubts=tuple(self.doubts), **notes)
+        last, corrections = self.done[-1], [o.corrections for o in self.done]
+        if message and not over and (not len(times) or t > times[-1]):
+            times, states = np.append(times, t), np.vstack([states, x])
+            phase_of = np.append(phase_of, len(self.ts) - 1)
+        seconds = [o.seconds for o in self.done if o.seconds is not None]
+        return replace(
+            last, t=times, x=states, success=last.success and (over or not message), message=message or last.message,
+            interrupted=interrupted or last.interrupted, n_steps=self.n_steps, n_rejected=sum(o.n_rejected for o in self.done),
+            n_evaluations=sum(o.n_evaluations for o in self.done), seconds=sum(seconds) if seconds else None,
+            corrections=Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
+                                    sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
+            happened=happened, n_jacobians=sum(o.n_jacobians for o in self.done),
+            n_factorizations=sum(o.n_factorizations for o in self.done),
+            doubts=(*self.doubts, *next((o.doubts for o in self.done if o.doubts), ())), cause=cause or last.cause,
+            row_phases=phase_of, **notes)

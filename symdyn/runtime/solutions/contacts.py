@@ -1,0 +1,73 @@
+"""What rigid contacts did in a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
+from symdyn.runtime.integrating.outcome import Impact, Phase
+
+if TYPE_CHECKING:
+    from symdyn.runtime.solutions.solution import Solution
+
+
+class Impacts(NamedTuple):
+    """Impacts of a contact: when, t (n,), the impulses along its normal and tangents, N s (n, 1 + n_tangents), the velocities
+    there before and after, m/s (n, 1 + n_tangents)."""
+
+    t: np.ndarray
+    impulse: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+class ContactMotion(NamedTuple):
+    """A rigid contact along a motion.
+
+    mode      "open", "sticking" or "sliding" at every time, (n_t,)
+    gap       m, (n_t,)
+    force     on body a along the normal, then along the tangents, N, (n_t, 1 + n_tangents); zero where it is open
+    slip      velocity of body a against body b along the tangents, m/s, (n_t, n_tangents)
+    impulse   sum of the impulses since the start, N s, (n_t, 1 + n_tangents)
+    impacts   one by one, see Impacts
+    rests     times at which infinitely many impacts have come to their end, s, (n,)
+    switches  times from which on the contact is in another mode, with that mode
+    """
+
+    mode: np.ndarray
+    gap: np.ndarray
+    force: np.ndarray
+    slip: np.ndarray
+    impulse: np.ndarray
+    impacts: Impacts
+    rests: np.ndarray
+    switches: tuple[tuple[float, str], ...]
+
+
+def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
+                    impacts: Sequence[Impact]) -> Mapping[str, ContactMotion]:
+    """Every rigid contact of a motion by name, one for each place where a shape touches."""
+    records = solution.module.metadata.contacts
+    n = sum(record.rows for record in records)
+    values = solution.rows(CONTACTS).reshape(len(solution.t), -1)
+    k = len(records)
+    slips, forces = values[:, 4 * k:4 * k + n], values[:, 4 * k + 2 * n:4 * k + 3 * n]
+    found = {}
+    for place, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
+        own = list(rows)
+        hits = [one for one in impacts if one.impulses[own].any()]
+        t = np.array([one.t for one in hits])
+        of_hits = Impacts(t, *[np.array([getattr(one, what)[own] for one in hits]).reshape(-1, len(own))
+                               for what in ("impulses", "before", "after")])
+        modes = [phase.modes[place] for phase in phases]
+        changes = [(phase.t, mode) for i, (phase, mode) in enumerate(zip(phases, modes, strict=True))
+                   if i == 0 or modes[i - 1] != mode]
+        summed = np.vstack([np.zeros(len(own)), np.cumsum(of_hits.impulse, axis=0)])
+        found[record.name] = ContactMotion(
+            np.array(modes, dtype=object)[row_phases] if modes else np.zeros(0, dtype=object), values[:, 4 * place],
+            forces[:, own], slips[:, own[1:]], summed[np.searchsorted(t, solution.t, side="left")], of_hits,
+            np.array([one.rest[place] for one in impacts if place in one.rest]), tuple(changes))
+    return found
