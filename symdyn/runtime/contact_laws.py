@@ -3,7 +3,7 @@
 Both are the same problem: relative velocities (of an impact) or accelerations w = b + D lam, with lam_N >= 0, w_N >= 0 and
 lam_N w_N = 0 in every contact, and friction within Coulomb's cone. It is solved exactly: each combination of modes is a system of
 linear equations, whose solution counts where it fulfils the inequalities. So all solutions are found, none or several as well
-(Painleve). Beyond MOST_COMBINATIONS the first one found counts, beginning with the modes that are at hand.
+(Painleve). Beyond MOST_COMBINATIONS, and in space, where directions of slip are unknowns as well, the first one found counts.
 
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapters 5, 8 (impacts: Newton's and Poisson's
 law); Glocker, Set-Valued Force Laws, 2001.
@@ -72,7 +72,8 @@ class Solved:
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
     """Solutions that differ in w or in what the forces do, the preferred one first; all of them up to MOST_COMBINATIONS."""
     options = [list(_options(site)) for site in sites]
-    few = np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS
+    planar = all(len(site.rows) < 3 for site in sites)
+    few = planar and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS
     found: list[Solved] = []
     for modes in islice(product(*options), MOST_TRIED):
         one = _solved(D, b, sites, modes)

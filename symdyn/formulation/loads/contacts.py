@@ -12,7 +12,7 @@ Complementarity Problem, section 3.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.model.contacts.lowering import SOFTNESS, RigidContact
 from symdyn.model.quantity import Quantity
-from symdyn.spatial.vectors import vector, zeros
+from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import jacobian
 from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
@@ -61,27 +61,16 @@ class ContactRows:
                 first += 1 + len(c.slide)
             A, shared = self.D @ H, a.expression(SOFTNESS)
             for i in range(n):
-                A[i, i] = A[i, i] + shared * self.D[i, i]
                 A[i] = held[i] * A[i]
                 A[i, i] = A[i, i] + (1 - held[i])
+            softened = A + np.diag([shared * held[i] * self.D[i, i] for i in range(n)])
             least = [a.rounding * held[i] * self.D[i, i] for i in range(n)]
-            x = self._eliminated(A, vector(*[-h * f for h, f in zip(held, self.free, strict=True)]), least, reasons)
+            factors = _Factors(a, softened, least, reasons)
+            b = vector(*[-h * f for h, f in zip(held, self.free, strict=True)])
+            x = factors.solve(b)
+            if n > 1:  # rows that depend on each other are softened, which a second step undoes in what the rows determine
+                x = x + factors.solve(b - A @ x)
             return dict(zip(self.forces, a.name("contact_force", H @ x), strict=True))
-
-    def _eliminated(self, A: np.ndarray, b: np.ndarray, least: Sequence[Any], reasons: Sequence[str]) -> np.ndarray:
-        """x with A x = b, by elimination without exchange of rows."""
-        n, A, b, pivots = len(b), A.copy(), b.copy(), []
-        for k in range(n):
-            pivots.append(self.algebra.divisor(A[k, k], least[k], reasons[k]))
-            for i in range(k + 1, n):
-                if not is_zero(A[i, k]):
-                    factor = A[i, k] / pivots[k]
-                    A[i, k + 1:] = A[i, k + 1:] - factor * A[k, k + 1:]
-                    b[i] = b[i] - factor * b[k]
-        x = zeros(n)
-        for k in reversed(range(n)):
-            x[k] = (b[k] - sum((A[k, j] * x[j] for j in range(k + 1, n) if not is_zero(A[k, j])), 0)) / pivots[k]
-        return x
 
     def numbers(self, forces: Mapping[Quantity, Any], rates_along: Callable[[np.ndarray], Sequence[Any]]) -> np.ndarray:
         """[gap, static, kinetic, restitution of each contact; slips; free accelerations; forces; D; M^-1 J^T; N M^-1 J^T] row by
@@ -95,3 +84,30 @@ class ContactRows:
             moved = np.array([list(rates_along(column)) for column in self.directions.T], dtype=object).T
             return vector(*of_contacts, *self.slips, *self.free, *forces.values(), *self.D.ravel(), *self.directions.ravel(),
                           *moved.ravel())
+
+
+class _Factors:
+    """A matrix factorized without exchange of rows; least, reasons: of its pivots."""
+
+    def __init__(self, algebra: TapeAlgebra, A: np.ndarray, least: Sequence[Any], reasons: Sequence[str]) -> None:
+        self.A = A.copy()
+        self.pivots: list[Any] = []
+        n = len(A)
+        for k in range(n):
+            self.pivots.append(algebra.divisor(self.A[k, k], least[k], reasons[k]))
+            for i in range(k + 1, n):
+                if not is_zero(self.A[i, k]):
+                    self.A[i, k] = self.A[i, k] / self.pivots[k]
+                    self.A[i, k + 1:] = self.A[i, k + 1:] - self.A[i, k] * self.A[k, k + 1:]
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """x with A x = b, (n,)."""
+        n, x = len(b), b.copy()
+        for k in range(n):
+            x[k] = x[k] - self._sum(k, range(k), x)
+        for k in reversed(range(n)):
+            x[k] = (x[k] - self._sum(k, range(k + 1, n), x)) / self.pivots[k]
+        return x
+
+    def _sum(self, k: int, columns: Iterable[int], x: np.ndarray) -> Any:
+        return sum((self.A[k, j] * x[j] for j in columns if not is_zero(self.A[k, j])), 0)

@@ -26,7 +26,7 @@ from symdyn.runtime.integrating.stops import describe_stop
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-Part = Callable[[Request], Outcome]
+Part = Callable[[Request, bool], Outcome]
 CONTACTS, SHARED = "contacts", "contacts_shared"
 # Gaps, m, and velocities, m/s, that count as none at the start.
 TOUCHING = 1e-9
@@ -39,9 +39,11 @@ NO_SPEED = 1e-11
 # So many switches within SAME_TIME of the run: the modes do not settle.
 MOST_SWITCHES, SAME_TIME = 50, 1e-13
 # What is added to the diagonal of rows that depend on each other, by its size.
-SOFTNESS = 1e-11
+SOFTNESS = 1e-8
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
+# The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
+SLIP_GRACE = 1e-5
 STILL = np.zeros(0)
 
 
@@ -105,7 +107,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
 
 
 def run_contacts(module: Module, request: Request, part: Part) -> Outcome:
-    """Integrate with rigid contacts; part: integrates a request in one mode.
+    """Integrate with rigid contacts; part: integrates a request in one mode, by an implicit method if so told.
 
     Raises ArgumentError for what contacts do not take.
     """
@@ -154,6 +156,7 @@ class _Phases:
         self.modes = [OPEN] * n
         self.directions = [np.zeros(record.rows - 1) for record in self.records]
         self.still = [False] * n  # whether the slip of a closed contact is zero
+        self.fresh = [False] * n  # whether it has just begun to slip
         self.shared = False
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
@@ -174,7 +177,8 @@ class _Phases:
         begun = True
         try:
             while True:
-                x = self._switch(t, x, fired, begun)
+                if begun or fired:
+                    x = self._switch(t, x, fired, begun)
                 begun = False
                 outcome = self._phase(t, x)
                 if not outcome.success:
@@ -191,6 +195,8 @@ class _Phases:
                     x = latest[-1].before.copy()
                 elif until >= last:
                     break
+                else:
+                    fired = self._back(until, x)
                 self._count(until - t, until, fired)
                 t = until
                 if request.max_steps is not None and self.n_steps >= request.max_steps:
@@ -209,8 +215,7 @@ class _Phases:
             return
         self.at_once += 1
         self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}
-        begin, end = self.request.span
-        self.until = t + GRACE * (end - begin)
+        self._wait(t)
         if self.at_once >= MOST_SWITCHES:
             names = ", ".join(dict.fromkeys(self.records[k].name for k, _ in fired))
             raise _Stop(f"the modes of contacts do not settle: {self.at_once} switches within {self.same:.3g} s, the latest of "
@@ -227,7 +232,9 @@ class _Phases:
         left = None if request.max_steps is None else request.max_steps - self.n_steps
         p = self._parameters()
         self.phases.append(Phase(t, p, tuple(self.modes)))
-        outcome = self.part(replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for()))
+        part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
+        stiff = self._stiff()
+        outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff)
         rows = np.ones(len(outcome.t), dtype=bool)
         if wanted is not None:
             rows = np.isin(outcome.t, wanted)
@@ -241,6 +248,11 @@ class _Phases:
         self.happened += outcome.happened
         self.n_steps += outcome.n_steps
         return outcome
+
+    def _stiff(self) -> bool:
+        """Whether the direction of friction is all but free: a contact in space begins to slip."""
+        return any(fresh and mode == SLIDING and record.rows == 3
+                   for fresh, mode, record in zip(self.fresh, self.modes, self.records, strict=True))
 
     def _parameters(self) -> np.ndarray:
         """The parameters with the modes of all contacts."""
@@ -274,7 +286,7 @@ class _Phases:
     def _numbers(self, t: float, x: np.ndarray) -> Numbers:
         request = self.request
         inputs = request.inputs.at(t, x[:request.n_state])
-        return numbers(self.module, t, x, self._parameters(), inputs)
+        return numbers(self.module, t, x, request.p, inputs)  # in the open mode: what is taken is that of all modes
 
     def _switch(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool) -> np.ndarray:
         """The state after impacts, and the modes of the next phase."""
@@ -282,6 +294,9 @@ class _Phases:
         for k, what in fired:
             if what == "sticks":
                 self.still[k] = True
+            elif what == "turns":  # a slip within the tolerances has no direction
+                v = self._numbers(t, x).slip[list(self.rows[k][1:])]
+                self.still[k] = bool(np.linalg.norm(v) <= 10 * self.request.atol.max(initial=0.0))
             elif what in ("opens", "slips"):
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         x = self._onto_surfaces(t, x)
@@ -416,11 +431,29 @@ class _Phases:
             self.doubts.append(f"{self.module.name}: at t = {t:.9g} s the laws of contact and friction allow {len(found)} "
                                f"motions (Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
         self.modes = [OPEN] * len(self.records)
+        self.fresh = [False] * len(self.records)
         self.shared = bool(found) and found[0].shared
         for k, mode in zip(closed, found[0].modes if found else (), strict=True):
             self.modes[k] = mode.kind
             self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].rows - 1)
+            self.fresh[k] = self.still[k] and mode.kind == SLIDING and self.records[k].rows > 1
             self.still[k] = mode.kind == STICKING
+            if self.fresh[k]:  # its slip is zero, and so are what these events look at
+                self.unlooked |= {self.events[k][what] for what in ("sticks", "turns") if what in self.events[k]}
+                self._wait(t, SLIP_GRACE)
+
+    def _wait(self, t: float, part: float = GRACE) -> None:
+        """Look for events that are not looked for again after a part of the run."""
+        begin, end = self.request.span
+        self.until = t + part * (end - begin)
+
+    def _back(self, t: float, x: np.ndarray) -> list[tuple[int, str]]:
+        """Contacts that stick again before their slip was looked at."""
+        if not any(self.fresh):
+            return []
+        at = self._numbers(t, x)
+        return [(k, "sticks") for k in range(len(self.records))
+                if self.fresh[k] and at.slip[list(self.rows[k][1:])] @ self.directions[k] < 0]
 
     def _named(self, chosen: Sequence[int], one: Solved) -> str:
         return ", ".join(f"{self.records[k].name} {mode.kind}" for k, mode in zip(chosen, one.modes, strict=True))

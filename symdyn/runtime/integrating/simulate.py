@@ -142,7 +142,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
 def integrate(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
     """A request, checked, by any method."""
     if module.metadata.contacts:
-        return run_contacts(module, request, lambda part: _run_smooth(module, part, method, bar))
+        stiff = "radau" if is_compiled(method) else "Radau"
+        return run_contacts(module, request,
+                            lambda part, slow: _run_smooth(module, part, stiff if slow else method, bar))
     return _run_smooth(module, request, method, bar)
 
 
