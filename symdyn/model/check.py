@@ -19,7 +19,7 @@ from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import check_events
 from symdyn.model.faults import NAME, Faults, plain_unit
 from symdyn.model.joints import Joint, Modal
-from symdyn.model.loads import Force, JointForce
+from symdyn.model.loads import Force, JointForce, expressions_of
 from symdyn.model.loop_check import idle_coordinate_faults, loop_faults, with_carriers
 from symdyn.model.orientation import EulerParameters
 from symdyn.model.physics import inertia_faults, plane_faults
@@ -227,6 +227,12 @@ class _Checker:
                 if places.get(one) is not None and places.get(one) == places.get(other):
                     self.faults.append(f"{load.label}: {one} and {other} are the same body, so that nothing comes of it; "
                                        "pass two different bodies")
+        reacting = [load.label for load in self.loads
+                    if any(q.level == 2 and q.measure.kind != "contact" for q in quantities_in(expressions_of(load)))]
+        if self.system.rigid_contacts and reacting:
+            self.faults.append(f"{', '.join(reacting)} depend{'s' if len(reacting) == 1 else ''} on accelerations, multipliers "
+                               "or reactions, which rigid contacts do not go with; give the load another law, or the contact "
+                               "law='compliant'")
         for output in self.system.outputs:
             if isinstance(output.value, Point):
                 self._resolve(output.value.body, f"output {shown(output.name)}: body")

@@ -705,6 +705,7 @@ class Module:
         """
         from symdyn.runtime.integrating.gradient import gradient
 
+        self._demand_no_rigid_contacts("gradients")
         return gradient(self, loss, by, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method,
                         max_step=max_step, first_step=first_step, stabilization=stabilization, events=events,
                         interpolation=interpolation, extend=extend)
@@ -784,6 +785,7 @@ class Module:
         """
         from symdyn.statics.equilibrium import equilibrium
 
+        self._demand_no_rigid_contacts("equilibria")
         return equilibrium(self, free, fixed, start, params, t, inputs, unknown_params, max_iterations)
 
     def equilibria(self, starts: int | Sequence[Start] = 100, ranges: Ranges | None = None, seed: int = 0,
@@ -807,6 +809,7 @@ class Module:
         """
         from symdyn.statics.equilibria import equilibria
 
+        self._demand_no_rigid_contacts("equilibria")
         return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
     def linearize(self, at: Start | None = None, params: States | None = None, t: float | None = None,
@@ -882,6 +885,7 @@ class Module:
         """
         from symdyn.statics.periodic import periodic
 
+        self._demand_no_rigid_contacts("periodic motions")
         return periodic(self, period, q, u, params, z=z, t=t, inputs=inputs, advance=advance, rtol=rtol, method=method)
 
     def campbell(self, speed: Key, values: Times, free: Names | None = None, fixed: Numbers | None = None,
@@ -907,8 +911,16 @@ class Module:
         """
         from symdyn.statics.campbell import campbell
 
+        self._demand_no_rigid_contacts("natural frequencies over a speed")
         return campbell(self, speed, values, free, fixed, start, params, t, inputs, blades, azimuth, azimuths, max_iterations,
                         frame, averaged)
+
+    def _demand_no_rigid_contacts(self, what: str) -> None:
+        """Raise ArgumentError where modes of rigid contacts would have to be chosen."""
+        names = ", ".join(contact.name for contact in self.metadata.contacts)
+        if names:
+            raise ArgumentError(f"{self.name}: {what} are not known with the rigid contacts {names}, whose modes follow from a "
+                                "motion; run simulate until the motion comes to rest, or replace the contacts by constraints")
 
     # -- about the module
 

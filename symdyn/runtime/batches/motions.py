@@ -133,6 +133,8 @@ def why_one_by_one(module: Module, events: bool = True) -> str:
         return "one by one: the mechanism has constraints, which states are projected onto"
     if metadata.unit_groups:
         return "one by one: the mechanism has Euler parameters, which are normalised after every step"
+    if metadata.contacts:
+        return "one by one: the mechanism has rigid contacts"
     if events and wanted(module, events).any():
         return "one by one: the mechanism has events"
     return "" if metadata.sizes.x else "one by one: the mechanism has no state"

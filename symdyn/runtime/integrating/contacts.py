@@ -34,6 +34,10 @@ TOUCHING = 1e-9
 TOGETHER = 1e-11
 # A flight shorter than this part of the run is one of infinitely many that end in finite time (Zeno): the contact stays closed.
 SHORTEST_FLIGHT = 1e-10
+# So is one that rises less than this part of the size of the coordinates: rounding hides when it ends.
+LOWEST_FLIGHT = 1e-12
+# Gaps of open contacts below minus this part of that size have been missed.
+MISSED = 1e-6
 # Velocities below this part of those before an impact, or of the largest rate, are none.
 NO_SPEED = 1e-11
 # So many switches within SAME_TIME of the run: the modes do not settle.
@@ -106,8 +110,11 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     raise ArgumentError(f"{module.name}: contacts overlap at the start: {told}; {remedy}")
 
 
-def run_contacts(module: Module, request: Request, part: Part) -> Outcome:
-    """Integrate with rigid contacts; part: integrates a request in one mode, by an implicit method if so told.
+def run_contacts(module: Module, request: Request, part: Part, method: object = None) -> Outcome:
+    """Integrate with rigid contacts.
+
+    part     integrates a request in one mode, by an implicit method if so told
+    method   the one that it integrates by else
 
     Raises ArgumentError for what contacts do not take.
     """
@@ -115,8 +122,14 @@ def run_contacts(module: Module, request: Request, part: Part) -> Outcome:
     if end < begin:
         raise ArgumentError(f"{module.name}: rigid contacts lose energy, so that motions with them do not run backward in time; "
                             "pass an end after the start")
+    if method == "ggl":
+        raise ArgumentError(f"{module.name}: method='ggl' does not locate the switches of rigid contacts; pass 'dop853' or "
+                            "another")
     if request.columns:
         raise ArgumentError(f"{module.name}: sensitivities do not go across the switches of rigid contacts; leave them out")
+    if request.inputs.are_held:
+        raise ArgumentError(f"{module.name}: controllers whose values are held between instants do not go with rigid contacts; "
+                            "pass their law as an expression of the system, or as a function of (t, x)")
     return _Phases(module, request, part).through()
 
 
@@ -156,6 +169,7 @@ class _Phases:
         self.modes = [OPEN] * n
         self.directions = [np.zeros(record.rows - 1) for record in self.records]
         self.still = [False] * n  # whether the slip of a closed contact is zero
+        self.size = 0.0  # of coordinates and gaps
         self.fresh = [False] * n  # whether it has just begun to slip
         self.shared = False
         begin, end = self.request.span
@@ -184,6 +198,7 @@ class _Phases:
                 if not outcome.success:
                     break
                 x = outcome.x[-1]
+                self._demand_seen(float(outcome.t[-1]), x)
                 latest = [one for one in outcome.happened if one.t == outcome.happened[-1].t] if outcome.happened else []
                 fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
                 if any(self.module.metadata.events[one.event].stop and one.event not in self.of_event for one in latest):
@@ -207,6 +222,14 @@ class _Phases:
             why = str(error).removeprefix(f"{self.module.name}: ")
             message, cause = describe_stop(self.module.metadata, t, x[:request.n_state], why), error.__cause__
         return self._whole(t, x, message, cause, interrupted, over)
+
+    def _demand_seen(self, t: float, x: np.ndarray) -> None:
+        """Raise _Stop where an open contact overlaps."""
+        at = self._numbers(t, x)
+        for k, (record, mode) in enumerate(zip(self.records, self.modes, strict=True)):
+            if mode == OPEN and at.gap[k] < -MISSED * self.size:
+                raise _Stop(f"contact {record.name} overlaps by {-at.gap[k]:.3g} m, since the instant at which it closed was "
+                            "missed; give event_spacing, or a finer rtol")
 
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note how often the modes change without time passing; raise _Stop where that does not end."""
@@ -301,6 +324,7 @@ class _Phases:
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         x = self._onto_surfaces(t, x)
         at = self._numbers(t, x)
+        self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0), np.abs(at.gap).max())
         closing = {k for k, what in fired if what == "closes"}
         near = TOUCHING if start else TOGETHER * max(1.0, float(np.abs(x[:self.request.n_state]).max(initial=0.0)))
         for k, mode in enumerate(self.modes):
@@ -476,7 +500,7 @@ class _Phases:
             if w[row] >= 0 or e >= 1:
                 continue
             flight = -2 * float(at.slip[row]) / float(w[row])
-            if flight < shortest:
+            if flight < shortest or flight * float(at.slip[row]) / 4 < LOWEST_FLIGHT * self.size:
                 resting.append(k)
                 self.impacts[-1] = self.impacts[-1]._replace(rest={**self.impacts[-1].rest, k: t + flight / (1 - e)})
         return resting

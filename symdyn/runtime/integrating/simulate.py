@@ -144,7 +144,7 @@ def integrate(module: Module, request: Request, method: Any, bar: Any = None) ->
     if module.metadata.contacts:
         stiff = "radau" if is_compiled(method) else "Radau"
         return run_contacts(module, request,
-                            lambda part, slow: _run_smooth(module, part, stiff if slow else method, bar))
+                            lambda part, slow: _run_smooth(module, part, stiff if slow else method, bar), method)
     return _run_smooth(module, request, method, bar)
 
 

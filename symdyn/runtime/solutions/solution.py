@@ -252,7 +252,8 @@ class Solution:
     @property
     def energy_balance(self) -> dict[str, np.ndarray]:
         """Parts of the energy balance since the start, each (n_t,), J: "change" of kinetic and potential energy; "work" of the
-        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "error", the change less all others.
+        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "impact of NAME" for every rigid contact;
+        "error", the change less all others.
 
         Raises ArgumentError as `work` does.
 
@@ -261,7 +262,10 @@ class Solution:
         ['change', 'error', 'work']
         """
         change = self.energy - self.energy[0]
-        parts = {"work": self.work, **{f"reset of {name}": rows for name, rows in self.reset_energy.items()}}
+        touching = {f"{contact.name}_closes" for contact in self.module.metadata.contacts}
+        parts = {"work": self.work}
+        for name, rows in self.reset_energy.items():
+            parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
         return {"change": change, **parts, "error": change - sum(parts.values())}
 
     @property
