@@ -26,8 +26,8 @@ def skipped(equations: Equations) -> list[str]:
     if equations.events:
         notes.append("events: files that stand alone do not look for them, simulations do")
     if equations.contacts:
-        notes.append("rigid contacts: files that stand alone leave them in the mode that their parameters say, simulations change "
-                     "it")
+        notes.append("rigid contacts: files that stand alone leave them in the mode that their parameters say, simulations "
+                     "change it")
     if equations.constraints:
         notes += _constraints(equations, tape)
     if equations.formulation != "recursive":

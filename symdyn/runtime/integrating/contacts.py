@@ -197,8 +197,8 @@ class _Phases:
                 outcome = self._phase(t, x)
                 if not outcome.success:
                     break
-                x = outcome.x[-1]
-                self._demand_seen(float(outcome.t[-1]), x)
+                start, t, x = t, float(outcome.t[-1]), outcome.x[-1]
+                self._demand_seen(t, x)
                 latest = [one for one in outcome.happened if one.t == outcome.happened[-1].t] if outcome.happened else []
                 fired = [self.of_event[one.event] for one in latest if one.event in self.of_event]
                 if any(self.module.metadata.events[one.event].stop and one.event not in self.of_event for one in latest):
@@ -212,7 +212,7 @@ class _Phases:
                     break
                 else:
                     fired = self._back(until, x)
-                self._count(until - t, until, fired)
+                self._count(until - start, until, fired)
                 t = until
                 if request.max_steps is not None and self.n_steps >= request.max_steps:
                     raise _Stop(f"{self.n_steps} steps were done, as asked")
@@ -254,7 +254,7 @@ class _Phases:
             times = np.unique(np.concatenate([[t], wanted, [end]]))
         left = None if request.max_steps is None else request.max_steps - self.n_steps
         p = self._parameters()
-        self.phases.append(Phase(t, p, tuple(self.modes)))
+        self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
         stiff = self._stiff()
         outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff)

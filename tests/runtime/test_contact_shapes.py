@@ -1,0 +1,145 @@
+"""Gaps, normals and rows of contacts against brute force: the nearest of many points, and differences along a motion."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.spatial.transform import Rotation
+
+import symdyn as sd
+from symdyn.runtime.integrating.contacts import numbers
+
+Shapes = sd.contacts
+X, Y = sp.symbols("X Y")
+
+
+@cache
+def two_bodies(name: str) -> Any:
+    """A free body a in contact with a body b that slides and turns."""
+    planar = name == "curve"
+    system = sd.System("two", planar=planar)
+    a, b = (system.add_body(body, mass=2.0, inertia=0.3 if planar else [0.3, 0.4, 0.5], com=[0.1, 0.2, 0.0]) for body in "ab")
+    if planar:
+        system.add_joint(sd.Planar("free", system.ground, a))
+        system.add_joint(sd.Planar("other", system.ground, b))
+    else:
+        system.add_joint(sd.Free("free", system.ground, a, orientation=sd.EulerParameters()))
+        system.add_joint(sd.Cylindrical("other", system.ground, b, axis=[0.6, 0, 0.8], parent_point=[0.1, 0.2, 0.3]))
+    system.add_contact(sd.Contact("touch", "a", "b", shape=ROUGH.get(name) or CASES[name][0],
+                                  friction=0 if name == "box" else 0.5))
+    return system.compile(backend="numpy")
+
+
+def rotations(module: Any, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position and rotation of a and b."""
+    frames = module.evaluate("frames", 0.0, x)
+    return [(row[:3], row[3:].reshape(3, 3)) for row in frames]
+
+
+def circle(radius: float, axis: np.ndarray, center: np.ndarray) -> np.ndarray:
+    turned = Rotation.align_vectors([axis], [[0, 0, 1]])[0].as_matrix()
+    angles = np.linspace(0, 2 * np.pi, 200_001)
+    return center + radius * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles]) @ turned.T
+
+
+def above(points: np.ndarray, normal: np.ndarray, point: np.ndarray) -> float:
+    return float(((points - point) @ normal).min())
+
+
+AXIS, CENTER = np.array([0.0, 0.6, 0.8]), np.array([0.1, -0.2, 0.3])
+NORMAL, POINT = np.array([1.0, 2.0, 2.0]) / 3, np.array([0.2, 0.1, -0.4])
+PLANE = Shapes.Plane([1, 2, 2], POINT.tolist())
+CASES: dict[str, tuple[Any, Callable[..., float]]] = {
+    "point": ((Shapes.Point(CENTER.tolist()), PLANE), lambda p: above(p(CENTER[None]), NORMAL, POINT)),
+    "sphere": ((Shapes.Sphere(0.2, CENTER.tolist()), PLANE), lambda p: above(p(CENTER[None]), NORMAL, POINT) - 0.2),
+    "disc": ((Shapes.Disc(0.3, AXIS.tolist(), CENTER.tolist()), PLANE),
+             lambda p: above(p(circle(0.3, AXIS, CENTER)), NORMAL, POINT)),
+    "cylinder": ((Shapes.Cylinder(0.3, 1.0, AXIS.tolist(), CENTER.tolist()), PLANE),
+                 lambda p: above(p(circle(0.3, AXIS, CENTER + AXIS / 2)), NORMAL, POINT)),
+    "spheres": ((Shapes.Sphere(0.2, CENTER.tolist()), Shapes.Sphere(0.1, POINT.tolist())),
+                lambda p: float(np.linalg.norm(p(CENTER[None])[0] - POINT)) - 0.3),
+    "box": ((Shapes.Box([0.2, 0.4, 0.6], CENTER.tolist()), PLANE),
+            lambda p: above(p(CENTER[None] - [[0.1, 0.2, 0.3]]), NORMAL, POINT)),
+}
+ROUGH = {"curve": (Shapes.Point([0.2, 0.1]), Shapes.Curve(sp.sin(X) / 3, X)),
+         "surface": (Shapes.Point([0.2, 0.1, 0.3]), Shapes.Surface(sp.sin(X) * Y / 3, X, Y))}
+
+
+def state(module: Any, seed: int) -> np.ndarray:
+    stream = np.random.default_rng(seed)
+    x = stream.uniform(-0.7, 0.7, module.metadata.sizes.x)
+    if module.metadata.unit_groups:
+        x[3:7] /= np.linalg.norm(x[3:7])
+    return x
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_gap_is_that_of_the_nearest_point(name: str) -> None:
+    distance, module = CASES[name][1], two_bodies(name)
+    for seed in range(3):
+        x = state(module, seed)
+        (p_a, R_a), (p_b, R_b) = rotations(module, x)
+        gap = numbers(module, 0.0, x, module.default_parameters, ()).gap[0]
+        assert gap == pytest.approx(distance(lambda at, a=(p_a, R_a), b=(p_b, R_b): (at @ a[1].T + a[0] - b[0]) @ b[1]), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [*CASES, "curve", "surface"])
+def test_rows_are_the_rate_of_the_gap_and_the_metric_of_the_mass_matrix(name: str) -> None:
+    """The first row by differences of the gap along the motion, D = J M^-1 J^T by differences of the rows by the speeds."""
+    module = two_bodies(name)
+    p, n_q = module.default_parameters, module.metadata.sizes.q
+    x = state(module, 5)
+    if name in ROUGH:  # scaled by its gradient the gap is the distance to first order: onto the surface
+        for _ in range(30):
+            at = numbers(module, 0.0, x, p, ())
+            x[:n_q] -= at.coordinates[:, 0] * at.gap[0] / at.D[0, 0]
+            if module.metadata.unit_groups:
+                x[3:7] /= np.linalg.norm(x[3:7])
+    at = numbers(module, 0.0, x, p, ())
+    rate = module.rhs(0.0, x)
+    h = 1e-6
+
+    def gap(step: float) -> float:
+        moved = x + step * rate
+        return float(numbers(module, 0.0, moved, p, ()).gap[0])
+
+    assert at.slip[0] == pytest.approx((gap(h) - gap(-h)) / (2 * h), abs=1e-8)
+    columns = []
+    for k in range(n_q, len(x)):
+        step = np.zeros(len(x))
+        step[k] = 1.0
+        columns.append(numbers(module, 0.0, x + step, p, ()).slip - at.slip)
+    J = np.array(columns).T
+    M = module.mass_matrix(0.0, x)
+    assert np.allclose(at.D, J @ np.linalg.solve(M, J.T), rtol=1e-10, atol=1e-10)
+    assert np.allclose(at.speeds, np.linalg.solve(M, J.T), rtol=1e-10, atol=1e-10)
+    later, sooner = (numbers(module, 0.0, x + s * h * rate, p, ()).slip for s in (1, -1))
+    assert np.allclose(at.free, (later - sooner) / (2 * h), atol=1e-7)
+
+
+def test_pair_of_forces_does_no_work_but_against_slip_and_keeps_momentum() -> None:
+    """Two spheres that hit each other with friction keep their momenta and lose energy."""
+    system = sd.System("spheres")
+    for name, mass in (("a", 1.0), ("b", 3.0)):
+        body = system.add_body(name, mass=mass, inertia=[0.004 * mass] * 3)
+        system.add_joint(sd.Free(f"free_{name}", system.ground, body, orientation=sd.EulerParameters()))
+    pair = (Shapes.Sphere(0.1), Shapes.Sphere(0.2))
+    system.add_contact(sd.Contact("touch", "a", "b", shape=pair, friction=0.3, restitution=0.7))
+    module = system.compile()
+    start = np.array([-1, 0.1, 0.05, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0], dtype=float)
+    solution = module.simulate((0, 1), q=start, u=[3, 0, 0, 1, 2, 3, 0, 0, 0, -1, 0, 2], rtol=1e-12)
+    touch = solution.contacts["touch"]
+    assert len(touch.impacts.t) == 1
+    v_a, v_b, w_a, w_b = solution.u[:, :3], solution.u[:, 6:9], solution.u[:, 3:6], solution.u[:, 9:]
+    assert np.abs(np.diff(v_a + 3 * v_b, axis=0)).max() < 1e-12
+    R_a, R_b = (Rotation.from_quat(solution.q[:, [k + 1, k + 2, k + 3, k]]) for k in (3, 10))
+    spins = 0.004 * (R_a.apply(w_a) + 3 * R_b.apply(w_b))
+    angular = np.cross(solution.q[:, :3], v_a) + 3 * np.cross(solution.q[:, 7:10], v_b) + spins
+    assert np.abs(np.diff(angular, axis=0)).max() < 1e-11
+    assert touch.impacts.after[0, 0] == pytest.approx(-0.7 * touch.impacts.before[0, 0], rel=1e-12)
+    impulse = touch.impacts.impulse[0]
+    assert np.linalg.norm(impulse[1:]) <= 0.3 * impulse[0] * (1 + 1e-9)
+    assert solution.energy[-1] < solution.energy[0]

@@ -1,0 +1,340 @@
+"""Motions with rigid contacts against closed forms."""
+
+import pickle
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import symdyn as sd
+from symdyn.errors import ArgumentError, EvaluationError, ModelError, SimulationWarning
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, solutions
+
+G = 9.81
+
+
+def ball(**law: Any) -> sd.System:
+    y = sd.coordinates("y")
+    system = sd.System("ball", gravity=[0, -G])
+    body = system.add_body("ball", mass=1.0)
+    system.add_joint(sd.Prismatic("height", system.ground, body, axis=[0, 1], coordinate=y))
+    system.add_contact(sd.Contact("floor", body, system.ground, **law))
+    return system
+
+
+def planar(name: str, contacts: list[sd.Contact], mass: float, inertia: float, tilt: float = 0.0) -> sd.System:
+    """A body that moves freely in a plane."""
+    system = sd.System(name, gravity=[G * np.sin(tilt), -G * np.cos(tilt)])
+    body = system.add_body("body", mass=mass, inertia=inertia)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    for contact in contacts:
+        system.add_contact(contact)
+    return system
+
+
+def box(friction: Any, tilt: float, restitution: float = 0.0, impact: str = "newton") -> sd.System:
+    contact = sd.Contact("corner", "body", "ground", shape=sd.contacts.Box([0.4, 0.2]), friction=friction,
+                         restitution=restitution, impact=impact)
+    return planar("box", [contact], 2.0, 2.0 * (0.4**2 + 0.2**2) / 12, tilt)
+
+
+def test_ball_meets_the_times_of_its_impacts_and_their_limit() -> None:
+    """Flights are 2 v/g with v = 0.8^n sqrt(2 g h): 50 impacts and the limit of the geometric series."""
+    solution = ball(restitution=0.8).compile().simulate((0, 6), q=[1.0], rtol=1e-12)
+    floor = solution.contacts["floor"]
+    fall, speed = np.sqrt(2 / G), np.sqrt(2 * G)
+    times = fall + np.cumsum([0, *[2 * speed * 0.8**n / G for n in range(1, 50)]])
+    assert np.abs(floor.impacts.t[:50] - times).max() < 1e-12
+    assert np.allclose(floor.impacts.impulse[:50, 0], 1.8 * speed * 0.8 ** np.arange(50), rtol=1e-9)
+    assert abs(floor.rests[0] - (fall + 2 * speed * 0.8 / G / 0.2)) < 1e-12
+    assert solution.success and floor.mode[-1] == SLIDING and floor.force[-1, 0] == pytest.approx(G)
+    assert np.abs(solution.x[-1]).max() < 1e-12
+    assert np.array_equal(solution.events["floor_closes"].t, floor.impacts.t)
+
+
+def test_block_on_a_belt_sticks_and_slips_for_100_periods() -> None:
+    """It slips from mu_s m g/k on, x = x_k + R cos(w t - phi), until its speed is the belt's again."""
+    static, kinetic, speed, k = 0.5, 0.3, 0.2, 100.0
+    x, y = sd.coordinates("x y")
+    system = sd.System("belt", gravity=[0, -G])
+    band, slide, block = (system.add_body(name, mass=m) for name, m in (("band", 1.0), ("slide", 0.0), ("block", 1.0)))
+    system.add_joint(sd.Prismatic("drive", system.ground, band, axis=[1, 0], coordinate=sd.t * speed))
+    system.add_joint(sd.Prismatic("along", system.ground, slide, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("across", slide, block, axis=[0, 1], coordinate=y))
+    system.add_spring_damper(system.ground, block, point_a=[-1, 0], stiffness=k, length=1)
+    system.add_contact(sd.Contact("sole", block, band, friction=(static, kinetic)))
+    w, begins, centre = np.sqrt(k), static * G / k, kinetic * G / k
+    slips = (np.pi + 2 * np.arctan2(speed / w, begins - centre)) / w
+    period = slips + 2 * (begins - centre) / speed
+    solution = system.compile().simulate((0, begins / speed + 100 * period + 1e-3), u=[speed, 0.0], rtol=1e-13, work=True)
+    switches = solution.contacts["sole"].switches
+    sliding, sticking = (np.array([t for t, mode in switches if mode == kind]) for kind in (SLIDING, STICKING))
+    expected = begins / speed + period * np.arange(101)
+    assert len(sliding) == 101
+    assert np.abs(sliding - expected).max() < 1e-10
+    assert np.abs(sticking[1:] - (expected[:100] + slips)).max() < 1e-10
+    assert np.abs(solution.energy_balance["error"]).max() < 1e-9
+
+
+def test_rocking_block_keeps_housners_times() -> None:
+    """Quarter periods by the energy integral; at an impact the angular momentum about the new corner stays (Housner 1963)."""
+    half, height, mass = 0.25, 1.0, 3.0
+    inertia = mass * (half**2 + height**2) / 3
+    reach, critical = np.hypot(half, height), np.arctan2(half, height)
+    feet = [sd.Contact(name, "body", "ground", shape=sd.contacts.Point([x, -height]), friction=5.0)
+            for name, x in (("left", -half), ("right", half))]
+    module = planar("block", feet, mass, inertia).compile()
+    start = 0.8 * critical
+    c, s = np.cos(start), np.sin(start)
+    solution = module.simulate((0, 6), q=[-half + c * half - s * height, s * half + c * height, start], rtol=1e-13)
+    about = inertia + mass * reach**2
+    kept = (inertia + mass * (height**2 - half**2)) / about
+
+    def quarter(angle: float) -> float:
+        def slope(r: float) -> float:  # angle - r^2
+            gained = 2 * np.sin(critical - angle + r * r / 2) * np.sin(r * r / 2)
+            return 2 * r / np.sqrt(2 * mass * G * reach / about * gained) if r else 2 / np.sqrt(
+                2 * mass * G * reach / about * np.sin(critical - angle) / 2) / np.sqrt(2)
+
+        return float(quad(slope, 0, np.sqrt(angle), epsabs=1e-13, epsrel=1e-12)[0])
+
+    angle, t, expected = start, quarter(start), []
+    for _ in range(7):
+        expected.append(t)
+        angle = critical - np.arccos(np.cos(critical) + kept**2 * (np.cos(critical - angle) - np.cos(critical)))
+        t += 2 * quarter(angle)
+    times = np.unique(np.concatenate([solution.contacts[name].impacts.t for name in ("left", "right")]))
+    assert np.abs(times[:7] - expected).max() < 1e-9
+    assert {str(mode) for mode in solution.contacts["left"].mode} == {OPEN, STICKING}
+
+
+def rod() -> Any:
+    mu = sd.parameters("mu")
+    tip = sd.Contact("tip", "body", "ground", shape=sd.contacts.Point([-1, 0]), friction=mu)
+    system = planar("rod", [tip], 1.0, 1 / 3)
+    system.defaults[mu] = 1.5
+    return system.compile()
+
+
+def rod_runs(module: Any, angle: float, mu: float, speed: float = -5.0) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)
+        return module.simulate((0, 1e-3), q=[np.cos(angle), np.sin(angle), angle], u=[speed, 0.0, 0.0], params={"mu": mu})
+
+
+def test_sliding_rod_stops_in_painleves_region() -> None:
+    """1 + 3 cos^2 - 3 mu sin cos < 0, tan^2 - 3 mu tan + 4 < 0: from mu = 4/3 on, between two angles (Painleve 1895)."""
+    module = rod()
+    assert all(rod_runs(module, angle, 1.3333).success for angle in np.radians(range(10, 90, 5)))
+    for edge, outside in zip(np.arctan(np.sort(np.roots([1, -4.5, 4]))), (-1, 1), strict=True):
+        assert rod_runs(module, edge + outside * 1e-9, 1.5).success
+        inside = rod_runs(module, edge - outside * 1e-9, 1.5)
+        assert not inside.success
+        assert "contacts tip: no accelerations fulfil the laws of contact and friction (Painleve's paradox" in inside.message
+    assert rod_runs(module, 1.1, 1.5, 5.0).success
+
+
+def test_accelerations_in_a_mode_that_jams_are_none() -> None:
+    module = rod()
+    mode = {"mu": 1.5, "tip_closed": 1, "tip_sliding": -1}
+    state = [np.cos(0.8), np.sin(0.8), 0.8, -5, 0, 0]
+    assert np.isfinite(module.rhs(0.0, state, mode)).all()
+    with pytest.raises(EvaluationError, match="contact tip: its friction jams"):
+        module.rhs(0.0, [np.cos(1.1), np.sin(1.1), 1.1, -5, 0, 0], mode)
+
+
+def test_several_solutions_are_reported() -> None:
+    """A contact that would leave, and whose friction presses it down harder than the force lifts it: open, or closed."""
+    D = np.array([[1.0, -1.5], [-1.5, 3.0]])
+    found = solutions(D, np.array([1.0, 0.0]), [Site((0, 1), 1.0, 1.0, slip=np.array([-1.0]))])
+    assert len(found) == 2
+    assert {one.modes[0].kind for one in found} == {OPEN, SLIDING}
+    assert not solutions(D, np.array([-1.0, 0.0]), [Site((0, 1), 1.0, 1.0, slip=np.array([-1.0]))])
+
+
+@pytest.fixture(scope="module")
+def billiard() -> Any:
+    r, mass = 0.028575, 0.17
+    system = sd.System("billiard", gravity=[0, 0, -G])
+    body = system.add_body("ball", mass=mass, inertia=[2 / 5 * mass * r * r] * 3)
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.Contact("cloth", body, system.ground, shape=sd.contacts.Sphere(r), friction=0.2))
+    return system.compile()
+
+
+@pytest.mark.parametrize(("v", "omega"), [([2.0, 0.0], [0.0, 0.0, 0.0]), ([2.0, 0.3], [30.0, -20.0, 5.0])])
+def test_billiard_ball_slides_then_rolls(billiard: Any, v: list[float], omega: list[float]) -> None:
+    """Sliding ends after 2 s/(7 mu g), s the slip at the start, whose direction stays: a parabola, then a straight line.
+
+    Source: Coriolis, Theorie mathematique des effets du jeu de billard, 1835.
+    """
+    r, mu = 0.028575, 0.2
+    t = np.linspace(0, 1.5, 151)
+    solution = billiard.simulate(t, q=[0, 0, r, 1, 0, 0, 0], u=[*v, 0, *omega], rtol=1e-13)
+    slip = np.array(v) + np.array([-r * omega[1], r * omega[0]])
+    ends, along = 2 * np.linalg.norm(slip) / (7 * mu * G), slip / np.linalg.norm(slip)
+    cloth = solution.contacts["cloth"]
+    assert [mode for _, mode in cloth.switches] == [SLIDING, STICKING]
+    assert abs(cloth.switches[1][0] - ends) < 1e-11
+    before = np.minimum(t, ends)[:, None]
+    path = before * v - mu * G / 2 * before**2 * along + (t[:, None] - before) * (v - mu * G * ends * along)
+    assert np.abs(solution.q[:, :2] - path).max() < 1e-11
+    assert np.abs(solution.u[-1, :2] - (v - mu * G * ends * along)).max() < 1e-11
+    if not any(omega):
+        assert solution.u[-1, 0] == pytest.approx(5 / 7 * v[0], rel=1e-12)
+
+
+def test_box_rests_on_a_slope_on_two_corners_and_slides_on_a_smooth_one() -> None:
+    """Two sticking corners depend on each other: the motion is unique, their friction is shared."""
+    tilt = np.radians(20)
+    resting = box(0.5, tilt).compile().simulate((0, 2), q=[0, 0.3, 0], rtol=1e-11)
+    feet = [resting.contacts[name] for name in ("corner_1", "corner_3")]
+    assert all(foot.mode[-1] == STICKING for foot in feet)
+    assert np.abs(resting.u[-1]).max() < 1e-12
+    assert sum(foot.force[-1, 0] for foot in feet) == pytest.approx(2 * G * np.cos(tilt), rel=1e-9)
+    assert sum(foot.force[-1, 1] for foot in feet) == pytest.approx(-2 * G * np.sin(tilt), rel=1e-9)
+    sliding = box(0.2, tilt).compile().simulate((0, 2), q=[0, 0.1, 0], rtol=1e-11)
+    assert sliding.q[-1, 0] == pytest.approx(2 * G * (np.sin(tilt) - 0.2 * np.cos(tilt)), rel=1e-11)
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_tumbling_box_comes_to_rest_and_its_energy_balances(law: str) -> None:
+    solution = box(0.3, 0.0, 0.5, law).compile().simulate((0, 3), q=[0, 0.6, 0.3], u=[0.5, 0, 1.0], rtol=1e-11, work=True)
+    assert solution.success
+    assert np.abs(solution.u[-1]).max() < 1e-9
+    assert solution.energy[-1] == pytest.approx(2 * G * 0.1, rel=1e-9)
+    balance = solution.energy_balance
+    assert {"impact of corner_1", "impact of corner_3"} <= set(balance)
+    assert np.abs(balance["error"]).max() < 1e-8
+    assert all((np.diff(rows) <= 1e-12).all() for name, rows in balance.items() if name.startswith("impact"))
+    assert min(contact.gap.min() for contact in solution.contacts.values()) > -1e-9
+
+
+@pytest.mark.parametrize("formulation", ["embedding", "recursive", "augmented", "absolute"])
+def test_all_formulations_make_the_same_motion(formulation: str) -> None:
+    system = sd.System("pendulum", gravity=[0, -G])
+    a, b = sd.coordinates("a b")
+    upper, lower = (system.add_body(name, mass=1.0, inertia=0.1, com=[0, -0.5]) for name in ("upper", "lower"))
+    system.add_joint(sd.Revolute("first", system.ground, upper, a))
+    system.add_joint(sd.Revolute("second", upper, lower, b, parent_point=[0, -1]))
+    wall = sd.contacts.Plane([1, 0], [-0.4, 0])
+    system.add_contact(sd.Contact("tip", lower, system.ground, shape=(sd.contacts.Point([0, -1]), wall), friction=0.3,
+                                  restitution=0.4))
+    absolute = formulation == "absolute"
+    equations = system.augmented(coordinates="absolute") if absolute else getattr(system, formulation)()
+    reference = system.embedding().compile().simulate((0, 1.2), q=[0.5, 0.2], rtol=1e-11)
+    start = {} if absolute else {"q": [0.5, 0.2]}
+    if absolute:
+        system.initial.update({a: 0.5, b: 0.2})
+        equations = system.augmented(coordinates="absolute")
+    solution = equations.compile().simulate((0, 1.2), rtol=1e-11, **start)
+    tip, expected = solution.contacts["tip"], reference.contacts["tip"]
+    assert [mode for _, mode in tip.switches] == [mode for _, mode in expected.switches]
+    assert len(expected.impacts.t) == 1
+    assert np.abs(tip.impacts.t - expected.impacts.t).max() < 1e-8
+    assert np.abs(tip.gap - expected.gap).max() < 1e-7
+
+
+def test_numpy_gives_the_same_motion_as_c() -> None:
+    system = ball(restitution=0.5)
+    runs = [system.compile(backend=backend).simulate((0, 0.9), q=[0.5], rtol=1e-12) for backend in ("c", "numpy")]
+    assert np.abs(runs[0].x - runs[1].x).max() < 1e-9
+    assert len(runs[0].contacts["floor"].impacts.t) == len(runs[1].contacts["floor"].impacts.t) == 4
+
+
+def test_states_at_other_times_steps_events_and_copies() -> None:
+    system = ball(restitution=0.5)
+    system.add_event("top", sd.velocity("ball")[1], -1)
+    module = pickle.loads(pickle.dumps(system.compile()))
+    solution = module.simulate((0, 0.9), q=[0.5], rtol=1e-12)
+    steps = module.simulate((0, 0.9), q=[0.5], rtol=1e-12, steps=True)
+    assert np.abs(steps(solution.t) - solution.x).max() < 1e-12
+    assert len(steps.contacts["floor"].mode) == len(steps.t)
+    speed = np.sqrt(G)  # flights begin with half the speed
+    assert solution.events["top"].t[1] == pytest.approx(np.sqrt(1 / G) + 0.5 * speed / G, abs=1e-12)
+    batch = module.simulate_batch(q=[[0.5], [0.2]], t=(0, 3))
+    assert np.abs(batch.x).max() < 1e-9
+
+
+def test_faults_of_contacts_are_reported_together() -> None:
+    system = ball(friction=-1, restitution=1.5)
+    shape = sd.contacts
+    for contact in (sd.Contact("self", "ball", "ball"), sd.Contact("ground", system.ground, "ball"),
+                    sd.Contact("lost", "ball", "bal"), sd.Contact("bad name", "ball", "ground"),
+                    sd.Contact("odd", "ball", "ground", shape=3, friction=(1, 2, 3), law="soft", impact="x"),  # type: ignore[arg-type]
+                    sd.Contact("disc", "ball", "ground", shape=shape.Disc(1)),
+                    sd.Contact("static", "ball", "ground", friction=(0.1, 0.2)),
+                    sd.Contact("small", "ball", "ground", shape=(shape.Sphere(-0.1), shape.Plane([0, 0]))),
+                    sd.Contact("flat", "ball", "ground", shape=(shape.Point(), shape.Plane([0, 0]))),
+                    sd.Contact("rolled", "ball", "ground", shape=(shape.Sphere(1), shape.Curve(0, sd.t))),
+                    sd.Contact("corners", "ball", "ground", shape=shape.Box([1, 2, 3])),
+                    sd.Contact("surface", "ball", "ground", shape=(shape.Point(), shape.Surface(0, sd.t, sd.t)))):
+        system.add_contact(contact)
+    system.add_contact("ball")  # type: ignore[arg-type]
+    with pytest.raises(ModelError) as caught:
+        system.check()
+    message = str(caught.value)
+    for part in ("'floor': static friction is -1", "'floor': restitution is 1.5, which would gain energy",
+                 "ball is in contact with itself", "body a is the ground", "'lost' is between 'bal'",
+                 "a contact is named 'bad name'", "shape is 3", "friction is (1, 2, 3)", "law is 'soft'", "impact is 'x'",
+                 "a Disc touches in space", "kinetic friction 0.2 is above",
+                 "radius of the shape on a is -0.1", "normal of the plane is zero", "a Curve is touched by points",
+                 "size is [1, 2, 3]; pass two lengths", "a Surface belongs to a spatial system", "add_contact was given 'ball'"):
+        assert part in message
+    crossed = sd.System("space")
+    body = crossed.add_body("body", mass=1.0, inertia=[1, 1, 1])
+    crossed.add_joint(sd.Free("free", crossed.ground, body))
+    pair = (shape.Disc(1, axis=[0, 0, 0]), shape.Sphere(1))
+    crossed.add_contact(sd.Contact("edge", body, crossed.ground, shape=pair))
+    crossed.add_contact(sd.Contact("axis", body, crossed.ground, shape=shape.Disc(1, axis=[0, 0, 0])))
+    with pytest.raises(ModelError, match="the axis is zero") as caught:
+        crossed.check()
+    assert "touches a Plane, found a Sphere" in str(caught.value)
+
+
+def test_loads_that_depend_on_reactions_do_not_go_with_rigid_contacts() -> None:
+    system = ball()
+    system.add_force("ball", [0, sd.acceleration("ball")[1] / 10])
+    with pytest.raises(ModelError, match="rigid contacts do not go with"):
+        system.check()
+
+
+def test_what_contacts_do_not_go_with_is_rejected() -> None:
+    module = ball(restitution=0.5).compile()
+    with pytest.raises(ArgumentError, match=r"floor by 0.2 m; start from q = \{y: 0\}, where they touch"):
+        module.simulate((0, 1), q=[-0.2])
+    with pytest.raises(ArgumentError, match="do not run backward in time"):
+        module.simulate((1, 0), q=[0.2])
+    with pytest.raises(ArgumentError, match="sensitivities do not go across"):
+        module.simulate((0, 1), q=[0.2], sensitivities=["y(0)"])
+    for call in (module.equilibrium, module.equilibria, lambda: module.periodic(1.0),
+                 lambda: module.gradient(sd.Loss(end=sd.coordinates("y")), ["y(0)"], (0.0, 1.0))):
+        with pytest.raises(ArgumentError, match="not known with the rigid contacts floor"):
+            call()
+    bound = ball().compile(specialize={"floor_closed": 0.0})
+    with pytest.raises(ArgumentError, match="floor_closed say in which mode contacts are"):
+        bound.simulate((0, 1), q=[0.2])
+    driven = ball()
+    driven.add_force("ball", [0, sd.inputs("F")])
+    with pytest.raises(ArgumentError, match="controllers whose values are held"):
+        driven.compile().simulate((0, 1), q=[0.2], inputs={"F": sd.Sampled(lambda t, x: 0.0, 0.1)})
+    absolute = ball().augmented(coordinates="absolute").compile()
+    with pytest.raises((ArgumentError, sd.MissingExtra), match="ggl"):
+        absolute.simulate((0, 1), method="ggl")
+
+
+def test_contact_that_closes_unseen_stops_the_run() -> None:
+    """Without a look at its events a contact would be passed."""
+    module = ball().compile()
+    from symdyn.runtime.integrating import contacts
+
+    seen = contacts._Phases._looked_for
+    try:
+        contacts._Phases._looked_for = lambda self: np.zeros_like(seen(self))  # type: ignore[method-assign]
+        with pytest.warns(SimulationWarning, match=r"stopped at t = 1: contact floor overlaps by 4.41 m, since the "
+                          "instant at which it closed was missed"):
+            module.simulate((0, 1), q=[0.5])
+    finally:
+        contacts._Phases._looked_for = seen  # type: ignore[method-assign]
