@@ -10,7 +10,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
-from symdyn.model.symbols import Timed, time
+from symdyn.model.symbols import Timed, parts_of, time
 
 if TYPE_CHECKING:
     from symdyn.given import BodyOrName, JointOrName, Vector
@@ -229,7 +229,7 @@ def reaction(joint: JointOrName, frame: BodyOrName | None = None) -> sp.Immutabl
 
 def quantities_in(expressions: Iterable[Any]) -> list[Quantity]:
     """The quantities in some expressions, each once, in the order of their names."""
-    found = {q for e in expressions if isinstance(e, sp.Basic) for q in e.atoms(Quantity)}
+    found = {part for part in parts_of(*[e for e in expressions if isinstance(e, sp.Basic)]) if isinstance(part, Quantity)}
     return sorted(found, key=lambda q: (q.name, str(q.measure)))
 
 

@@ -19,6 +19,8 @@ WALKS, STEPS, STRIDE = 6, 12, 0.25
 STARTS = 8
 # Sets of random numbers that are tried for parameters without numbers.
 TRIES = 4
+# A row whose part in the combinations of rows that vanish is above this follows from the others.
+REPLACED = 1e-6
 # Derivatives smaller than this part of those beside a state vanish there.
 VANISHING = 1e-5
 
@@ -85,7 +87,7 @@ def ranks(equations: Equations, seed: int = 1) -> Ranks | None:
     mass = _mass(equations, states, np.concatenate([places, consistent]))
     if mass is None:
         return None
-    return Ranks(rank, _independent(samples, rank), samples, mass, _vanishing(states, places, stream))
+    return Ranks(rank, _independent(samples, rank, states.holonomic), samples, mass, _vanishing(states, places, stream))
 
 
 def _mass(equations: Equations, states: ConstraintStates, places: np.ndarray) -> np.ndarray | None:
@@ -142,12 +144,14 @@ def _along(A: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return direction - held[..., 0]  # type: ignore[no-any-return]
 
 
-def _independent(samples: np.ndarray, rank: int) -> tuple[int, ...]:
+def _independent(samples: np.ndarray, rank: int, holonomic: np.ndarray) -> tuple[int, ...]:
     """Rows of full rank at the samples (s, n_c, n_u): one after the other the row goes that the others replace best where they
-    do it worst, by its part in the combinations of rows that vanish."""
+    do it worst, by its part in the combinations of rows that vanish. Velocity constraints that follow from others go before
+    constraints of positions, which no velocity constraint replaces."""
     kept = list(range(samples.shape[1]))
     while len(kept) > rank:
         left = np.linalg.svd(samples[:, kept])[0][:, :, rank:]
         part = np.linalg.norm(left, axis=2).min(axis=0)
-        kept.pop(int(part.argmax()))
+        of_speeds = np.where(holonomic[kept], 0.0, part)
+        kept.pop(int((of_speeds if of_speeds.max() > REPLACED else part).argmax()))
     return tuple(kept)
