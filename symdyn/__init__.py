@@ -37,6 +37,7 @@ _HOME = {
     "symdyn.flexible.shape": ("Shape",),
     "symdyn.frames": ("Frame", "rate"),
     "symdyn.urdf.read": ("read_urdf",),
+    "symdyn.sympy_mechanics.border": ("from_sympy",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
     "symdyn.estimation": ("Experiment", "Fit", "Identification", "MeasuredMotion", "fit", "identify"),

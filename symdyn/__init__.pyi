@@ -230,6 +230,7 @@ from symdyn.runtime.inputs.inputs import Smooth as Smooth
 from symdyn.runtime.inputs.sampled import Sampled as Sampled
 from symdyn.runtime.inputs.tables import Table as Table
 from symdyn.runtime.losses import Loss as Loss
+from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.urdf.read import read_urdf as read_urdf
 
 __version__: str

@@ -77,6 +77,10 @@ MEASUREMENTS: dict[str, Measurement] = {
             _names("--models", "names", "some of the mechanisms, such as spatial_chain or 'spatial_chain(7)'"), _BEST, _JSON,
             Option("of_derivatives", "--derivatives", {"action": "store_true", "help": "derivatives of the accelerations by q "
                    "and u, in place of the accelerations"}))),
+    "sympy": Measurement(
+        "symdyn.lab.sympy_models.measure:run",
+        "examples of SymPy's and PyDy's taken over: agreement, operations, times compared with lambdify",
+        (_names("--only", "only", "some of the examples, such as bicycle or pendulum_on_cart"),)),
     "robots": Measurement(
         "symdyn.lab.robots.command:run", "robots from URDF files compared with Pinocchio: agreement, operations, times", (
             _names("--only", "only", "some of the robots; names with * and ?", "ROBOT"),
@@ -109,7 +113,8 @@ MEASUREMENTS: dict[str, Measurement] = {
             _number("--count", "count", "motions (default: 1000000)"),
             _number("--seed", "seed", "of the moment of the kill (default: another one every time)"))),
     "sensitivities": Measurement(
-        "symdyn.lab.sensitivities:run", "derivatives of motions: errors, and times compared with CasADi's CVODES and diffrax", (_ONLY,)),
+        "symdyn.lab.sensitivities:run", "derivatives of motions: errors, times compared with CasADi's CVODES and diffrax",
+        (_ONLY,)),
     "optimize": Measurement(
         "symdyn.lab.optimize:run", "optimal motions: cost, iterations, time, compared with the same problems in plain CasADi", (_ONLY,)),
     "turbine": Measurement(

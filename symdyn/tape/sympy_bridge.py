@@ -28,6 +28,8 @@ _REWRITTEN: dict[type, Callable[..., sp.Expr]] = {
     sp.Mod: lambda a, b: a - b * sp.floor(a / b), sp.sinc: lambda x: sp.Piecewise((sp.sin(x) / x, sp.Ne(x, 0)), (1, True)),
     sp.frac: lambda x: x - sp.floor(x), sp.erfc: lambda x: 1 - sp.erf(x),
 }
+# Where SymPy has curves of muscles and tendons, which are written out in the order of operations that keeps their digits.
+_CURVES = "sympy.physics.biomechanics.curve"
 _RECIPROCAL = {sp.sec: "cos", sp.csc: "sin", sp.cot: "tan", sp.sech: "cosh", sp.csch: "sinh", sp.coth: "tanh"}
 
 
@@ -109,6 +111,8 @@ def record_expression(recorder: Recorder, expression: Any, leaves: Mapping[sp.Ba
             half = take(e.args[1]) if len(e.args) > 1 else Fraction(1, 2)
             return recorder.apply("select", recorder.apply("gt", x, 0), 1,
                                   recorder.apply("select", recorder.apply("eq", x, 0), half, 0))
+        if type(e).__module__ == _CURVES:
+            return take(e.doit(deep=False, evaluate=False))
         rewritten = _REWRITTEN.get(type(e))
         if rewritten is not None:
             return take(rewritten(*e.args))

@@ -211,10 +211,10 @@ def _derive(description: _Description) -> AugmentedEquations:
     faults = contradictions(result(_Coordinates(recorded, kernel=True), None))
     if faults:
         raise ModelError(faults, description.name)
-    return choose(lambda *way: _Coordinates(recorded, *way), result, _search)
+    return choose(lambda *way: _Coordinates(recorded, *way), result, search_near)
 
 
-def _search(equations: Equations) -> Ranks | None:
+def search_near(equations: Equations) -> Ranks | None:
     """Rank and independent rows at consistent states near the initial one or, failing that, near others.
 
     Parameters without defaults take random numbers, which makes no rows dependent that are not with all numbers.

@@ -187,6 +187,7 @@ def recording(symbols: Symbols) -> TapeAlgebra:
     recorder = Recorder()
     leaves: dict[sp.Basic, Any] = {time: recorder.leaf("t", kinds.TIME)}
     for group, kind in ((symbols.coordinates, kinds.COORDINATE), (symbols.speeds, kinds.SPEED),
-                        (symbols.inputs, kinds.INPUT), (symbols.parameters, kinds.PARAMETER)):
+                        (symbols.states, kinds.STATE), (symbols.inputs, kinds.INPUT),
+                        (symbols.parameters, kinds.PARAMETER)):
         leaves.update({s: recorder.leaf(s.name, kind) for s in group})
     return TapeAlgebra(recorder, leaves)
