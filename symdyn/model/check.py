@@ -14,6 +14,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.model.bodies import Body
+from symdyn.model.closures import Constraint
 from symdyn.model.contacts.lowering import with_contacts
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import check_events
@@ -26,9 +27,9 @@ from symdyn.model.physics import inertia_faults, plane_faults
 from symdyn.model.points import Point
 from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import Model
-from symdyn.model.symbol_check import check_coordinates, check_symbols, spelling, symbols_in
+from symdyn.model.symbol_check import check_coordinates, check_symbols, chosen_speeds, spelling, symbols_in
 from symdyn.model.symbols import GivenAcceleration, GivenRate, finite, take_over, time
-from symdyn.model.uses import units_of, uses
+from symdyn.model.uses import unit_of, units_of, uses
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
@@ -69,11 +70,18 @@ class _Checker:
         if s.planar:
             self.faults += plane_faults([*self.joints, *(j for j in s.loops if isinstance(j, Joint))], s.ground_motion)
         self.coordinates, self.speeds = check_coordinates(s, self.joints, self.faults)
-        self.parameters, self.inputs = check_symbols(s, self.joints, self.loads, self.coordinates, self.speeds, self.faults)
+        self.own_speeds = self.speeds
+        self.eliminated: tuple[Constraint, ...] = ()
+        constraints = tuple(s.constraints)
+        if s.chosen_speeds:
+            self.speeds, self.eliminated = chosen_speeds(s, self.coordinates, self.own_speeds, self.faults)
+            constraints = tuple(c for c in constraints if c not in self.eliminated)
+        self.parameters, self.inputs = check_symbols(s, self.joints, self.loads, self.coordinates, self.own_speeds, self.faults)
         elsewhere = [symbol for _, expressions, _ in uses(s, self.joints, self.loads) for symbol in symbols_in(expressions)]
         self.faults += idle_coordinate_faults(s.loops, [*self.coordinates, *[z.symbol for z in s.states], *elsewhere])
         state = [*self.coordinates, *self.speeds, *[z.symbol for z in s.states]]
-        self.events = check_events(s.events, state, [*state, *[q.dot for q in self.coordinates], *self.inputs, time], self.faults)
+        rates = [*self.own_speeds, *[q.dot for q in self.coordinates]]
+        self.events = check_events(s.events, state, [*state, *rates, *self.inputs, time], self.faults)
         self._loads()
         self._shapes()
         defaults = self._numbers(s.defaults, "defaults", self.parameters, "parameter")
@@ -91,12 +99,16 @@ class _Checker:
             if doubt not in s._warned:  # every formulation checks the system again
                 s._warned.add(doubt)
                 warnings.warn(doubt, ModelWarning, stacklevel=4)
+        units = {**units_of(s, self.joints, self.loads), **self.units}
+        of_lengths = {"rad": "rad/s", "m": "m/s"}
+        units = {**{u: of_lengths.get(unit_of(e, units), "") for u, e in s.chosen_speeds.items()}, **units}
         return Model(
             s.name, s.planar, s.gravity, tuple(s.bodies), tuple(j for j, _, _ in order), tuple(p for _, p, _ in order),
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
-            tuple(s.constraints), tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
-            defaults, {**self._upright(), **initial}, float(s.duration), {**units_of(s, self.joints, self.loads), **self.units},
-            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts))
+            constraints, tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
+            defaults, {**self._upright(), **initial}, float(s.duration), units,
+            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.chosen_speeds.items()),
+            self.own_speeds if s.chosen_speeds else (), self.eliminated)
 
     # -- names
 

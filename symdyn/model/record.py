@@ -47,6 +47,8 @@ class Model:
     shapes        what bodies look like
     doubts        sentences on what is possible, but hardly meant
     contacts      rigid ones, place by place; their forces are among the loads, their events among the events
+    chosen        generalized speeds of the user's choice: symbol, expression in the speeds that the joints would have,
+                  own_speeds; eliminated: velocity constraints that the chosen speeds fulfil, which are not among `constraints`
     """
 
     name: str
@@ -74,6 +76,9 @@ class Model:
     events: tuple[Event, ...] = ()
     doubts: tuple[str, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
+    chosen: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
+    own_speeds: tuple[sp.Symbol, ...] = ()
+    eliminated: tuple[Constraint, ...] = ()
 
     def __str__(self) -> str:
         rows = [f"{self.name}: {'planar' if self.planar else 'spatial'} mechanism, no faults found",

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.counting import counted
+from symdyn.model.closures import Constraint
 from symdyn.model.faults import NAME, Faults
 from symdyn.model.joints import Joint
 from symdyn.model.loop_check import constraint_faults
-from symdyn.model.quantity import Quantity
+from symdyn.model.quantity import Quantity, of_speeds
 from symdyn.model.record import joint_speeds
 from symdyn.model.symbols import Acceleration, Coordinate, GivenMotion, Input, Rate, described, symbols_of, time, with_rates
 from symdyn.model.uses import Scope, uses
@@ -70,10 +72,30 @@ def check_coordinates(s: System, joints: Sequence[Joint], faults: Faults) -> tup
     return distinct
 
 
+def chosen_speeds(s: System, coordinates: Symbols, own: Symbols, faults: Faults) -> tuple[Symbols, tuple[Constraint, ...]]:
+    """The speeds that are chosen in place of the joints' own, and the velocity constraints that they fulfil."""
+    chosen = tuple(s.chosen_speeds)
+    taken = {*coordinates, *[z.symbol for z in s.states]}
+    faults += [f"set_speeds was given {u}, which is {'a coordinate' if u in coordinates else 'a state'} already; make another "
+               f"symbol with sd.speeds" for u in chosen if u in taken]
+    faults += [f"set_speeds was given {u}, which is the speed of a joint already; make another symbol with sd.speeds"
+               for u in chosen if u in own]
+    moving = {*own, *[q.dot for q in coordinates]}
+    of_motion = tuple(c for c in s.constraints if any(a in moving or of_speeds(a) for a in symbols_of(c.expression)))
+    if len(chosen) == len(own):
+        return chosen, ()
+    if len(chosen) + len(of_motion) != len(own):
+        faults.append(f"set_speeds was given {counted(len(chosen), 'speed')}, the joints have {len(own)}; pass as many"
+                      + (f", or {len(own) - len(of_motion)}, which fulfil the velocity constraints "
+                         f"{', '.join(c.name for c in of_motion)}" if of_motion else ""))
+        return chosen, ()
+    return chosen, of_motion
+
+
 def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coordinates: Symbols, speeds: Symbols,
                   faults: Faults) -> tuple[Symbols, Symbols]:
     """Parameters and inputs in order of their use; symbols that stand where they must not are added to the faults."""
-    moving = {time, *coordinates, *[q.dot for q in coordinates], *speeds, *[z.symbol for z in s.states]}
+    moving = {time, *coordinates, *[q.dot for q in coordinates], *speeds, *s.chosen_speeds, *[z.symbol for z in s.states]}
     named = {symbol.name: symbol for symbol in [*moving, *(s.declared or ())]}
     parameters: dict[sp.Symbol, None] = dict.fromkeys(s.declared or ())
     inputs: dict[sp.Symbol, None] = {}
@@ -123,7 +145,7 @@ def check_symbols(s: System, joints: Sequence[Joint], loads: Sequence[Any], coor
         if free:
             faults.append(f"move_ground uses {', '.join(map(str, free))}; pass given functions of t, motions and parameters")
     given = with_rates(inputs)
-    everything = dict.fromkeys([*coordinates, *speeds, *[z.symbol for z in s.states], *parameters, *given])
+    everything = dict.fromkeys([*coordinates, *speeds, *s.chosen_speeds, *[z.symbol for z in s.states], *parameters, *given])
     names = Counter(a.name for a in everything)
     for name, count in names.items():
         if count > 1:

@@ -102,6 +102,7 @@ class System:
         self.ground_motion: Joint | None = None
         self.shapes: list[Drawn] = []
         self.extra_coordinates: list[sp.Symbol] = []
+        self.chosen_speeds: dict[sp.Symbol, sp.Expr] = {}
         self.defaults: dict[Any, float] = {}
         self.initial: dict[Any, float] = {}
         self.duration = 10.0
@@ -223,6 +224,38 @@ class System:
                 self._faults.append(f"add_coordinate was given {shown(given)}; make coordinates with sd.coordinates and pass "
                                     "them "
                                     "one by one")
+
+    def set_speeds(self, speeds: Mapping[sp.Symbol, Scalar]) -> System:
+        """Choose the generalized speeds: u -> an expression that is linear in the derivatives of the coordinates.
+
+        speeds   symbols made by sd.speeds("u1 u2"), with expressions A(q, t) q_dot + a(q, t) of the coordinates, their
+                 derivatives, the speeds that the joints would have, and of sd.angular_velocity(body)[i] and sd.velocity(body,
+                 point)[i], such as {u1: q1.dot + l * q2.dot, u2: q2.dot}
+
+        As many as the joints have speeds, so that they can be solved for these; loops and constraints keep their multipliers. Or
+        fewer, by as many as there are velocity constraints (add_constraint with speeds): these are then fulfilled by the choice,
+        and the equations have no multipliers (Kane's independent speeds). Equations are printed and run in the chosen speeds;
+        loads, outputs, events and constraints may use these and the derivatives of the coordinates. Called again, it replaces
+        the choice; an empty mapping takes it back. Returns the system; what is wrong is reported by `check()`.
+
+        >>> system = sd.systems.double_pendulum()
+        >>> q1, q2 = system.check().coordinates
+        >>> u1, u2 = sd.speeds("u1 u2")
+        >>> system.set_speeds({u1: q1.dot, u2: q1.dot + q2.dot}).embedding().M_tilde.shape
+        (2, 2)
+        """
+        if not isinstance(speeds, Mapping):
+            self._faults.append(f"set_speeds was given {shown(speeds)}; pass a mapping from symbols to expressions, such as "
+                                "{u1: q1.dot + q2.dot}")
+            return self
+        self.chosen_speeds = {}
+        for given, expression in speeds.items():
+            symbol = as_coordinate(given)
+            if isinstance(symbol, Coordinate):
+                self.chosen_speeds[symbol] = self._faults.expression(expression, f"the speed {symbol}")
+            else:
+                self._faults.append(f"set_speeds was given {shown(given)} as a speed; pass a symbol such as sd.speeds('u1')")
+        return self
 
     def move_ground(self, position: Vector = ZERO, angles: Sequence[Scalar] = ZERO, sequence: str = "ZYX") -> None:
         """Give the ground a prescribed motion: position (m) and Euler angles (rad), of t, motions (sd.motions) and parameters.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
 from symdyn.model.closures import Gear, Rod
@@ -14,9 +15,9 @@ from symdyn.model.elements import AddedMass, Element
 from symdyn.model.joints import Helical, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque, expressions_of
 from symdyn.model.points import Point
-from symdyn.model.quantity import quantities_in
+from symdyn.model.quantity import Quantity, quantities_in
 from symdyn.model.record import joint_speeds
-from symdyn.model.symbols import Coordinate, GivenMotion, time
+from symdyn.model.symbols import Coordinate, GivenMotion, symbols_of, time
 from symdyn.shown import shown
 from symdyn.turning import force_unit
 
@@ -81,6 +82,8 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
         yield f"event {shown(event.name)}", event.expressions, Scope.FORCES
     for state in s.states:
         yield f"rate of state {state.symbol}", [state.rate], Scope.FORCES
+    for u, expression in s.chosen_speeds.items():
+        yield f"the speed {u}", [expression], Scope.MOTION
     for constraint in s.constraints:
         yield constraint.name, [constraint.expression], Scope.MOTION
 
@@ -145,3 +148,23 @@ def units_of(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> d
             for point in quantity.measure.points:
                 note(point, "m")
     return units
+
+
+def unit_of(expression: sp.Expr, units: Mapping[sp.Symbol, str]) -> str:
+    """The unit of an expression of lengths, or of their rates: "m", "rad" (no length in it), "m^2", ...; "" if its terms differ.
+
+    Found by its values with all lengths doubled and trebled.
+    """
+    symbols = sorted(symbols_of(expression), key=str)
+    lengths = [s for s in symbols if (s.unit if isinstance(s, Quantity) else units.get(s)) in ("m", "m/s")]
+    stream = np.random.default_rng(5)
+    values = {s: sp.Float(v, 30) for s, v in zip(symbols, stream.uniform(0.3, 1.3, len(symbols)), strict=True)}
+    try:
+        first, *others = [complex(expression.xreplace({**values, **{s: k * values[s] for s in lengths}}).evalf(25))
+                          for k in (1, 2, 3)]
+    except (TypeError, ValueError):
+        return ""
+    for power in range(4):
+        if all(abs(v - first * k**power) <= 1e-12 * abs(v) for k, v in zip((2, 3), others, strict=True)):
+            return ("rad", "m")[power] if power < 2 else f"m^{power}"
+    return ""

@@ -15,6 +15,7 @@ from typing import Any
 
 import sympy as sp
 
+from symdyn.errors import ModelError
 from symdyn.formulation.loads.site import has_roll_pitch_yaw, joint_with_ground
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Gear
@@ -30,7 +31,13 @@ from symdyn.model.symbols import Coordinate, Speed, symbols_of
 
 def in_absolute_coordinates(model: Model, orientation: EulerAngles | EulerParameters | None = None) -> Model:
     """The model with coordinates of its own for every body: planar x, y, theta; spatial x, y, z of its origin and its
-    orientation in the ground's frame. Start values are those of the relative coordinates (see absolute_start)."""
+    orientation in the ground's frame. Start values are those of the relative coordinates (see absolute_start).
+
+    Raises ModelError for chosen speeds."""
+    if model.chosen:
+        chosen = ", ".join(str(u) for u, _ in model.chosen)
+        raise ModelError([f"chosen speeds are those of relative coordinates, and {chosen} were given to set_speeds; take "
+                          "system.augmented(), or take the choice back with set_speeds({})"], model.name)
     orientation = orientation or EulerParameters()
     taken = {s.name for s in (*model.coordinates, *model.speeds, *model.parameters, *model.inputs)}
     names = {j.name for j in (*model.joints, *model.loops)}

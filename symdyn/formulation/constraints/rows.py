@@ -7,7 +7,7 @@ Source: lecture, chapters 3.4 and 6.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,8 +22,9 @@ from symdyn.formulation.trees.tree import GROUND, Pose, Tree
 from symdyn.model.closures import Constraint, Gear, Rod
 from symdyn.model.joints import Joint
 from symdyn.model.orientation import EulerParameters
-from symdyn.model.quantity import Quantity, of_speeds
+from symdyn.model.quantity import of_speeds
 from symdyn.model.symbols import Coordinate, symbols_of
+from symdyn.model.uses import unit_of
 from symdyn.spatial.vectors import dot, inner, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.floats import evaluate_rows
@@ -160,7 +161,8 @@ class Gathered:
         self._expression(Constraint(gear.name, expression))
 
     def _expression(self, constraint: Constraint) -> None:
-        row = expression_row(self.algebra, constraint, self.model.coordinates, self.tree.rates, self.model.speeds)
+        model = self.model
+        row = expression_row(self.algebra, constraint, model.coordinates, self.tree.rates, model.speeds, model.own_speeds)
         self._add(replace(row, unit=unit_of(constraint.expression, self.model.units)))
 
     def _add(self, row: Row, closes: bool = False) -> bool:
@@ -210,33 +212,14 @@ class Gathered:
         return evaluate_rows(tape, numbers, STATES)["values"]
 
 
-def unit_of(expression: sp.Expr, units: Mapping[sp.Symbol, str]) -> str:
-    """The unit of an expression of lengths, or of their rates: "m", "rad" (no length in it), "m^2", ...; "" if its terms differ.
-
-    Found by its values with all lengths doubled and trebled.
-    """
-    symbols = sorted(symbols_of(expression), key=str)
-    lengths = [s for s in symbols if (s.unit if isinstance(s, Quantity) else units.get(s)) in ("m", "m/s")]
-    stream = np.random.default_rng(5)
-    values = {s: sp.Float(v, 30) for s, v in zip(symbols, stream.uniform(0.3, 1.3, len(symbols)), strict=True)}
-    try:
-        first, *others = [complex(expression.xreplace({**values, **{s: k * values[s] for s in lengths}}).evalf(25))
-                          for k in (1, 2, 3)]
-    except (TypeError, ValueError):
-        return ""
-    for power in range(4):
-        if all(abs(v - first * k**power) <= 1e-12 * abs(v) for k, v in zip((2, 3), others, strict=True)):
-            return ("rad", "m")[power] if power < 2 else f"m^{power}"
-    return ""
-
-
 def expression_row(algebra: Any, constraint: Constraint, coordinates: Sequence[sp.Symbol], rates: Sequence[Any],
-                   speeds: Sequence[sp.Symbol]) -> Row:
-    """The row of an expression in coordinates and t, or with speeds, linear in them."""
+                   speeds: Sequence[sp.Symbol], own: Sequence[sp.Symbol] = ()) -> Row:
+    """The row of an expression in coordinates and t, or with speeds, linear in them; own: those of joints, where others are "
+    "chosen."""
     by_time = algebra.by_time(coordinates, rates)
     recorder = algebra.recorder
     value = algebra.expression(constraint.expression)
-    moving = {*speeds, *[q.dot for q in coordinates if isinstance(q, Coordinate)]}
+    moving = {*speeds, *own, *[q.dot for q in coordinates if isinstance(q, Coordinate)]}
     symbols = symbols_of(constraint.expression)
     holonomic = not symbols & moving and not any(map(of_speeds, symbols))
     rate = forward(recorder, [value], by_time)[0] if holonomic else value

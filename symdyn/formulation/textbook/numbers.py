@@ -13,13 +13,14 @@ import numpy as np
 import sympy as sp
 
 from symdyn.errors import ArgumentError, EvaluationError, ModelError
-from symdyn.formulation.algebra import TapeAlgebra, leaves_of
+from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.loads.measured import Measured
 from symdyn.formulation.loads.recorded import Applied, Loads
 from symdyn.formulation.textbook.doubles import Doubles
 from symdyn.formulation.textbook.rates import Rates, apparent_rates
 from symdyn.formulation.textbook.scalars import on_scalars
 from symdyn.formulation.textbook.values import taken
+from symdyn.formulation.trees.chosen_speeds import algebra_of
 from symdyn.formulation.trees.tree import Tree, build
 from symdyn.model.record import Model
 from symdyn.model.symbols import time
@@ -27,7 +28,6 @@ from symdyn.shown import name_of
 from symdyn.spatial.vectors import vector
 from symdyn.tape.evaluate import evaluate
 from symdyn.tape.node import Node
-from symdyn.tape.recorder import Recorder
 from symdyn.tape.tape import Tape, reachable
 
 
@@ -51,8 +51,8 @@ class NumericTree:
 
     def __init__(self, model: Model, aligned: bool = False) -> None:
         self.model = model
-        recorder = Recorder()
-        self.algebra = TapeAlgebra(recorder, leaves_of(model, recorder))
+        self.algebra = algebra_of(model)
+        recorder = self.algebra.recorder
         self.tree = build(model, self.algebra, aligned)
         self.algebra.measured = Measured(self.tree)
         loads = Loads(self.tree)

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 import sympy as sp
 
 from symdyn.errors import ModelError, SymdynError
-from symdyn.formulation.algebra import TapeAlgebra, leaves_of
 from symdyn.formulation.equations import Symbols
 from symdyn.formulation.loads.implicit import implicit
 from symdyn.formulation.loads.measured import Measured
 from symdyn.formulation.printed.independent_speeds import MotionEquations
 from symdyn.formulation.printed.provenance import OfBodies
+from symdyn.formulation.trees.chosen_speeds import algebra_of
 from symdyn.formulation.trees.quantities import TreeQuantities
 from symdyn.formulation.trees.tree import Tree, build
 from symdyn.model.joints import Fixed, Joint, Modal
@@ -24,7 +24,6 @@ from symdyn.model.points import Point
 from symdyn.model.quantity import quantities_in
 from symdyn.model.record import Model
 from symdyn.shown import name_of, shown
-from symdyn.tape.recorder import Recorder
 
 FRAMES = ("body", "parallel")
 E = TypeVar("E", bound=MotionEquations)
@@ -50,8 +49,7 @@ def tree_of(model: Model, frames: str) -> Tree:
     """The tree of a model on a tape of its own. Raises SymdynError for unknown frames."""
     if not isinstance(frames, str) or frames not in FRAMES:
         raise SymdynError(f"frames {shown(frames)} asked for; there are {' and '.join(map(repr, FRAMES))}")
-    recorder = Recorder()
-    tree = build(model, TapeAlgebra(recorder, leaves_of(model, recorder)), frames == "parallel")
+    tree = build(model, algebra_of(model), frames == "parallel")
     tree.algebra.measured = Measured(tree)
     return tree
 

@@ -117,6 +117,9 @@ class TreeQuantities(Motion):
             own["event_resets"] = self.event_resets
         if self.loads.implicit and not self.rows:  # with constraints, given accelerations leave open what these give
             own["inverse_dynamics"] = self.inverse_dynamics_at_accelerations
+        if self.model.chosen and (self.model.eliminated or self.model.constraints):
+            self.notes.append("no reactions, cut_loads: forces of constraints by expression are not known along chosen speeds")
+            own = {name: record for name, record in own.items() if name not in ("reactions", "cut_loads")}
         return {**super().quantities(), **own, **(self.identification.quantities() if self.tree.rigid else {})}
 
     # -- the equations, joint by joint

@@ -31,6 +31,7 @@ from symdyn.spatial.inertia import ArticulatedInertia, Inertia
 from symdyn.spatial.vectors import identity, vector, zeros
 from symdyn.tape.differentiate import forward
 from symdyn.tape.node import Node, is_zero
+from symdyn.tape.passes import substitute
 
 GROUND = -1
 
@@ -245,6 +246,13 @@ class _Builder:
                 w.append(a.leaves[symbol])
                 self.w_t.append(0)
                 self.b.append(0)
+            elif symbol is not None and symbol in self.model.own_speeds:
+                speed = a.leaves[symbol]
+                leaves = [a.leaves[u] for u in self.model.speeds]
+                row = [forward(a.recorder, [speed], {u: 1})[0] for u in leaves]
+                w.append(speed)
+                self.w_t.append(substitute((speed,), dict.fromkeys(leaves, 0), a.recorder)[0])
+                self.b.append(forward(a.recorder, [speed], a.by_time(self.model.coordinates, self.rates))[0])
             else:
                 by_time = a.by_time(self.model.coordinates, self.rates)
                 speed = forward(a.recorder, [s[k]], by_time)[0]
