@@ -116,7 +116,8 @@ MEASUREMENTS: dict[str, Measurement] = {
         "symdyn.lab.sensitivities:run", "derivatives of motions: errors, times compared with CasADi's CVODES and diffrax",
         (_ONLY,)),
     "optimize": Measurement(
-        "symdyn.lab.optimize:run", "optimal motions: cost, iterations, time, compared with the same problems in plain CasADi", (_ONLY,)),
+        "symdyn.lab.optimize:run", "optimal motions: cost, iterations, time, compared with the same problems in plain CasADi",
+        (_ONLY,)),
     "turbine": Measurement(
         "symdyn.lab.turbine:run", "the floating wind turbine: agreement, energy, equilibria, periods, run time", (_ONLY,)),
     "flexible": Measurement(

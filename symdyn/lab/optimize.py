@@ -43,7 +43,7 @@ def cart_pole() -> Iterator[Figure]:
     start, end = np.array([0, -np.pi, 0, 0]), np.array([1.0, 0, 0, 0])
     peer = _Collocation(4, 1, K, lambda ca, x, u: (_statements(ca, equations, x, u, p), u[0] ** 2), (2.0, 2.0))
     peer.states, peer.inputs = ([-2, -np.inf, -np.inf, -np.inf], [2, np.inf, np.inf, np.inf]), ([-20], [20])
-    peer.start, peer.end = (start, start), (end, end)
+    peer.start, peer.end = (start.tolist(), start.tolist()), (end.tolist(), end.tolist())
     peer.guess = lambda share: (1 - share) * start + share * end
     yield from _compared("cart-pole", lambda: solve(intervals=K, tolerance=None), peer, SAME)
     found = solve(tolerance=1e-7)

@@ -189,7 +189,7 @@ class _ByDiffrax:
         def field(t: Any, x: Any, p: Any) -> Any:
             entries = [*[x[k] for k in range(n)], *[p[k] for k in range(len(values))]]
             leaves = dict(zip([*names, *parameters], entries, strict=True))
-            return jnp.append(_field(words, equations, leaves), x[costs[0]] ** 2 + x[costs[1]] ** 2)
+            return jnp.append(casadi_field(words, equations, leaves), x[costs[0]] ** 2 + x[costs[1]] ** 2)
 
         def loss(given: Any) -> Any:
             p = jnp.asarray(values).at[places].set(given)
