@@ -40,11 +40,11 @@ def cart_pole() -> Iterator[Figure]:
     force = sp.Symbol("F")
     solve = lambda **more: sd.optimize(module, sd.Loss(integral=force**2), 2.0, **SWING, **more)
     p = dict(zip(module.metadata.parameters, module.parameters(SWING["params"]).tolist(), strict=True))
-    start, end = np.array([0, -np.pi, 0, 0]), np.array([1.0, 0, 0, 0])
+    start, end = [0.0, -np.pi, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
     peer = _Collocation(4, 1, K, lambda ca, x, u: (_statements(ca, equations, x, u, p), u[0] ** 2), (2.0, 2.0))
     peer.states, peer.inputs = ([-2, -np.inf, -np.inf, -np.inf], [2, np.inf, np.inf, np.inf]), ([-20], [20])
-    peer.start, peer.end = (start.tolist(), start.tolist()), (end.tolist(), end.tolist())
-    peer.guess = lambda share: (1 - share) * start + share * end
+    peer.start, peer.end = (start, start), (end, end)
+    peer.guess = lambda share: (1 - share) * np.array(start) + share * np.array(end)
     yield from _compared("cart-pole", lambda: solve(intervals=K, tolerance=None), peer, SAME)
     found = solve(tolerance=1e-7)
     yield "cart-pole: cost of a refined mesh less the published one", abs(found.cost - CONVERGED), "", "<= 5e-06"

@@ -11,7 +11,7 @@ from scipy.interpolate import PPoly
 from symdyn.errors import ArgumentError
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Dynamics, Field, Rows
-from symdyn.optimal.loops import Loops, independent_rows, normals
+from symdyn.optimal.loops import Loops, UnitLengths, independent_rows, normals, unit_groups
 from symdyn.optimal.problem import Problem
 from symdyn.optimal.program import Block, Label, Program
 from symdyn.optimal.steps import Steps
@@ -63,11 +63,9 @@ class Discretized:
         problem, mesh = self.problem, self.mesh
         self.dynamics = Dynamics(problem.module, problem.of, self.guess.p)
         self.held = mesh.kind == "shooting" and mesh.at_inputs.shape[1] == 1
-        self.rows_of_loops, self.normals = np.zeros(0, dtype=int), np.zeros((mesh.n_intervals, problem.of.n_x, 0))
-        if problem.module.metadata.constraints:
-            X, t = self.guess.X[mesh.ends], problem.t0 + mesh.breaks * self.guess.T
-            self.rows_of_loops = independent_rows(problem.module, float(t[0]), X[0], self.guess.p)
-            self.normals = normals(problem.module, t[1:], X[1:], self.guess.p, self.rows_of_loops)
+        X, t = self.guess.X[mesh.ends], problem.t0 + mesh.breaks * self.guess.T
+        self.rows_of_loops = independent_rows(problem.module, float(t[0]), X[0], self.guess.p)
+        self.normals = normals(problem.module, t[1:], X[1:], self.guess.p, self.rows_of_loops)
         self.layout = self._laid_out()
         self.z = self.variables(self.guess)
         self.program = self._program()
@@ -76,12 +74,13 @@ class Discretized:
 
     def _laid_out(self) -> Layout:
         of, mesh = self.problem.of, self.mesh
-        sizes = [len(mesh.nodes) * of.n_x, len(mesh.samples) * of.n_in, mesh.n_intervals * len(self.rows_of_loops), len(of.free)]
+        n_corrections = self.normals.shape[0] * self.normals.shape[2]
+        sizes = [len(mesh.nodes) * of.n_x, len(mesh.samples) * of.n_in, n_corrections, len(of.free)]
         first = np.concatenate([[0], np.cumsum(sizes)])
         free = self.problem.duration[0] < self.problem.duration[1]
         part = lambda k, *shape: np.arange(int(first[k]), int(first[k + 1])).reshape(shape)
         return Layout(part(0, -1, of.n_x), part(1, -1, of.n_in) if of.n_in else np.zeros((len(mesh.samples), 0), dtype=int),
-                      part(2, mesh.n_intervals, len(self.rows_of_loops)), part(3, -1), int(first[4]) if free else -1,
+                      part(2, mesh.n_intervals, self.normals.shape[2]), part(3, -1), int(first[4]) if free else -1,
                       int(first[4]) + free)
 
     def variables(self, motion: Motion) -> np.ndarray:
@@ -116,7 +115,7 @@ class Discretized:
     def _program(self) -> Program:
         least, most = self._bounds()
         self.z = np.clip(self.z, least, most)
-        parts = [self._defects(), *self._path(), *self._boundary(), *self._rates(), *self._loops()]
+        parts = [self._defects(), *self._path(), *self._boundary(), *self._rates(), *self._loops(), *self._units()]
         if self.elastic:
             parts.append(self._end())
         program = self._assembled(parts, least, most)
@@ -210,7 +209,7 @@ class Discretized:
                       np.kron(mesh.b, np.eye(n_x + 1)[n_x]))
         L = sp.lil_matrix((R * n_x, self.layout.n))
         L[:, :self.layout.X.size] = sp.kron(mesh.E, sp.identity(n_x))
-        for row in np.flatnonzero(mesh.corrected >= 0) if len(self.rows_of_loops) else ():
+        for row in np.flatnonzero(mesh.corrected >= 0) if self.normals.shape[2] else ():
             k = mesh.corrected[row]
             L[row * n_x:(row + 1) * n_x, self.layout.corrections[k]] = -self.normals[k]
         names = self.problem.module.metadata.x
@@ -305,6 +304,16 @@ class Discretized:
         block = Block(loops, columns, np.zeros(columns.shape), np.ones(columns.shape), sp.identity(m, format="csr"), np.zeros(m))
         texts = tuple(names[k] if k < len(names) else f"the rate of {names[k - len(names)]}" for k in rows)
         return [_Part(m, None, block, np.zeros(m), np.zeros(m), [Label("the constraint ", 0, mesh.breaks, texts)])]
+
+    def _units(self) -> list[_Part]:
+        groups, mesh, at = unit_groups(self.problem.module), self.mesh, self.layout
+        if not groups:
+            return []
+        columns, m = at.X[mesh.ends], len(mesh.ends) * len(groups)
+        block = Block(UnitLengths(self.problem.of.n_x, groups), columns, np.zeros(columns.shape), np.ones(columns.shape),
+                      sp.identity(m, format="csr"), np.zeros(m))
+        texts = tuple(", ".join(names) for names in self.problem.module.metadata.unit_groups)
+        return [_Part(m, None, block, np.zeros(m), np.zeros(m), [Label("the unit length of ", 0, mesh.breaks, texts)])]
 
     # -- the motion
 

@@ -69,9 +69,42 @@ class Loops:
             return np.full((len(at), *shape), np.nan)
 
 
+class UnitLengths:
+    """Squares of what has unit length together, such as Euler parameters, less 1, as Rows of x.
+
+    groups   indices in x
+    """
+
+    def __init__(self, n_x: int, groups: Sequence[Sequence[int]]) -> None:
+        self.groups = [list(group) for group in groups]
+        self.slopes, self.curvature = np.zeros((len(groups), n_x), dtype=bool), np.zeros((n_x, n_x), dtype=bool)
+        for k, group in enumerate(self.groups):
+            self.slopes[k, group] = True
+            self.curvature[group, group] = True
+
+    def values(self, at: np.ndarray) -> np.ndarray:
+        return np.column_stack([(at[:, group] ** 2).sum(axis=1) - 1 for group in self.groups])
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        return np.where(self.slopes, 2 * at[:, None, :], 0.0)
+
+    def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        found = np.zeros((len(at), *self.curvature.shape))
+        for k, group in enumerate(self.groups):
+            found[:, group, group] = 2 * weights[:, k, None]
+        return found
+
+
+def unit_groups(module: Module) -> list[list[int]]:
+    """Indices in x of what has unit length together."""
+    return [[module.metadata.q.index(name) for name in group] for group in module.metadata.unit_groups]
+
+
 def independent_rows(module: Module, t: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Which rows of [C; C_dot] imply the others at a state: velocity constraints have no row among those of C."""
     n_c = len(module.metadata.constraints)
+    if not n_c:
+        return np.zeros(0, dtype=int)
     C_r = module.evaluate("C_r", t, x, p) * module.evaluate("C_scale", t, x, p)[:, None]
     holonomic = np.array(module.metadata.holonomic or [True] * n_c, dtype=bool)
     return np.array([*_independent(C_r, np.flatnonzero(holonomic)), *(n_c + k for k in _independent(C_r, np.arange(n_c)))],
@@ -115,12 +148,17 @@ def on_constraints(module: Module, t: np.ndarray, X: np.ndarray, p: np.ndarray, 
 
 
 def normals(module: Module, t: np.ndarray, x: np.ndarray, p: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Directions (N, n_x, n) along which the state is corrected, orthonormal for positions and for velocities each."""
-    sizes, n_c = module.metadata.sizes, len(module.metadata.constraints)
+    """Directions (N, n_x, n) along which the state is corrected: orthonormal ones for the rows, of positions and of velocities,
+    then those of what has unit length."""
+    sizes, n_c, groups = module.metadata.sizes, len(module.metadata.constraints), unit_groups(module)
+    found = np.zeros((len(x), sizes.x, len(rows) + len(groups)))
+    for j, group in enumerate(groups):
+        found[:, group, len(rows) + j] = x[:, group] / np.linalg.norm(x[:, group], axis=1)[:, None]
+    if not len(rows):
+        return found
     C_r, N = module.evaluate("C_r", t, x, p), module.evaluate("N", t, x, p)
-    found = np.zeros((len(x), sizes.x, len(rows)))
     of_positions, of_speeds = rows[rows < n_c], rows[rows >= n_c] - n_c
     for k in range(len(x)):
         found[k, :sizes.q, :len(of_positions)] = np.linalg.qr(N[k] @ C_r[k, of_positions].T)[0]
-        found[k, sizes.q:sizes.q + sizes.u, len(of_positions):] = np.linalg.qr(C_r[k, of_speeds].T)[0]
+        found[k, sizes.q:sizes.q + sizes.u, len(of_positions):len(rows)] = np.linalg.qr(C_r[k, of_speeds].T)[0]
     return found

@@ -15,7 +15,7 @@ from symdyn.errors import ArgumentError, EvaluationError, NoOptimum, OptimumWarn
 from symdyn.optimal import ipopt, scipy_solvers
 from symdyn.optimal.discretized import Discretized, Motion
 from symdyn.optimal.ipopt import Found
-from symdyn.optimal.loops import on_constraints
+from symdyn.optimal.loops import on_constraints, unit_groups
 from symdyn.optimal.problem import Faults, Problem, problem_of
 from symdyn.optimal.result import MeshRecord, Optimum
 from symdyn.optimal.transcription import Transcription, hermite_simpson, radau, shooting
@@ -326,11 +326,18 @@ class _Search:
         if course.leading is not None and self.problem.module.metadata.constraints:
             t = self.problem.t0 + mesh.nodes * course.T
             guess = replace(guess, X=on_constraints(self.problem.module, t, guess.X, guess.p, course.leading))
+        for group in unit_groups(self.problem.module):
+            sizes = np.linalg.norm(guess.X[:, group], axis=1)
+            if not (sizes > 0).all():
+                names = [self.problem.module.metadata.q[k] for k in group]
+                raise ArgumentError(f"{self.problem.module.name}: {', '.join(names)} have unit length together, and are zero in "
+                                    "the guess; pass a guess of them, or the other sign at the end, which is the same orientation")
+            guess.X[:, group] /= sizes[:, None]
         for _ in range(4):
             made = Discretized(self.problem, mesh, steps, guess)
             self._demand_finite(made)
             found = self._solve(made)
-            if not found.solved or not len(made.rows_of_loops) or made.transversal(made.motion(found.z)) > TRANSVERSAL:
+            if not found.solved or not made.normals.size or made.transversal(made.motion(found.z)) > TRANSVERSAL:
                 break
             guess = made.motion(found.z)
         return made, found

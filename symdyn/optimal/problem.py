@@ -274,8 +274,7 @@ def _expressions(given: Sequence[sp.Expr], names: Sequence[str], constants: Mapp
 
 def _conditions(given: Any, what: str, names: Sequence[str], constants: Mapping[str, float], faults: Faults) -> Conditions | None:
     listed = list(given) if isinstance(given, (list, tuple)) else [given]
-    expressions, least, most = [], [], []
-    texts: list[str] = []
+    expressions, least, most, texts = [], [], [], list[str]()
     for relation in listed:
         if isinstance(relation, (bool, BooleanTrue, BooleanFalse)):
             faults.add(f"a condition of {what} is {relation} whatever the motion is; it must depend on it")

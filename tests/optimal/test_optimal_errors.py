@@ -184,6 +184,19 @@ def test_what_a_result_does_not_have(slider: Module) -> None:
         fall.lqr(Q=[1, 1], R=[1])
 
 
+def test_euler_parameters_that_vanish_on_the_way_of_the_guess() -> None:
+    p, w = sd.coordinates("p0:4"), sd.speeds("w1:4")
+    system = sd.System("body")
+    body = system.add_body("body", mass=1, inertia=[1, 2, 3])
+    system.add_joint(sd.Spherical("pivot", system.ground, body, coordinates=p, speeds=w, orientation=sd.EulerParameters()))
+    system.add_torque(body, sd.inputs("T1:4"))
+    module, cost = system.compile(backend="c"), sd.Loss(integral=sum(e**2 for e in sp.symbols("T1:4")))
+    with pytest.raises(sd.ArgumentError, match=r"p0, p1, p2, p3 have unit length together, and are zero in the guess"):
+        sd.optimize(module, cost, 1.0, [1, 0, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0, 0])
+    with pytest.raises(sd.ArgumentError, match=r"what is given violates the unit length of p0, p1, p2, p3 at t = 1 s by 0.44"):
+        sd.optimize(module, cost, 1.0, [1, 0, 0, 0, 0, 0, 0], [1.2, 0, 0, 0, 0, 0, 0])
+
+
 def test_riccati_that_overflows(slider: Module) -> None:
     found = sd.optimize(slider, EFFORT, 2.0, end=REST, tolerance=None, intervals=3)
     with pytest.raises(sd.EvaluationError, match=r"Riccati's equation along the motion has no finite solution"):

@@ -211,6 +211,28 @@ def test_impact_of_the_biped_against_constraints_that_begin_to_hold() -> None:
     assert np.abs(v[2:][::-1] - found).max() < 1e-12 * np.abs(found).max()
 
 
+@functools.cache
+def satellite() -> Module:
+    T, p, w = sd.inputs("T1:4"), sd.coordinates("p0:4"), sd.speeds("w1:4")
+    system = sd.System("satellite")
+    body = system.add_body("body", mass=1, inertia=sp.diag(1, 2, 3))
+    system.add_joint(sd.Spherical("pivot", system.ground, body, coordinates=p, speeds=w, orientation=sd.EulerParameters()))
+    system.add_torque(body, T, frame=body)
+    return system.compile(backend="c")
+
+
+@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, {"transcription": "shooting", "intervals": 30}])
+def test_turn_of_a_body_in_euler_parameters(options: dict[str, Any]) -> None:
+    """By 2 rad about a principal axis, from rest to rest: 12 I^2 theta^2/T^3; all four parameters are given at both ends."""
+    module = satellite()
+    cost = sd.Loss(integral=sum(e**2 for e in sp.symbols("T1:4")))
+    end = dict(zip(module.metadata.x, [np.cos(1), 0, 0, np.sin(1), 0, 0, 0], strict=True))
+    found = sd.optimize(module, cost, 2.0, start=[1, 0, 0, 0, 0, 0, 0], end=end, **options)
+    assert found.cost == pytest.approx(12 * 3**2 * 2**2 / 2**3, rel=3e-6 if "intervals" not in options else 3e-3)
+    assert np.abs((found.x[np.isin(found.t, found.breaks), :4] ** 2).sum(axis=1) - 1).max() < 1e-9
+    assert found.iterations < 40 and max(found.difference.values()) < 1e-5
+
+
 def test_solvers_of_scipy_agree() -> None:
     small: dict[str, Any] = {"intervals": 10, "tolerance": None}
     costs = {method: swing_up(method=method, **small).cost for method in ("ipopt", "slsqp", "trust-constr")}
