@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from symdyn.errors import MissingExtra
+from symdyn.errors import ArgumentError, MissingExtra
 from symdyn.optimal.program import Program
 
 # What IPOPT returns at a solution.
@@ -55,8 +55,14 @@ def solve(program: Program, z: np.ndarray, accuracy: float, max_iterations: int,
              "calc_multipliers": False,
              "ipopt.check_derivatives_for_naninf": "no", "error_on_fail": False,
              **{f"ipopt.{name}": value for name, value in options.items()}}
-    solver = ca.nlpsol("optimize", "ipopt", calls["nlp"], {**given, "grad_f": calls["grad_f"], "jac_g": calls["jac_g"],
-                                                           "hess_lag": calls["hess_lag"]})
+    functions = {name: calls[name] for name in ("grad_f", "jac_g", "hess_lag")}
+    try:
+        solver = ca.nlpsol("optimize", "ipopt", calls["nlp"], {**given, **functions})
+    except (RuntimeError, NotImplementedError) as error:
+        if not options:
+            raise
+        raise ArgumentError(f"optimize: IPOPT does not take options {dict(options)}: "
+                            f"{str(error).strip().splitlines()[-1]}") from None
     found = solver(x0=z, lbx=program.z_least, ubx=program.z_most, lbg=program.g_least, ubg=program.g_most)
     stats = solver.stats()
     return Found(np.array(found["x"]).ravel(), float(found["f"]), np.array(found["lam_g"]).ravel(),

@@ -105,6 +105,9 @@ def optimize(module: Module, cost: Loss, duration: float | tuple[float, float], 
         problem = problem_of(module, cost, duration, start, end, bounds, rates, path, boundary, parameters, params, inputs, t)
     except ArgumentError as error:
         faults.add(str(error).removeprefix(f"{module.name}: "))
+    else:
+        if hold is True and np.isfinite(problem.rates).any():
+            faults.add("inputs that are held jump between intervals, and have bounds of rates; leave out hold, or the bounds")
     faults.demand_none()
     assert chosen is not None
     course = _guess(problem, guess, faults)
@@ -148,6 +151,8 @@ class _Chosen:
             if not fits and not (what == "tolerance" and value is None):
                 or_none = ", or None" if what == "tolerance" else ""
                 faults.add(f"{what} is {shown(value)}; pass a number between 0 and 1{or_none}")
+        if not isinstance(hold, bool) or (hold and kind in TRANSCRIPTIONS and kind != "shooting"):
+            faults.add(f"hold is {shown(hold)}, and transcription is {shown(kind)}; inputs are held with shooting alone")
         breaks = _breaks(intervals, faults)
         if options is not None and not isinstance(options, Mapping):
             faults.add(f"options is {shown(options)}; pass a mapping from names of IPOPT's options to values")
@@ -331,7 +336,7 @@ class _Search:
             if not (sizes > 0).all():
                 names = [self.problem.module.metadata.q[k] for k in group]
                 raise ArgumentError(f"{self.problem.module.name}: {', '.join(names)} have unit length together, and are zero in "
-                                    "the guess; pass a guess of them, or the other sign at the end, which is the same orientation")
+                                    "the guess; pass a guess of them, or the other sign at the end, the same orientation")
             guess.X[:, group] /= sizes[:, None]
         for _ in range(4):
             made = Discretized(self.problem, mesh, steps, guess)
