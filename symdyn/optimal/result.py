@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PPoly
@@ -52,6 +52,7 @@ class Optimum:
     costates       (n, n_x) at costate_times (n,): derivatives of the cost by a shift of the state there; NaN likewise
     success, message   whether the solver ended at a minimum, and why it ended
     seconds        of the whole call
+    breaks         (K + 1,) ends of the intervals, s; states_over_time, inputs_over_time: the polynomials between them
 
     >>> module = sd.systems.cart_pole().compile()
     >>> F = sd.inputs("F")
@@ -84,8 +85,8 @@ class Optimum:
     message: str
     seconds: float
     breaks: np.ndarray
-    _states: PPoly = field(repr=False)
-    _inputs: PPoly = field(repr=False)
+    states_over_time: PPoly = field(repr=False)
+    inputs_over_time: PPoly = field(repr=False)
 
     def __getitem__(self, name: Key) -> np.ndarray:
         """A state or input over the times t, (n_t,). Raises ArgumentError for another name."""
@@ -100,14 +101,15 @@ class Optimum:
     def at(self, t: Times) -> np.ndarray:
         """The state at a time, (n_x,), or at times, (n, n_x), by the polynomials of the transcription. Raises ArgumentError
         beyond the motion."""
-        return np.asarray(self._states(self._within(t)))
+        return np.asarray(self.states_over_time(self.within(t)))
 
     def inputs_at(self, t: Times) -> np.ndarray:
         """The inputs at a time, (n_in,), or at times, (n, n_in); where they jump, those after it. Raises ArgumentError beyond the
         motion."""
-        return np.asarray(self._inputs(self._within(t)))
+        return np.asarray(self.inputs_over_time(self.within(t)))
 
-    def _within(self, t: Any) -> np.ndarray:
+    def within(self, t: Times) -> np.ndarray:
+        """Times, those beyond the motion by rounding at its ends. Raises ArgumentError for others."""
         times, slack = real_of(t, self.module.name, "t must be numbers"), 1e-9 * (1 + abs(self.t[-1]))
         if not np.isfinite(times).all() or (times < self.t[0] - slack).any() or (times > self.t[-1] + slack).any():
             raise ArgumentError(f"{self.module.name}: the optimal motion goes from t = {self.t[0]:g} to {self.t[-1]:g} s; found "
@@ -117,7 +119,7 @@ class Optimum:
     @property
     def table(self) -> Piecewise:
         """The inputs as `simulate` takes them, inputs=optimum.table: exactly these, steps end where intervals do."""
-        return as_table(self._inputs)
+        return as_table(self.inputs_over_time)
 
     def simulate(self, t: Row | None = None, rtol: float = 1e-9, method: str | None = None) -> Solution:
         """The motion from the same start with these inputs, integrated with error control; t: output times, default: the

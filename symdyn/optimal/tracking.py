@@ -11,20 +11,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.interpolate import PPoly
 
 from symdyn.errors import ArgumentError, EvaluationError
+from symdyn.optimal.transcription import through
 from symdyn.shown import name_of
 from symdyn.statics.regulator import demand_definite, weights_of
 
 if TYPE_CHECKING:
     from symdyn.optimal.result import Optimum
 
-# Relative error of a step of S.
-RTOL = 1e-8
+# Relative error of a step of S; points of a polynomial of the gain; breaks of these that are nearer are one, as a part of the
+# whole.
+RTOL, POINTS, CLOSE = 1e-8, 6, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,30 +54,40 @@ class Tracking:
     Qf: np.ndarray
     driven: tuple[str, ...]
     _S: Callable[[float], np.ndarray] = field(repr=False)
+    _K: PPoly = field(repr=False)
 
     def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
         """Raises ArgumentError beyond the motion."""
-        found = self.optimum.inputs_at(t).copy()
-        found[self._places] -= self.K(t) @ (np.asarray(x, dtype=float) - self.optimum.at(t))
+        optimum = self.optimum
+        if not self._begin <= t <= self._end:
+            t = float(optimum.within(t))
+        found: np.ndarray = optimum.inputs_over_time(t)
+        found[self._places] -= self._K(t) @ (np.asarray(x, dtype=float) - optimum.states_over_time(t))
         return found
 
-    @property
+    @cached_property
     def _places(self) -> list[int]:
         names = self.optimum.module.metadata.inputs
         return [names.index(n) for n in self.driven]
 
+    @cached_property
+    def _begin(self) -> float:
+        return float(self.optimum.t[0])
+
+    @cached_property
+    def _end(self) -> float:
+        return float(self.optimum.t[-1])
+
     def S(self, t: float) -> np.ndarray:
         """(n_x, n_x): what is left to pay for a deviation dx at a time is dx^T S dx."""
         n = len(self.Q)
-        found = np.asarray(self._S(float(t))).reshape(n, n)
+        found = np.asarray(self._S(float(self.optimum.within(t)))).reshape(n, n)
         return np.asarray((found + found.T) / 2)
 
     def K(self, t: float) -> np.ndarray:
-        """The gain at a time, (k, n_x), rows as driven, columns as the state."""
-        optimum = self.optimum
-        B = optimum.module.jacobian(float(t), optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["inputs"]).inputs
-        assert B is not None
-        return np.asarray(np.linalg.solve(self.R, B[:, self._places].T @ self.S(t)))
+        """The gain at a time, (k, n_x), rows as driven, columns as the state; by polynomials through exact values. Raises
+        ArgumentError beyond the motion."""
+        return np.asarray(self._K(float(self.optimum.within(t))))
 
     def __repr__(self) -> str:
         first, last = self.optimum.t[0], self.optimum.t[-1]
@@ -117,4 +131,21 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
         found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
     if not found.success:
         raise EvaluationError(without)
-    return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol)
+    return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol, _gain(optimum, found, places, inverse))
+
+
+def _gain(optimum: Optimum, found: Any, places: Sequence[int], inverse: np.ndarray) -> PPoly:
+    """R^-1 B^T S as polynomials through its values in every interval of the mesh and step of Riccati's equation."""
+    breaks = np.unique(np.concatenate([optimum.breaks, found.t[(found.t > optimum.t[0]) & (found.t < optimum.t[-1])]]))
+    apart = np.append(np.diff(breaks) > CLOSE * (breaks[-1] - breaks[0]), True)
+    apart[0] = True
+    breaks, h = breaks[apart], np.diff(breaks[apart])
+    inner = (1 - np.cos(np.pi * (2 * np.arange(POINTS) + 1) / (2 * POINTS))) / 2
+    t = (breaks[:-1, None] + h[:, None] * inner).ravel()
+    B = optimum.module.jacobian(t, optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["inputs"]).inputs
+    assert B is not None
+    n = optimum.x.shape[1]
+    S = np.asarray(found.sol(t)).T.reshape(-1, n, n)
+    K = np.einsum("ij,tkj,tkl->til", inverse, B[:, :, places], (S + S.transpose(0, 2, 1)) / 2)
+    c = through(inner, K.reshape(len(h), POINTS, -1), h)
+    return PPoly(c.reshape(*c.shape[:2], len(places), n), breaks)

@@ -91,10 +91,10 @@ def hermite_simpson(breaks: np.ndarray) -> Transcription:
     corrected[1::2] = k
 
     def of_inputs(U: np.ndarray) -> PPoly:
-        return PPoly(_through(np.array([0.0, 0.5, 1.0]), U[_thirds(K)], h), breaks)
+        return PPoly(through(np.array([0.0, 0.5, 1.0]), U[_thirds(K)], h), breaks)
 
     def of_states(X: np.ndarray, F: np.ndarray) -> PPoly:
-        slopes = _through(np.array([0.0, 0.5, 1.0]), F[_thirds(K)], h)
+        slopes = through(np.array([0.0, 0.5, 1.0]), F[_thirds(K)], h)
         whole = PPoly(slopes, breaks).antiderivative()
         whole.c[-1] = X[0:-1:2]
         return whole
@@ -131,10 +131,10 @@ def radau(breaks: np.ndarray, degree: int) -> Transcription:
     corrected[d - 1::d] = np.arange(K)
 
     def of_inputs(U: np.ndarray) -> PPoly:
-        return PPoly(_through(c, U.reshape(K, d, -1), h), breaks)
+        return PPoly(through(c, U.reshape(K, d, -1), h), breaks)
 
     def of_states(X: np.ndarray, F: np.ndarray) -> PPoly:
-        return PPoly(_through(local, X[(np.arange(K) * d)[:, None] + np.arange(d + 1)], h), breaks)
+        return PPoly(through(local, X[(np.arange(K) * d)[:, None] + np.arange(d + 1)], h), breaks)
 
     points = np.arange(P)
     return Transcription("radau", breaks, nodes, np.arange(0, N, d), nodes[1:], points + 1, points[:, None], nodes[1:], E, W, b,
@@ -196,7 +196,7 @@ def _values(points: np.ndarray, at: float) -> np.ndarray:
     return np.array([p(at) for p in _basis(points)])
 
 
-def _through(points: np.ndarray, values: np.ndarray, h: np.ndarray) -> np.ndarray:
+def through(points: np.ndarray, values: np.ndarray, h: np.ndarray) -> np.ndarray:
     """Coefficients as PPoly has them, (d, K, n), of polynomials through values (K, d, n) at points of each interval."""
     basis = np.array([np.pad(p.coef, (0, len(points) - len(p.coef))) for p in _basis(points)])  # (d, powers)
     found = np.einsum("kjn,jp->pkn", values, basis) / h[None, :, None] ** np.arange(len(points))[:, None, None]
