@@ -24,6 +24,8 @@ from symdyn.tape.tape import reachable, unsigned
 BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
 # By what a weighted sum of the rates is differentiated, once or twice.
 WEIGHTED = ("x", "inputs", "params")
+# What else is weighted and differentiated twice.
+CURVED = ("constraints", "outputs")
 # The quantity whose entries the equations are solved for.
 UNKNOWNS = "unknowns"
 
@@ -136,17 +138,24 @@ def hessian(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
     return np.array(columns, dtype=object).T.reshape(len(columns), len(columns))
 
 
-def curvature_named(name: str) -> tuple[str, ...] | None:
-    """By what a function of this name differentiates the weighted constraints twice: constraints_hessian_x_params; None for other
-    functions."""
-    wrt = tuple(name.removeprefix("constraints_hessian_").split("_"))
-    return wrt if name.startswith("constraints_hessian_") and wrt in (("x",), ("x", "params")) else None
+def curvature_named(name: str) -> tuple[str, tuple[str, ...]] | None:
+    """What a function of this name differentiates twice, weighted, and by what: constraints_hessian_x_params,
+    outputs_hessian_x_inputs; None for other functions."""
+    of, found, by = name.partition("_hessian_")
+    wrt = tuple(by.split("_"))
+    return (of, wrt) if found and of in CURVED and wrt == tuple(one for one in WEIGHTED if one in wrt) else None
 
 
-def curvature(equations: Equations, wrt: Sequence[str]) -> np.ndarray:
-    """The matrix of second derivatives of w^T [C; C_dot], with the weights w (2 n_c,) among the arguments."""
-    recorder = equations.recorder
-    values = [*equations.quantity("C").tolist(), *equations.quantity("C_dot").tolist()]
+def curved(equations: Equations, of: str) -> list[Any]:
+    """The entries of what is differentiated twice: of the constraints [C; C_dot], of all outputs one after the other."""
+    if of == "constraints":
+        return [*equations.quantity("C").tolist(), *equations.quantity("C_dot").tolist()]
+    return [e for name in equations.quantities if name.startswith("output_") for e in equations.quantity(name).ravel().tolist()]
+
+
+def curvature(equations: Equations, of: str, wrt: Sequence[str]) -> np.ndarray:
+    """The matrix of second derivatives of w^T of these entries, with the weights w among the arguments."""
+    recorder, values = equations.recorder, curved(equations, of)
     weights = [recorder.leaf(name, ACCELERATION) for name in weight_names(len(values))]
     leaves = [leaf for by in wrt for group in BY[by] for leaf in leaves_of(equations, group)]
     total = sum((w * value for w, value in zip(weights, values, strict=True)), 0)

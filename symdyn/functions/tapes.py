@@ -17,6 +17,7 @@ from symdyn.formulation.derivatives import (
     along,
     curvature,
     curvature_named,
+    curved,
     derivative,
     derivative_named,
     gradient,
@@ -39,8 +40,9 @@ def has_function(equations: Equations, name: str) -> bool:
     """Whether the equations can give a function."""
     if second_named(name) is not None:
         return "adjoint" in equations.quantities
-    if curvature_named(name) is not None:
-        return "C_dot" in equations.quantities
+    twice = curvature_named(name)
+    if twice is not None:
+        return "C_dot" in equations.quantities if twice[0] == "constraints" else has_function(equations, "outputs")
     found = derivative_named(name)
     if found is not None and name not in equations.quantities:
         return found[0] in ALL and derivative_named(found[0]) is None and has_function(equations, found[0])
@@ -79,7 +81,7 @@ def tape_as_derived(equations: Equations, name: str) -> Tape:
         return Tape(equations.recorder, {name: Output.of(name, weighted(equations, *second))})
     twice = curvature_named(name)
     if twice is not None:
-        return Tape(equations.recorder, {name: Output.of(name, curvature(equations, twice))})
+        return Tape(equations.recorder, {name: Output.of(name, curvature(equations, *twice))})
     found = derivative_named(name)
     if found is not None and name not in equations.quantities:
         differentiated = _only_output(tape_as_derived(equations, found[0])).array()
@@ -191,8 +193,8 @@ def given_rates(equations: Equations, names: Sequence[str]) -> list[str]:
         given += weight_names(len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states))
         wrt = next((second[1] for n in names if (second := second_named(n)) and second[0] == "hessian_product"), ())
         given += [seed for by in wrt for group in BY[by] for seed in seeds_in(equations, group)]
-    if any(curvature_named(n) for n in names):
-        given += weight_names(2 * n_c)
+    for twice in filter(None, map(curvature_named, names)):
+        given += weight_names(len(curved(equations, twice[0])))
     if any(n in VARIATIONS for n in names):
         given += variation_names(symbols, n_c, "second_variation" in names)
     return given

@@ -9,7 +9,6 @@ import scipy.sparse as sp
 from scipy.interpolate import PPoly
 
 from symdyn.errors import ArgumentError
-from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Dynamics, Field, Rows
 from symdyn.optimal.loops import Loops, UnitLengths, independent_rows, normals, unit_groups
 from symdyn.optimal.problem import Problem
@@ -216,7 +215,7 @@ class Discretized:
         return _Part(R * n_x, L.tocsr(), block, np.zeros(R * n_x), np.zeros(R * n_x),
                      [Label(MOTION, 0, mesh.share, names)])
 
-    def _pointwise(self, expressions: Expressions, columns: np.ndarray, shares: np.ndarray, A: sp.csr_matrix,
+    def _pointwise(self, expressions: Rows, columns: np.ndarray, shares: np.ndarray, A: sp.csr_matrix,
                    b: np.ndarray) -> Block:
         """Expressions whose last argument is the time, at points."""
         T, N = self.layout.duration, len(shares)

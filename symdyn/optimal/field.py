@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from symdyn.errors import EvaluationError
-from symdyn.optimal.expressions import Expressions
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -130,7 +129,7 @@ class Field:
     shares   (N,) of the points
     """
 
-    def __init__(self, dynamics: Dynamics, integrand: Expressions, t0: float, shares: np.ndarray) -> None:
+    def __init__(self, dynamics: Dynamics, integrand: Rows, t0: float, shares: np.ndarray) -> None:
         self.dynamics, self.integrand, self.t0, self.shares = dynamics, integrand, t0, shares
         n_x, n = dynamics.of.n_x, dynamics.of.n
         self.slopes, self.curvature = np.zeros((n_x + 1, n), dtype=bool), np.zeros((n, n), dtype=bool)

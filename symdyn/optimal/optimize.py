@@ -59,8 +59,8 @@ def optimize(module: Module, cost: Loss, duration: float | tuple[float, float], 
              options: Mapping[str, str | float] | None = None, verbose: bool = False) -> Optimum:
     """The motion of least cost between a start and an end, with its inputs and free parameters.
 
-    cost         sd.Loss of expressions: integral of coordinates, speeds, extra states, inputs, parameters and sd.t; end of these
-                 at the end and of values at the start, called "q1(0)"
+    cost         sd.Loss of expressions: integral of coordinates, speeds, extra states, inputs, parameters, outputs and sd.t; end
+                 of these at the end and of values at the start, called "q1(0)". Entries of outputs are called "tip[0]"
     duration     s; or (least, most) for one that is found
     start, end   by name or symbol: a number, (least, most), or None for any value; or a whole state in order. A state that start
                  leaves out has the system's initial value, one that end leaves out is free; start="free": all are

@@ -15,6 +15,7 @@ from symdyn.arguments import take
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
+from symdyn.optimal.outputs import WithOutputs, output_names
 from symdyn.real_numbers import NotReal, number
 from symdyn.runtime.losses import Loss
 from symdyn.runtime.masses import real_parameters
@@ -32,7 +33,7 @@ LONGEST = 120
 class Conditions:
     """Expressions between bounds: least <= values <= most, (m,); texts: as the user wrote them."""
 
-    expressions: Expressions
+    expressions: Expressions | WithOutputs
     least: np.ndarray
     most: np.ndarray
     texts: tuple[str, ...]
@@ -59,8 +60,8 @@ class Problem:
     inputs: np.ndarray
     rates: np.ndarray
     params: np.ndarray
-    integrand: Expressions
-    end_cost: Expressions
+    integrand: Expressions | WithOutputs
+    end_cost: Expressions | WithOutputs
     path: Conditions
     boundary: Conditions
 
@@ -132,18 +133,21 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     point = (*metadata.x, *metadata.inputs, *names, "t")
     both = (*[f"{n}(0)" for n in metadata.x], *point)
     constants = {n: float(v) for n, v in zip(metadata.parameters, p, strict=True) if n not in names}
+    along_it = _Read(module, of, p, point, 0, constants, faults)
+    at_both = _Read(module, of, p, both, of.n_x, constants, faults)
     if not isinstance(cost, Loss):
         faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...) with expressions")
         cost = Loss(integral=0)
-    integrand = _expressions([_expression(cost.integral, "the integral of the cost", point, constants, faults)], point, constants,
-                             faults, "the integral of the cost")
-    end_cost = _expressions([_expression(cost.end, "the end of the cost", both, constants, faults)], both, constants, faults,
-                            "the end of the cost")
-    along = _conditions(path, "path", point, constants, faults)
-    at_ends = _conditions(boundary, "boundary", both, constants, faults)
-    if not faults.found and T[0] < T[1] and _depends_on_time(module, p):
-        faults.add("the duration is free, and the equations of motion depend on t, by which there are no second derivatives; "
-                   "give the duration as a number")
+    integrand = along_it.rows([along_it.one(cost.integral, "the integral of the cost")], "the integral of the cost")
+    end_cost = at_both.rows([at_both.one(cost.end, "the end of the cost")], "the end of the cost")
+    along, at_ends = _conditions(path, "path", along_it), _conditions(boundary, "boundary", at_both)
+    if not faults.found and T[0] < T[1]:
+        with_outputs = any(isinstance(rows, WithOutputs) for rows in (integrand, end_cost, along and along.expressions,
+                                                                      at_ends and at_ends.expressions))
+        for what, name in (("equations of motion", "rhs"), ("outputs", "outputs")):
+            if (name == "rhs" or with_outputs) and _depends_on_time(module, name, p):
+                faults.add(f"the duration is free, and the {what} depend on t, by which there are no second derivatives; give "
+                           "the duration as a number")
     faults.demand_none()
     assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
     params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
@@ -245,57 +249,73 @@ def _ends(metadata: Any, start: Any, end: Any, states: np.ndarray, faults: Fault
     return found[0], found[1]
 
 
-def _expression(given: Any, what: str, there: Sequence[str], constants: Mapping[str, float], faults: Faults) -> sp.Expr:
-    if given is None:
-        return sp.S.Zero
-    try:
-        found = sp.sympify(given, strict=True)
-        if not isinstance(found, sp.Expr):
-            raise TypeError
-    except (sp.SympifyError, TypeError):
-        faults.add(f"{what} is {shown(given)}; pass an expression of coordinates, speeds, inputs, parameters and sd.t: second "
-                   "derivatives are needed, which functions do not have")
-        return sp.S.Zero
-    unknown = sorted({str(s) for s in found.free_symbols} - {*there, *constants})
-    if unknown:
-        faults.add(f"{what} has {', '.join(unknown)}, which is not there; there are {', '.join((*there, *constants))}")
-        return sp.S.Zero
-    return found
+@dataclass(frozen=True)
+class _Read:
+    """Takes expressions over: names of their arguments, in which [x; inputs; free parameters; t] begin at `first`."""
+
+    module: Module
+    of: Arguments
+    p: np.ndarray
+    names: tuple[str, ...]
+    first: int
+    constants: Mapping[str, float]
+    faults: Faults
+
+    def one(self, given: Any, what: str) -> sp.Expr:
+        """An expression; 0, and a fault, for what is none."""
+        if given is None:
+            return sp.S.Zero
+        try:
+            found = sp.sympify(given, strict=True)
+            if not isinstance(found, sp.Expr):
+                raise TypeError
+        except (sp.SympifyError, TypeError):
+            self.faults.add(f"{what} is {shown(given)}; pass an expression of coordinates, speeds, inputs, parameters, outputs "
+                            "and sd.t: second derivatives are needed, which functions do not have")
+            return sp.S.Zero
+        there = (*self.names, *self.constants, *output_names(self.module))
+        unknown = sorted({str(s) for s in found.free_symbols} - set(there))
+        if unknown:
+            self.faults.add(f"{what} has {', '.join(unknown)}, which is not there; there are {', '.join(there)}")
+            return sp.S.Zero
+        return found
+
+    def rows(self, given: Sequence[sp.Expr], what: str) -> Expressions | WithOutputs | None:
+        """Expressions as a function; None, and a fault, for what has no derivatives."""
+        outputs = output_names(self.module)
+        used = not set(outputs).isdisjoint(str(s) for e in given for s in e.free_symbols)
+        try:
+            made = Expressions(given, (*self.names, *outputs) if used else self.names, self.constants)
+        except UnsupportedExpression as error:
+            self.faults.add(f"{what}: {error}")
+            return None
+        return WithOutputs(made, self.module, self.of, self.p, self.first) if used else made
 
 
-def _expressions(given: Sequence[sp.Expr], names: Sequence[str], constants: Mapping[str, float], faults: Faults,
-                 what: str) -> Expressions | None:
-    try:
-        return Expressions(given, names, constants)
-    except UnsupportedExpression as error:
-        faults.add(f"{what}: {error}")
-        return None
-
-
-def _conditions(given: Any, what: str, names: Sequence[str], constants: Mapping[str, float], faults: Faults) -> Conditions | None:
+def _conditions(given: Any, what: str, read: _Read) -> Conditions | None:
     listed = list(given) if isinstance(given, (list, tuple)) else [given]
     expressions, least, most, texts = [], [], [], list[str]()
     for relation in listed:
         if isinstance(relation, (bool, BooleanTrue, BooleanFalse)):
-            faults.add(f"a condition of {what} is {relation} whatever the motion is; it must depend on it")
+            read.faults.add(f"a condition of {what} is {relation} whatever the motion is; it must depend on it")
             continue
         if not isinstance(relation, (sp.Eq, sp.Le, sp.Ge, sp.Lt, sp.Gt)):
-            faults.add(f"a condition of {what} is {shown(relation)}; write sp.Eq(a, b), a <= b or a >= b")
+            read.faults.add(f"a condition of {what} is {shown(relation)}; write sp.Eq(a, b), a <= b or a >= b")
             continue
         text = str(relation) if not isinstance(relation, sp.Eq) else f"{relation.lhs} = {relation.rhs}"
-        expressions.append(_expression(relation.lhs - relation.rhs, f"the condition {text} of {what}", names, constants, faults))
+        expressions.append(read.one(relation.lhs - relation.rhs, f"the condition {text} of {what}"))
         least.append(-np.inf if isinstance(relation, (sp.Le, sp.Lt)) else 0.0)
         most.append(np.inf if isinstance(relation, (sp.Ge, sp.Gt)) else 0.0)
         texts.append(text if len(text) <= LONGEST else f"{text[:LONGEST]} ... ({len(texts) + 1})")
-    made = _expressions(expressions, names, constants, faults, what)
+    made = read.rows(expressions, what)
     return None if made is None else Conditions(made, np.array(least), np.array(most), tuple(texts))
 
 
-def _depends_on_time(module: Module, p: np.ndarray) -> bool:
-    """Whether the rates depend on the time, by structure, or where this is not known by their values at two times."""
-    found = module.structure("rhs_by_t")
+def _depends_on_time(module: Module, name: str, p: np.ndarray) -> bool:
+    """Whether a function depends on the time, by structure, or where this is not known by its values at two times."""
+    found = module.structure(f"{name}_by_t")
     if found is not None:
         return bool(found.any())
     x = np.array([module.metadata.initial.get(n, 0.0) for n in module.metadata.x]) + 0.1
-    first, second = (module.rhs(t, x, p) for t in (0.1, 0.7351))
+    first, second = (module.evaluate(name, t, x, p) for t in (0.1, 0.7351))
     return not np.array_equal(first, second)

@@ -136,6 +136,20 @@ def test_programs_against_differences(mesh: Any, loops: bool) -> None:
         z, np.ones(Discretized(problem, made, 2, on.guess, elastic=True).program.n - len(z))))
 
 
+@pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(shooting, hold=False)], ids=["collocation", "shooting"])
+def test_programs_with_outputs_against_differences(mesh: Any) -> None:
+    module = sd.systems.two_link_arm().compile(backend="c")
+    x, y, q1, tau, l2 = sp.symbols("tip[0] tip[1] q1 tau1 l2")
+    cost, conditions = sd.Loss(integral=y**2 * tau + x * sd.t, end=sp.sin(x * l2) * sd.t), [x * y <= q1, tau * x <= 3]
+    problem = problem_of(module, cost, (1.0, 3.0), "free", None, None, None, conditions, [sp.Eq(sp.Symbol("q1(0)") * x, y**2)],
+                         {"l2": (0.1, 5)}, None, None, 0.3)
+    made = mesh(np.array([0.0, 0.2, 0.5, 1.0]))
+    rng = np.random.default_rng(1)
+    guess = Motion(0.3 * rng.normal(size=(len(made.nodes), 4)), rng.normal(size=(len(made.samples), 2)), problem.p, 1.1)
+    on = Discretized(problem, made, 8, guess)
+    _derivatives_agree(on.program, on.z)
+
+
 def test_constraints_of_loops_against_differences() -> None:
     module = sd.systems.four_bar().compile(backend="c")
     x = np.array([[0.5, 0.13, -2.4, 0.3, -0.2, 0.9], [1.0, -0.5, -2.1, 1.0, 0.4, -0.7]])

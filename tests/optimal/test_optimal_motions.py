@@ -148,6 +148,22 @@ def test_path_and_boundary_conditions() -> None:
     assert around["x"][-1] - around["x"][0] == pytest.approx(1) and around.cost < 1e-12 and around["x"][0] > 2 - 1e-7
 
 
+def test_outputs_in_conditions_and_costs() -> None:
+    """The tip of an arm, by the output and by hand."""
+    module = sd.systems.two_link_arm().compile(backend="c")
+    q1, q2, tau1, tau2 = sp.symbols("q1 q2 tau1 tau2")
+    length = dict(zip(module.metadata.parameters, module.parameters(), strict=True))
+    by_hand = [sum(float(length[f"l{k + 1}"]) * f(angle) for k, angle in enumerate((q1, q1 + q2))) for f in (sp.cos, sp.sin)]
+    found = []
+    for tip in (sp.symbols("tip[0] tip[1]"), by_hand):
+        cost = sd.Loss(integral=tau1**2 + tau2**2 + 10 * tip[1] ** 2, end=tip[0] ** 2)
+        found.append(sd.optimize(module, cost, 1.0, start={"q1": -1.5, "q2": 0.5}, end={"q1_dot": 0, "q2_dot": 0}, intervals=15,
+                                 tolerance=None, boundary=[sp.Eq(tip[1], 0.3)], path=[tip[0] >= 0.2]))
+    assert found[0].cost == pytest.approx(found[1].cost, rel=1e-9) and found[0].iterations == found[1].iterations
+    tips = module.outputs(found[0].t, found[0].x)["tip"]
+    assert tips[-1, 1] == pytest.approx(0.3, abs=1e-8) and tips[:, 0].min() == pytest.approx(0.2, abs=1e-7)
+
+
 def test_a_linkage_between_two_positions() -> None:
     module = linkage()
     q = module.consistent({"q1": 0.5}, keep=["q1"])[0]
@@ -286,3 +302,12 @@ def test_what_is_printed_and_drawn(tmp_path: Any) -> None:
     figure = found.plot(tmp_path / "swing.png")
     assert (tmp_path / "swing.png").stat().st_size > 10_000 and len(figure.axes) == 4
     assert [a.get_ylabel() for a in figure.axes] == ["coordinates", "speeds", "inputs", "error of an interval"]
+
+
+def test_measurement_beside_plain_casadi(capsys: pytest.CaptureFixture[str]) -> None:
+    """Minimum time: the same iterations and the same cost."""
+    from symdyn.lab.optimize import run
+
+    assert run(["minimum_time"]) == 0
+    rows = {line.split("  ")[0]: line.split()[-1] for line in capsys.readouterr().out.splitlines() if "iterations" in line}
+    assert rows["minimum time: iterations"] == rows["minimum time: iterations of CasADi"]

@@ -1,0 +1,88 @@
+"""Expressions that hold outputs of a module, with exact derivatives: those of the outputs come from compiled code."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+from symdyn.optimal.expressions import Expressions
+from symdyn.optimal.field import Arguments
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+
+def output_names(module: Module) -> tuple[str, ...]:
+    """Names of all entries of the outputs: "height" of a number, "tip[0]" and "frame[0,1]" of arrays."""
+    return tuple(name + (f"[{','.join(map(str, place))}]" if place else "")
+                 for name, shape in module.metadata.outputs for place in product(*map(range, shape)))
+
+
+class WithOutputs:
+    """Expressions of arguments and outputs as a function of the arguments alone, as Rows.
+
+    expressions   of the arguments and then the outputs, all of them
+    first         where [x; inputs; free parameters; t] begin among the arguments; p (n_p,): values of all parameters
+    """
+
+    def __init__(self, expressions: Expressions, module: Module, of: Arguments, p: np.ndarray, first: int) -> None:
+        self.expressions, self.module, self.of, self.p, self.first = expressions, module, of, p.copy(), first
+        self.n_y = len(output_names(module))
+        self.n = len(expressions.names) - self.n_y
+        self._wrt = ("x", *(("inputs",) if of.n_in else ()), *(("params",) if of.free else ()))
+        self._sizes = {"x": of.n_x, "inputs": of.n_in, "params": len(p)}
+        whole = of.n_x + of.n_in
+        self._kept = np.array([*range(whole), *(whole + k for k in of.free)], dtype=int)
+        self._at = slice(first, first + len(self._kept))
+        by_outputs = expressions.slopes[:, self.n:].any(axis=1)
+        self.m, self.slopes = expressions.m, expressions.slopes[:, :self.n].copy()
+        self.curvature = expressions.curvature[:self.n, :self.n].copy()
+        used = np.zeros(self.n, dtype=bool)
+        used[self._at] = True
+        self.slopes[np.ix_(by_outputs, used)] = True
+        mixed = used | expressions.curvature[:self.n, self.n:].any(axis=1)
+        self.curvature |= np.outer(mixed, used) | np.outer(used, mixed)
+
+    def values(self, at: np.ndarray) -> np.ndarray:
+        return self.expressions.values(self._whole(at))
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        found = self.expressions.jacobian(self._whole(at))
+        return found[:, :, :self.n] + found[:, :, self.n:] @ self._slopes(at)
+
+    def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        whole, Y = self._whole(at), self._slopes(at)
+        H = self.expressions.hessian(whole, weights)
+        on_outputs = np.einsum("ni,nij->nj", weights, self.expressions.jacobian(whole)[:, :, self.n:])
+        cross = H[:, :self.n, self.n:] @ Y
+        found = H[:, :self.n, :self.n] + cross + cross.transpose(0, 2, 1) + Y.transpose(0, 2, 1) @ H[:, self.n:, self.n:] @ Y
+        n = sum(self._sizes[by] for by in self._wrt)
+        given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), on_outputs])
+        second = self._call(f"outputs_hessian_{'_'.join(self._wrt)}", at, (n, n), given)
+        found[:, self._at, self._at] += second[:, self._kept[:, None], self._kept]
+        return np.asarray(found)
+
+    def _whole(self, at: np.ndarray) -> np.ndarray:
+        return np.hstack([at, self._call("outputs", at, (self.n_y,))])
+
+    def _slopes(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the outputs by the arguments, (N, n_y, n); by the time they are not needed: it is prescribed."""
+        found = np.zeros((len(at), self.n_y, self.n))
+        parts = [self._call(f"outputs_by_{by}", at, (self.n_y, self._sizes[by])) for by in self._wrt]
+        found[:, :, self._at] = np.concatenate(parts, axis=2)[:, :, self._kept]
+        return found
+
+    def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
+        n_x, n_in, free = self.of.n_x, self.of.n_in, list(self.of.free)
+        mine = at[:, self.first:]
+        if free:
+            self.p = self.p.copy()
+            self.p[free] = mine[0, n_x + n_in:n_x + n_in + len(free)]
+        try:
+            found = self.module.evaluate(name, mine[:, -1], mine[:, :n_x], self.p, mine[:, n_x:n_x + n_in], given)
+        except EvaluationError:
+            return np.full((len(at), *shape), np.nan)
+        return np.asarray(found).reshape(len(at), *shape)
