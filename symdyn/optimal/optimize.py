@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time as clock
 import warnings
 from collections.abc import Mapping, Sequence
@@ -292,8 +293,7 @@ class _Search:
         """See optimize."""
         chosen, problem = self.chosen, self.problem
         breaks, steps, records = chosen.breaks, chosen.steps, list[MeshRecord]()
-        course = self.course
-        tolerance = chosen.tolerance
+        course, tolerance, before = self.course, chosen.tolerance, None
         while True:
             made, found = self._solved(breaks, steps, course)
             motion = made.motion(found.z)
@@ -301,8 +301,9 @@ class _Search:
             records.append(MeshRecord(made.mesh.n_intervals, steps, found.iterations, found.cost, float(errors.max()),
                                       self._lap()))
             if not found.solved:
-                raise self._failed(made, found, errors, records)
-            too_large = tolerance is not None and bool((errors > tolerance).any())
+                raise self._failed(made, found, errors, records, before)
+            before = self._optimum(made, found, errors, records)
+            too_large = tolerance is not None and not bool((errors <= tolerance).all())
             if not too_large or len(records) > chosen.max_refinements:
                 break
             assert tolerance is not None
@@ -312,12 +313,11 @@ class _Search:
             breaks, steps = finer
             x, u = made.polynomials(motion)
             course = _Course(x, u, motion.p, motion.T)
-        optimum = self._optimum(made, found, errors, records)
         if too_large:
-            warnings.warn(f"{problem.module.name}: the error of an interval is {optimum.error:.2g} after {len(records)} meshes, "
+            warnings.warn(f"{problem.module.name}: the error of an interval is {before.error:.2g} after {len(records)} meshes, "
                           f"above the tolerance {tolerance:g}; allow more refinements, or pass a larger tolerance",
                           OptimumWarning, stacklevel=3)
-        return optimum
+        return self._simulated(before)
 
     def _lap(self) -> float:
         now = clock.perf_counter()
@@ -369,9 +369,11 @@ class _Search:
         """The next mesh: intervals cut, steps of shooting halved, by the order of their errors; None: it would be too fine."""
         order = made.mesh.order
         if made.mesh.kind == "shooting":
-            more = int(np.ceil(steps * np.clip((errors.max() / tolerance) ** (1 / order), 1.2, 4)))
+            wanted = np.nan_to_num((errors.max() / tolerance) ** (1 / order), nan=PARTS, posinf=PARTS)
+            more = int(np.ceil(steps * np.clip(wanted, 1.2, PARTS)))
             return (breaks, more) if more <= MOST_STEPS else None
-        parts = np.where(errors > tolerance, np.clip(np.ceil((errors / tolerance) ** (1 / order)), 2, PARTS), 1).astype(int)
+        wanted = np.nan_to_num(np.ceil((errors / tolerance) ** (1 / order)), nan=PARTS, posinf=PARTS)
+        parts = np.where(errors <= tolerance, 1, np.clip(wanted, 2, PARTS)).astype(int)
         if parts.sum() > MOST_INTERVALS:
             return None
         finer = [breaks[k] + (breaks[k + 1] - breaks[k]) * np.arange(n) / n for k, n in enumerate(parts)]
@@ -385,22 +387,23 @@ class _Search:
         x, u = in_time(x), in_time(u)
         t = problem.t0 + mesh.nodes * motion.T
         metadata = problem.module.metadata
-        optimum = Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
-                          {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
-                          motion.T, sum(r.iterations for r in records), tuple(records), float(errors.max()), errors, {}, None,
-                          made.multipliers(found.multipliers), *made.costates(found.multipliers, motion.T), self._kind(mesh),
-                          found.solved, found.message, 0.0, problem.t0 + mesh.breaks * motion.T, x, u)
-        simulated = None
-        difference = dict.fromkeys(metadata.x, np.nan)
-        if np.isfinite(found.z).all():
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")
-                    simulated = optimum.simulate()
+        return Optimum(problem.module, t, motion.X, np.asarray(u(t)), motion.p,
+                       {n: float(motion.p[k]) for n, k in zip(problem.free, problem.of.free, strict=True)}, found.cost,
+                       motion.T, sum(r.iterations for r in records), tuple(records), float(errors.max()), errors,
+                       dict.fromkeys(metadata.x, np.nan), None, made.multipliers(found.multipliers),
+                       *made.costates(found.multipliers, motion.T), self._kind(mesh), found.solved, found.message, 0.0,
+                       problem.t0 + mesh.breaks * motion.T, x, u)
+
+    def _simulated(self, optimum: Optimum) -> Optimum:
+        """With the motion by its inputs; where that cannot be computed, the difference stays not a number."""
+        simulated, difference = None, optimum.difference
+        if np.isfinite(optimum.x).all():
+            with contextlib.suppress(SymdynError), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                simulated = optimum.simulate()
                 if simulated.success:
-                    difference = dict(zip(metadata.x, np.abs(simulated.x - motion.X).max(axis=0).tolist(), strict=True))
-            except SymdynError:
-                pass  # the difference is not a number, which says so
+                    gaps = np.abs(simulated.x - optimum.x).max(axis=0).tolist()
+                    difference = dict(zip(difference, gaps, strict=True))
         return replace(optimum, simulated=simulated, difference=difference, seconds=clock.perf_counter() - self.begun)
 
     def _kind(self, mesh: Transcription) -> str:
@@ -408,12 +411,16 @@ class _Search:
             return f"Gauss-Radau of degree {mesh.degree}"
         return "Hermite-Simpson" if mesh.kind == "hermite-simpson" else "multiple shooting"
 
-    def _failed(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord]) -> NoOptimum:
-        """What to raise: what is violated, and by how much."""
+    def _failed(self, made: Discretized, found: Found, errors: np.ndarray, records: list[MeshRecord],
+                before: Optimum | None) -> NoOptimum:
+        """What to raise: what is violated, and by how much; with the optimum of the mesh before, if there is one."""
         owner = self.problem.module.name
-        optimum = self._optimum(made, found, errors, records)
+        optimum = self._simulated(before or self._optimum(made, found, errors, records))
         used_up = found.iterations >= self.chosen.max_iterations
-        head = f"{owner}: no optimal motion was found in {optimum.iterations} iterations ({found.message})"
+        n = sum(record.iterations for record in records)
+        head = f"{owner}: no optimal motion was found in {n} iterations ({found.message})"
+        if before is not None:
+            head += f" on a finer mesh of {made.mesh.n_intervals} intervals, that of {len(before.breaks) - 1} is kept"
         if used_up:
             return NoOptimum(f"{head}; {self._worst(made, found.z)}; allow more iterations, or begin with a better guess",
                              optimum)

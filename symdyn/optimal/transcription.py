@@ -36,12 +36,13 @@ class Transcription:
 
     breaks     (K + 1,) ends of the intervals, shares of the duration
     nodes      (N,) shares at which there are states; ends: indices of those at the breaks, (K + 1,)
-    samples    (M,) shares at which there are inputs; of_start, of_end: indices of those at the start and the end of the motion
+    samples    (M,) shares at which there are inputs, the last one those at the end
     at_state, at_inputs   (P,), (P, k) which state and which inputs the points of the field depend on; shares (P,) of these
-    E, W, b    the defects and the quadrature; interval (R,): in which interval a defect is, share (R,): when
+    E, W, b    the defects and the quadrature; share (R,): when a defect is
     corrected  (R,) index of the interval at whose end constraints are kept by a correction of this defect, -1 for others
     rates      (r, M) matrix of d inputs/d share; joints (j, M): jumps of the inputs between intervals
-    order      of the errors that are measured between points
+    order      of the errors that are measured between points; degree: of Radau's polynomials
+    of_inputs, of_states   from U, and from X and the rates F at the points, to polynomials over shares of the duration
     """
 
     kind: str
@@ -55,7 +56,6 @@ class Transcription:
     E: sp.csr_matrix
     W: sp.csr_matrix
     b: np.ndarray
-    interval: np.ndarray
     share: np.ndarray
     corrected: np.ndarray
     rates: sp.csr_matrix
@@ -100,7 +100,7 @@ def hermite_simpson(breaks: np.ndarray) -> Transcription:
         return whole
 
     return Transcription("hermite-simpson", breaks, nodes, np.arange(0, N, 2), nodes, np.arange(N), np.arange(N)[:, None], nodes,
-                         E.tocsr(), W.tocsr(), b, np.repeat(k, 2), nodes[1:], corrected, rates.tocsr(), sp.csr_matrix((0, N)), 4,
+                         E.tocsr(), W.tocsr(), b, nodes[1:], corrected, rates.tocsr(), sp.csr_matrix((0, N)), 4,
                          3, of_inputs, of_states)
 
 
@@ -138,7 +138,7 @@ def radau(breaks: np.ndarray, degree: int) -> Transcription:
 
     points = np.arange(P)
     return Transcription("radau", breaks, nodes, np.arange(0, N, d), nodes[1:], points + 1, points[:, None], nodes[1:], E, W, b,
-                         np.repeat(np.arange(K), d), nodes[1:], corrected, rates, joints.tocsr(), d + 1, d, of_inputs, of_states)
+                         nodes[1:], corrected, rates, joints.tocsr(), d + 1, d, of_inputs, of_states)
 
 
 def shooting(breaks: np.ndarray, hold: bool) -> Transcription:
@@ -159,7 +159,7 @@ def shooting(breaks: np.ndarray, hold: bool) -> Transcription:
         raise NotImplementedError("the states of shooting are those of its steps")
 
     return Transcription("shooting", breaks, breaks, np.arange(K + 1), samples, k, at_inputs, breaks[:-1], E.tocsr(),
-                         sp.identity(K, format="csr"), np.ones(K), k, breaks[1:], k.copy(), rates, sp.csr_matrix((0, M)), 4, 1,
+                         sp.identity(K, format="csr"), np.ones(K), breaks[1:], k, rates, sp.csr_matrix((0, M)), 4, 1,
                          of_inputs, of_states)
 
 

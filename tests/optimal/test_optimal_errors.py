@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import sympy as sp
 
 import symdyn as sd
+from symdyn.optimal import ipopt
 from symdyn.runtime.module import Module
 
 x, v, F = sp.symbols("x x_dot F")
@@ -138,6 +140,22 @@ def test_mesh_that_is_not_fine_enough(slider: Module) -> None:
     with pytest.warns(sd.OptimumWarning, match=r"the error of an interval is .* after 1 meshes, above the tolerance 1e-08"):
         found = sd.optimize(slider, sd.Loss(integral=F**2 + x**4), 2.0, end=REST, tolerance=1e-8, max_refinements=0, intervals=3)
     assert found.error > 1e-8 and len(found.meshes) == 1
+
+
+def test_a_finer_mesh_without_a_solution_keeps_that_of_the_mesh_before(slider: Module, monkeypatch: pytest.MonkeyPatch) -> None:
+    solve, calls = ipopt.solve, list[int]()
+
+    def second_fails(*given: Any) -> ipopt.Found:
+        calls.append(1)
+        found = solve(*given)
+        return replace(found, solved=False, message="Restoration Failed") if len(calls) == 2 else found
+
+    monkeypatch.setattr(ipopt, "solve", second_fails)
+    text = r"\(Restoration Failed\) on a finer mesh of .* intervals, that of 3 is kept; a motion that fulfils all conditions"
+    with pytest.raises(sd.NoOptimum, match=text) as error:
+        sd.optimize(slider, sd.Loss(integral=F**2 + x**4), 2.0, end=REST, tolerance=1e-9, intervals=3)
+    kept = error.value.optimum
+    assert kept.success and len(kept.breaks) == 4 and max(kept.difference.values()) < 1e-2
 
 
 def test_without_casadi(slider: Module, monkeypatch: pytest.MonkeyPatch) -> None:
