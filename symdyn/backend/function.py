@@ -44,6 +44,7 @@ class Function:
     inlined     steps that are written where they are used: which products and sums become one depends on it
     values      of a Jacobian by several columns at once: the function that computes what all columns share, n_v numbers v
     along       and for each group of arguments the derivatives along a direction in it
+    motion      of a right-hand side with sensitivities: what their directions are
     """
 
     name: str
@@ -62,6 +63,7 @@ class Function:
     inlined: frozenset[Node] = frozenset()
     values: Function | None = None
     along: tuple[Along, ...] = ()
+    motion: Motion | None = None
 
     @property
     def size(self) -> int:
@@ -88,3 +90,21 @@ class Along:
     first: int
     n: int
     function: Function
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The directions of sensitivities: entries of the state's columns, then inputs that are held, then what columns are by.
+
+    n_x      entries of a column; n: columns
+    values   where x_dot begins in what the directions share
+    held     number of inputs that are held, whose derivatives along the columns begin at parameter held_first
+    by       for each column the entry of the direction that is 1; -1: none
+    """
+
+    n_x: int
+    n: int
+    values: int
+    held: int
+    held_first: int
+    by: tuple[int, ...]

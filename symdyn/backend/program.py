@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from symdyn.backend.columns import Columns, seeds_of
+from symdyn.backend.columns import Columns, MotionColumns, seeds_of
 from symdyn.backend.dialect import Dialect
 from symdyn.backend.divide import divide
-from symdyn.backend.function import ARGUMENTS, Along, Function, Part
+from symdyn.backend.function import ARGUMENTS, Along, Function, Motion, Part
 from symdyn.backend.user_functions import called
 from symdyn.backend.writer import STOPPING, Writer, checks_of, cores_of
 from symdyn.tape.external import UserFunction
@@ -117,7 +117,8 @@ def _columns(columns: Columns, name: str, title: str, write: Callable[..., Funct
     moving = [node for node in tape.steps if node.mask & SEED]
     shared = dict.fromkeys(core for node in moving for core in cores_of(node.args)
                            if not core.mask & SEED and core.mask and core.op != "leaf" and core not in hoisted)
-    values = write(Tape(tape.recorder, {"v": Output("v", (len(shared),), tuple(shared))}), name=f"{name}_values", title=title,
+    kept = (*shared, *columns.values)
+    values = write(Tape(tape.recorder, {"v": Output("v", (len(kept),), kept)}), name=f"{name}_values", title=title,
                    dividing=moving)
     stored = {**hoisted, **{node: ("v", k) for k, node in enumerate(shared)}}
     along = []
@@ -129,8 +130,14 @@ def _columns(columns: Columns, name: str, title: str, write: Callable[..., Funct
         along.append(Along(group.first, len(group.seeds), function))
     groups = {g for f in (values, *[a.function for a in along]) for g in f.arguments}
     operations = count_of([n for n in tape.steps if n.op != "leaf" and n not in hoisted])
-    return Function(name, title, (*columns.shape, columns.n), tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
-                    (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along))
+    motion = None
+    if isinstance(columns, MotionColumns):
+        n_p = sum(group == "p" for group, _ in places.values())
+        motion = Motion(columns.n_rows, columns.n, len(shared), columns.held, n_p - columns.n * columns.held,
+                        tuple(-1 if k is None else k for k in columns.by))
+        groups |= {"z", *["p"] * bool(columns.held)}
+    return Function(name, title, columns.result_shape, tuple(g for g in ARGUMENTS if g in groups - {"v", "change"}),
+                    (), (), (), operations, tape.longest_chain(), values=values, along=tuple(along), motion=motion)
 
 
 def _function(dialect: Dialect, tape: Tape, places: Mapping[str, tuple[str, int]], hoisted: Mapping[Node, tuple[str, int]],

@@ -29,6 +29,11 @@ class RightSide:
     held: tuple[str, ...] = ()
 
     @property
+    def in_lanes(self) -> bool:
+        """Whether sensitivities may be columns in SIMD lanes: a series takes every statement of x_dot."""
+        return bool(self.sensitivities) and self.method != "taylor"
+
+    @property
     def label(self) -> str:
         """Plain words for messages."""
         parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte),

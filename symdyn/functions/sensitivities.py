@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from symdyn.backend.columns import Group, MotionColumns
 from symdyn.formulation.adjoint import weight_names
 from symdyn.formulation.equations import Equations, Symbols
 from symdyn.formulation.sensitivities import direction_names
 from symdyn.spatial.vectors import vector
-from symdyn.tape.differentiate import reverse
-from symdyn.tape.node import ACCELERATION, PARAMETER, STATE
+from symdyn.tape.differentiate import reverse, seed_name
+from symdyn.tape.node import ACCELERATION, PARAMETER, SEED, STATE
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import Output, Tape
 
@@ -66,6 +67,23 @@ def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held:
     of = "events" if name == OF_EVENTS else "event_resets"
     parts = [equations.quantity(f"{of}_rate"), *[_with(equations, f"{of}_variation", column) for column in columns]]
     return _tape(equations, name, np.array(parts, dtype=object).T)
+
+
+def motion_columns(equations: Equations, sensitivities: Sequence[str], held: Sequence[str]) -> MotionColumns:
+    """The right-hand side with these columns as x_dot and its derivative along a direction, the same code for every column."""
+    symbols, recorder = equations.symbols, equations.recorder
+    states = [s.name for s in (*symbols.coordinates, *symbols.speeds, *symbols.states)]
+    by = dict.fromkeys(name for name in sensitivities if name and name not in held)
+    moving = [*states, *held, *by]
+    seeds = {name: recorder.leaf(seed_name(name), SEED) for name in moving}
+    given = [*states, *[s.name for s in (*symbols.inputs, *symbols.parameters)]]
+    leaves = [recorder.leaf(name, ACCELERATION) for name in direction_names(symbols)]
+    at = {leaf: seeds.get(name, 0) for leaf, name in zip(leaves, given, strict=True)}
+    along = substitute(tuple(equations.quantity("rhs_variation")), at, recorder)
+    tape = _tape(equations, "rhs", vector(*equations.quantity("rhs"), *along))
+    groups = (Group("columns", tuple(map(seed_name, moving)), 0),)
+    return MotionColumns(tape, groups, (len(along),), len(sensitivities), len(held),
+                         tuple(moving.index(name) if name in by else None for name in sensitivities))
 
 
 def adjoint_tape_of(equations: Equations, name: str, by: Sequence[str]) -> Tape:

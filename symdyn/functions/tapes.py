@@ -124,7 +124,10 @@ def columns_of(equations: Equations, name: str, right_side: RightSide) -> Column
 
 
 def all_columns_of(equations: Equations, name: str, right_side: RightSide) -> Columns | None:
-    """The derivatives along directions that a matrix of derivatives consists of; None for other functions."""
+    """The derivatives along directions that a matrix of derivatives, or a right-hand side with sensitivities, consists of; None
+    for other functions."""
+    if name == "rhs" and right_side.sensitivities:
+        return columns.motion_columns(equations, right_side.sensitivities, right_side.held) if right_side.in_lanes else None
     second = second_named(name)
     if second is not None and second[0] == "hessian":
         return _columns_of_hessian(equations, name, second[1])

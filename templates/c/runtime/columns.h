@@ -1,10 +1,7 @@
 // Jacobians by derivatives along directions, a direction in each lane.
 #pragma once
 
-#include "vector_type.h"
-
-// a*b + c of numbers and vectors.
-#define MADD_EACH(a, b, c) symdyn_each_madd(VECTOR(a), VECTOR(b), VECTOR(c))
+#include "each.h"
 
 // Directions along the entries first, first + 1, ... of n, one in each lane; those past the end are zero. Whole vectors are
 // stored: a load of a vector would wait for lanes that are stored one by one.
