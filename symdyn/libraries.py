@@ -57,7 +57,8 @@ class Libraries:
             names = groups.of_right_side(self.equations, what)
             return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                         work=what.work, baumgarte=what.baumgarte, method=what.method,
-                        sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held)
+                        sensitivities=what.sensitivities, adjoint=what.adjoint, held=what.held,
+                        followed=what.followed)
         names = groups.with_function(self.equations, what)
         return emit(self.equations, self.backend, names, self.templates, standalone=False, specialize=self.specialize,
                     batch=what == BATCH)

@@ -19,7 +19,7 @@ from symdyn.runtime.solutions.solution import Solution
 
 # Methods that other parts of symdyn call; a Campbell diagram needs a rotor, which tests/runtime/test_campbell.py has.
 WITHOUT = {"Module.following", "Module.motions_at", "Module.split_outputs", "Module.unit", "Module.noting", "Module.campbell",
-           "Solution.states_and_columns"}
+           "Solution.states_and_columns", "Solution.input_slopes"}
 
 
 def _public() -> Iterator[tuple[str, Any]]:

@@ -18,6 +18,7 @@ class RightSide:
     method      of the integrator, one of symdyn.backend.methods.METHODS
     sensitivities   what the state is differentiated by along the motion, a column each: parameters, inputs, "" for initial values
     held        inputs whose derivatives along the columns are parameters: those of x_dot by them count, too
+    followed    inputs that follow the state by a function of the user, whose derivatives along the columns are further inputs
     adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
@@ -27,6 +28,7 @@ class RightSide:
     sensitivities: tuple[str, ...] = ()
     adjoint: tuple[str, ...] | None = None
     held: tuple[str, ...] = ()
+    followed: tuple[str, ...] = ()
 
     @property
     def in_lanes(self) -> bool:

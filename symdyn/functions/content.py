@@ -53,7 +53,7 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
               "z": [*[s.name for s in symbols.states], *[WORK] * right_side.work,
                     *column_names(symbols, right_side.sensitivities)], "ud": given_rates(equations, names),
-              "inputs": [s.name for s in symbols.inputs],
+              "inputs": [*[s.name for s in symbols.inputs], *held_names(right_side.sensitivities, right_side.followed)],
               "p": [*[s.name for s in symbols.parameters if s.name not in bound], *[BAUMGARTE] * right_side.baumgarte,
                     *held_names(right_side.sensitivities, right_side.held)]}
     outputs = output_shapes(equations) if "outputs" in names else ()

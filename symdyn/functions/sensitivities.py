@@ -17,7 +17,7 @@ from symdyn.formulation.equations import Equations, Symbols
 from symdyn.formulation.sensitivities import direction_names
 from symdyn.spatial.vectors import vector
 from symdyn.tape.differentiate import reverse, seed_name
-from symdyn.tape.node import ACCELERATION, PARAMETER, SEED, STATE
+from symdyn.tape.node import ACCELERATION, INPUT, PARAMETER, SEED, STATE
 from symdyn.tape.passes import substitute
 from symdyn.tape.tape import Output, Tape
 
@@ -37,7 +37,8 @@ def column_names(symbols: Symbols, sensitivities: Sequence[str]) -> list[str]:
 
 
 def held_names(sensitivities: Sequence[str], held: Sequence[str]) -> list[str]:
-    """Names of the derivatives of inputs along all columns, which are extra parameters."""
+    """Names of the derivatives of inputs along all columns, which are extra parameters, or extra inputs of those that follow the
+    state."""
     return [f"(d {name} by {k + 1})" for k in range(len(sensitivities)) for name in held]
 
 
@@ -53,9 +54,11 @@ def adjoints_of(equations: Equations) -> tuple[str, ...]:
     return (ADJOINT, *([CORRECTED_ADJOINT] if equations.constraints or equations.unit_groups else ()))
 
 
-def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held: Sequence[str] = ()) -> Tape:
-    """The tape of rhs, or of one of the functions above, with these columns, along which inputs that are held change, too."""
-    columns = _columns(equations, sensitivities, held)
+def tape_of(equations: Equations, name: str, sensitivities: Sequence[str], held: Sequence[str] = (),
+            followed: Sequence[str] = ()) -> Tape:
+    """The tape of rhs, or of one of the functions above, with these columns, along which inputs that are held, or that follow the
+    state, change, too."""
+    columns = _columns(equations, sensitivities, held, followed)
     if name == "rhs":
         # As a matrix where many directions share it: measured, the counts meet where there are half as many as states.
         way = "rhs_variation_by_matrix" if 2 * len(columns) > len(columns[0]["x"]) else "rhs_variation"
@@ -107,16 +110,16 @@ def _tape(equations: Equations, name: str, values: np.ndarray) -> Tape:
     return Tape(equations.recorder, {name: Output.of(name, values)})
 
 
-def _columns(equations: Equations, sensitivities: Sequence[str], held: Sequence[str]) -> list[dict[str, Any]]:
+def _columns(equations: Equations, sensitivities: Sequence[str], held: Sequence[str],
+             followed: Sequence[str]) -> list[dict[str, Any]]:
     """Of each column x, the leaves of its entries, and all, what stands for the direction, by name."""
     symbols, recorder = equations.symbols, equations.recorder
     n_x = len(symbols.coordinates) + len(symbols.speeds) + len(symbols.states)
     leaves = [recorder.leaf(name, STATE) for name in column_names(symbols, sensitivities)]
     given = [s.name for s in (*symbols.inputs, *symbols.parameters)]
-    along = dict(zip(held_names(sensitivities, held), [recorder.leaf(name, PARAMETER) for name in
-                                                       held_names(sensitivities, held)], strict=True))
-    return [{"x": leaves[k * n_x:(k + 1) * n_x],
-             "by": [along[f"(d {name} by {k + 1})"] if name in held else int(name == by) for name in given]}
+    along = {name: recorder.leaf(name, kind) for names, kind in ((held, PARAMETER), (followed, INPUT))
+             for name in held_names(sensitivities, names)}
+    return [{"x": leaves[k * n_x:(k + 1) * n_x], "by": [along.get(f"(d {name} by {k + 1})", int(name == by)) for name in given]}
             for k, by in enumerate(sensitivities)]
 
 

@@ -99,7 +99,7 @@ def tapes_of(equations: Equations, names: Sequence[str], right_side: RightSide) 
     of_columns = right_side.sensitivities
     with_columns = ("rhs", *columns.COLUMNS) if of_columns else ()
     adjoint = right_side.adjoint or ()
-    tapes = {name: columns.tape_of(equations, name, of_columns, right_side.held) if name in with_columns else
+    tapes = {name: columns.tape_of(equations, name, of_columns, right_side.held, right_side.followed) if name in with_columns else
              columns.adjoint_tape_of(equations, name, adjoint) if name in columns.ADJOINTS else tape_as_derived(equations, name)
              for name in names}
     if work or baumgarte:

@@ -30,6 +30,8 @@ class Smooth:
 
     Methods that cannot find such places, as "gauss", take declared functions alone:
     `inputs={"F": sd.Smooth(lambda t, x: ...)}`.
+    gradient   f(t, x) -> derivatives of the value by the state, (n_x,), of a function for all inputs one row for each: what
+               sensitivities of the motion need where the value depends on the state; None: not known
     Raises ArgumentError for what cannot be called.
 
     >>> force = sd.Smooth(lambda t, x: 2.0 - x[0])
@@ -38,8 +40,11 @@ class Smooth:
     """
 
     function: Callable[[float, np.ndarray], Row]
+    gradient: Callable[[float, np.ndarray], Row | Sequence[Row]] | None = None
 
     def __post_init__(self) -> None:
+        if not (self.gradient is None or callable(self.gradient)):
+            raise ArgumentError(f"the gradient of sd.Smooth must be a function of (t, x), or None, found {self.gradient!r}")
         if not callable(self.function):
             raise ArgumentError(f"sd.Smooth declares that a function of (t, x) is smooth, found {self.function!r}; constants "
                                 "need no declaration, and tables have kinks")
@@ -90,6 +95,7 @@ class Inputs:
     samplers   controllers that set some of the constants at instants; until then these have their initial values
     record     the values of these as the controllers held them in a run, in place of samplers
     motions    those that inputs follow; None: there are none, or they stand still
+    gradients  of functions that have one: places of the inputs, derivatives of their values by the state, what messages call it
     """
 
     constant: np.ndarray
@@ -100,6 +106,21 @@ class Inputs:
     samplers: tuple[Sampler, ...] = ()
     record: Record | None = None
     motions: Motions | None = None
+    gradients: tuple[tuple[tuple[int, ...], Callable[[float, np.ndarray], Any], str], ...] = ()
+
+    def slopes(self, t: float, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Derivatives of the inputs along columns (k, n_x) of sensitivities, (n_in, k), by the gradients of functions. Raises
+        InputRaised from what these raise, ArgumentError for what does not fit."""
+        found = np.zeros((len(self.constant), len(columns)))
+        for places, gradient, what in self.gradients:
+            given = called(gradient, t, x.copy(), what)
+            try:
+                rows = np.asarray(given, dtype=float).reshape(len(places), len(x))
+            except (TypeError, ValueError):
+                raise ArgumentError(f"{what} returned {shown(given)} at t = {t:.6g}; needed are {len(x)} numbers for each of its "
+                                    "inputs") from None
+            found[list(places)] = rows @ columns.T
+        return found
 
     @property
     def has_kinks(self) -> bool:
@@ -241,7 +262,9 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     if isinstance(given, Sampled):
         return Inputs(start, samplers=(Sampler(given, tuple(range(len(names))), "the sampled controller"),))
     if callable(given):
-        return Inputs(start, function=partial(_asked, _undeclared(given), "the input function"), smooth=isinstance(given, Smooth))
+        asked = partial(_asked, _undeclared(given), "the input function")
+        return Inputs(start, function=asked, smooth=isinstance(given, Smooth),
+                      gradients=_gradients({"the input function": (given, range(len(names)))}))
     if is_table(given):
         table = _table(given, for_pairs, names, owner, span)
         return Inputs(start, pieces=table.pieces, kinks=table.pieces.breaks)
@@ -274,7 +297,15 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(constant, pieces=pieces, kinks=kinks, samplers=samplers, motions=along)
     mixed = Mixed(constant, pieces, tuple((places[n], n, f) for n, f in functions.items()), by_function)
     smooth = all(isinstance(varying[n], Smooth) for n in functions) and all(m.smooth or m.breaks for m in by_function)
-    return Inputs(constant, function=mixed, kinks=kinks, smooth=smooth, samplers=samplers, motions=along)
+    of = {f"the function of input {n}": (varying[n], [places[n]]) for n in functions}
+    return Inputs(constant, function=mixed, kinks=kinks, smooth=smooth, samplers=samplers, motions=along,
+                  gradients=_gradients(of))
+
+
+def _gradients(given: Mapping[str, tuple[Any, Sequence[int]]]) -> tuple[tuple[tuple[int, ...], Any, str], ...]:
+    """Those of functions that have one; given: how messages call a function -> the function and the places of its inputs."""
+    return tuple((tuple(places), value.gradient, f"the gradient of {what}") for what, (value, places) in given.items()
+                 if isinstance(value, Smooth) and value.gradient is not None)
 
 
 def inputs_at(given: Any, t: float, names: Sequence[str], initial: Mapping[str, float], owner: str,

@@ -119,6 +119,11 @@ class Record:
         found: np.ndarray = self.values[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
         return found
 
+    def slopes(self, t: np.ndarray) -> np.ndarray:
+        """Derivatives of the inputs along columns of sensitivities at times (n,), (n, n_in, k)."""
+        found: np.ndarray = self.columns[np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)]
+        return found
+
     def put(self, t: Any, values: np.ndarray) -> np.ndarray:
         """Inputs at times with what was held in place of the values (n_in,), or (n, n_in) or (1, n_in) for (n,) times."""
         places, held = list(self.places), self.rows(t)

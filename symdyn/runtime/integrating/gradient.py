@@ -161,6 +161,10 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
     if not asked.names:
         raise ArgumentError(f"{module.name}: a gradient by nothing was asked for; name parameters, inputs or initial values")
     check_compiled(module, request, method)
+    if request.inputs.gradients:
+        raise ArgumentError(f"{module.name}: a gradient was asked for, but the way back does not go through functions of "
+                            "inputs that follow the state; write the law into the system's loads, or take simulate(..., "
+                            "sensitivities=[...])")
     return method
 
 

@@ -43,8 +43,8 @@ class Request:
     stabilization   what keeps the state on its constraints
     carried   of events, where the run goes on from the end of another one
     event_spacing   of the samples of events at the most, s; 0: as they vary
-    input_columns   derivatives of inputs that are held along the columns, (n_in, n_columns)
-    columns, held   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
+    input_columns   derivatives of inputs that are held along the columns, (n_held, n_columns)
+    columns, held, followed   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
     """
 
     span: tuple[float, float]
@@ -64,6 +64,7 @@ class Request:
     event_spacing: float = 0.0
     columns: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
+    followed: tuple[str, ...] = ()
     input_columns: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property

@@ -74,7 +74,9 @@ class Asked:
         part = 1.0 / np.sqrt(1.0 + len(self.columns))
         of_columns = part * request.atol / self.sizes[:, None] if controlled else np.full(self.starts.shape, _ANY)
         names = [name for k, name in enumerate(inputs) if k in request.inputs.places] if request.inputs.are_held else []
-        return replace(request, held=tuple(names), x0=np.concatenate([request.x0, self.starts.ravel()]), rtol=part * request.rtol,
+        followed = [inputs[place] for places, *_ in request.inputs.gradients for place in places]
+        return replace(request, held=tuple(names), followed=tuple(followed), rtol=part * request.rtol,
+                       x0=np.concatenate([request.x0, self.starts.ravel()]),
                        atol=np.concatenate([part * request.atol, of_columns.ravel()]), columns=self.columns)
 
     def check(self, module: Module, request: Request, method: Any, work: bool) -> None:
@@ -99,10 +101,13 @@ class Asked:
         if any(one.sampled.gradient is None for one in request.inputs.samplers):
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but the derivatives of a sampled controller by "
                                 "the state are not known; pass sd.Sampled(function, period, gradient=...), a function of (t, x)")
-        if _depends_on_state(request):
+        unknown = _depend_on_state(request) - {place for places, *_ in request.inputs.gradients for place in places}
+        if unknown:
+            names = ", ".join(metadata.inputs[k] for k in sorted(unknown))
             raise ArgumentError(f"{module.name}: sensitivities were asked for, but inputs follow the state through a function of "
-                                "the user, whose derivatives are not known; write the law into the system's loads as expressions "
-                                "of coordinates and speeds, or make the inputs functions of the time alone")
+                                f"the user, whose derivatives are not known: {names}; pass sd.Smooth(function, gradient=...), a "
+                                "function of (t, x), write the law into the system's loads as expressions of coordinates and "
+                                "speeds, or make the inputs functions of the time alone")
 
     def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
         """What to warn of: columns in which everything is zero all along, jumps that no event looks for."""
@@ -116,13 +121,14 @@ class Asked:
             if nothing else []
 
 
-def _depends_on_state(request: Request) -> bool:
-    """Whether a function of inputs gives others where every entry of the state is another one."""
+def _depend_on_state(request: Request) -> set[int]:
+    """Places of inputs that a function gives other values where every entry of the state is another one."""
     if request.inputs.function is None:
-        return False
+        return set()
     t, x = request.span[0], request.x0[:request.n_state]
     here = request.inputs.at(t, x)
-    return any(not np.array_equal(here, request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x)))) for way in (-1.0, 1.0))
+    sides = [request.inputs.at(t, x + way * (0.01 + 0.01 * np.abs(x))) for way in (-1.0, 1.0)]
+    return set(np.flatnonzero((here != sides[0]) | (here != sides[1])).tolist())
 
 
 def unseen_jumps(module: Module, request: Request, outcome: Outcome) -> list[str]:

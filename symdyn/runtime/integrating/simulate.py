@@ -157,7 +157,7 @@ def _run_smooth(module: Module, request: Request, method: Any, bar: Any = None) 
 
         return run_ggl(module, request, bar)
     field = RightSide(work=request.works, baumgarte=request.stabilization.way == "baumgarte", sensitivities=request.columns,
-                      held=request.held)
+                      held=request.held, followed=request.followed)
     run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
     return run(module, request, method, bar, field)
 

@@ -83,10 +83,11 @@ class Sensitivity(Mapping[Any, np.ndarray]):
         solution = self._solution
         metadata, inputs = solution.module.metadata, solution.inputs
         given = [*metadata.inputs, *metadata.parameters]
-        parts = []
+        parts, along = [], solution.input_slopes(np.swapaxes(self.matrix, 1, 2))
         for k, by in enumerate(self._columns):
             direction = np.zeros((len(solution.t), metadata.sizes.x + len(given)))
             direction[:, :metadata.sizes.x] = self.matrix[:, :, k]
+            direction[:, metadata.sizes.x:metadata.sizes.x + metadata.sizes.inputs] = along[:, :, k]
             if by:
                 direction[:, metadata.sizes.x + given.index(by)] = 1.0
             parts.append(solution.module.split_outputs(

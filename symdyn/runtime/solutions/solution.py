@@ -314,6 +314,12 @@ class Solution:
         """
         return self._work is not None
 
+    def input_slopes(self, columns: np.ndarray) -> np.ndarray:
+        """Derivatives of inputs that controllers hold, or that follow the state, along columns (n_t, k, n_x), (n_t, n_in, k)."""
+        given, shape = self._inputs, (len(self.t), self.module.metadata.sizes.inputs, columns.shape[1])
+        rows = [given.slopes(t, x, row) for t, x, row in zip(self.t.tolist(), self.x, columns, strict=True)]
+        return np.array(rows).reshape(shape) + (0.0 if given.record is None else given.record.slopes(self.t))
+
     @property
     def inputs(self) -> np.ndarray:
         """The inputs at every time, (n_t, n_in), as they were when the run ended; at an instant of a sampled controller those
