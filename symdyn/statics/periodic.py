@@ -23,6 +23,7 @@ from symdyn.runtime.masses import real_parameters
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.given import Key
     from symdyn.runtime.module import Module
     from symdyn.runtime.solutions.solution import Solution
 
@@ -68,7 +69,7 @@ class PeriodicMotion:
         """The motion over a period, at n times."""
         return self._problem.solution(self.x, self.period, n)
 
-    def follow(self, name: Any, values: Sequence[float]) -> list[PeriodicMotion]:
+    def follow(self, name: Key, values: Sequence[float]) -> list[PeriodicMotion]:
         """The periodic motions at other values of a parameter, one after the other, each sought from the one before along its
         derivative by the parameter.
 
@@ -93,6 +94,19 @@ class PeriodicMotion:
                                     f"{motion.params[point]:g}") from None
             found.append(motion)
         return found
+
+    def branch(self, name: Key, least: float, most: float, step: float = 0.1, n: int = 200) -> list[PeriodicMotion]:
+        """The periodic motions on the branch of this one over a parameter, past folds, where the parameter turns back.
+
+        least, most   of the parameter: where it leaves them the branch ends
+        step          along the branch, relative to the sizes of the state, the period and the parameter; the longest one, halved
+                      where the branch is bent; negative: it begins with smaller values of the parameter
+        n             motions at most
+        Raises ArgumentError for what does not fit, NoEquilibrium where the branch is lost, with the value.
+        """
+        from symdyn.statics.branches import branch
+
+        return branch(self, name, least, most, step, n)
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{abs(m):.4g}" for m in self.multipliers[:4])
@@ -132,8 +146,7 @@ class _Problem:
         """The periodic motion near a start and a period."""
         x = Projector(self.module, self.p)(self.t, x)
         here = self.shot(x, period)
-        scale = max(float(np.abs(x).max()), float(np.abs(here.end).max()), 1e-3)
-        enough = CLOSED * self.rtol * scale
+        scale, enough = _size(x, here.end), self.enough(x, here.end)
         for iteration in range(ITERATIONS):
             if np.abs(here.gap).max() <= enough:
                 return self.found(here, iteration)
@@ -146,6 +159,10 @@ class _Problem:
         raise NoEquilibrium(f"{self.module.name}: no periodic motion found near the start with the period {period:.6g} s: after "
                             f"{here.period:.6g} s {self.module.metadata.x[worst]} is off by {here.gap[worst]:.3g}; begin nearer "
                             "to it, with a state that a simulation has settled to")
+
+    def enough(self, x: np.ndarray, end: np.ndarray) -> float:
+        """The gap of a motion that counts as closed."""
+        return CLOSED * self.rtol * _size(x, end)
 
     def nearer(self, here: _Shot, step: np.ndarray, scale: float) -> _Shot | None:
         """A motion with a smaller gap on the way of a step, None if there is none."""
@@ -214,6 +231,10 @@ class _Problem:
         if not run.success or run.t[-1] != times[-1]:
             raise EvaluationError(f"{self.module.name}: the motion does not last for a period: {run.message}")
         return run
+
+
+def _size(x: np.ndarray, end: np.ndarray) -> float:
+    return max(float(np.abs(x).max()), float(np.abs(end).max()), 1e-3)
 
 
 @dataclass(frozen=True)

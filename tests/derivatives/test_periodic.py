@@ -13,6 +13,7 @@ import sympy as sp
 import symdyn as sd
 from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.runtime.building.compiler import find_compiler
+from symdyn.statics import branches
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
@@ -50,6 +51,66 @@ def test_followed_over_a_parameter() -> None:
     assert all(one.stable for one in found) and found[3].params[list(oscillator().metadata.parameters).index("mu")] == 5
     with pytest.raises(ArgumentError, match="followed over 'nu', which is no parameter; there are"):
         found[0].follow("nu", [1])
+
+
+@cache
+def bent() -> Any:
+    """Circles r with mu + r^2 - r^4 = 0, which meet in a fold at mu = -1/4: r' = r (mu + r^2 - r^4), angle' = 2."""
+    a, b, x = sd.coordinates("a b x")
+    mu, m = sd.parameters("mu m")
+    system = sd.System("bent")
+    body = system.add_body("body", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, x, axis=[1, 0]))
+    system.add_joint_force(joint, -x - 2 * x.dot)
+    growth = mu + (a**2 + b**2) - (a**2 + b**2) ** 2
+    system.add_state(a, a * growth - 2 * b)
+    system.add_state(b, b * growth + 2 * a)
+    system.defaults, system.initial = {mu: -0.1, m: 1}, {a: 0.94}
+    return system.embedding().compile()
+
+
+def test_branch_past_a_fold() -> None:
+    """Radii R = r^2, periods and multipliers exp(pi (2 R - 4 R^2)) in closed form, on both sides of the fold."""
+    found = bent().periodic(3.0, z={"a": 0.94}, rtol=1e-11).branch("mu", -1, -0.05, step=-0.2)
+    mu = np.array([one.params[1] for one in found])
+    R = np.array([one.x[2] ** 2 + one.x[3] ** 2 for one in found])
+    assert np.abs(mu + R - R**2).max() < 2e-8 and mu.min() < -0.24 and mu[-1] > -0.07 and R[0] > 0.8 and R[-1] < 0.1
+    assert all(abs(one.period - np.pi) < 1e-9 for one in found)
+    assert [one.stable for one in found] == [bool(r > 0.5) for r in R]
+    for one, r in zip(found, R, strict=True):
+        assert np.abs(one.multipliers - np.exp(np.pi * (2 * r - 4 * r**2))).min() < 1e-6
+    few = bent().periodic(3.0, z={"a": 0.94}).branch("mu", -1, 1, step=0.05, n=3)
+    assert len(few) == 3 and few[0].params[1] > -0.1
+
+
+def test_branches_that_are_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    orbit = bent().periodic(3.0, z={"a": 0.94})
+    for arguments, text in ((("nu", 0, 1), "over 'nu', which is no parameter; there are m, mu"),
+                            (("mu", 0, 1), r"mu = -0.1 is not between the ends 0 and 1 of the branch"),
+                            (("mu", -1, 1, 0), "the step along the branch is 0; pass a positive number, or a negative one"),
+                            (("mu", -1, 1, 0.1, 0), "a branch of 0 motions was asked for; pass a whole number from 1 on")):
+        with pytest.raises(ArgumentError, match=text):
+            orbit.branch(*arguments)
+    monkeypatch.setattr(branches, "ITERATIONS", 0)
+    with pytest.raises(NoEquilibrium, match=r"the branch of periodic motions over mu is lost after 0 motions, at mu = -0.1"):
+        orbit.branch("mu", -1, 1)
+
+
+def test_forced_branch_of_a_given_period() -> None:
+    """Duffing's oscillator: the time appears, so that the period stays; its response has two folds over the force."""
+    q = sd.coordinates("q")
+    m, force = sd.parameters("m force")
+    system = sd.System("duffing")
+    body = system.add_body("body", mass=m)
+    joint = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=q))
+    system.add_joint_force(joint, force * sp.cos(2 * sd.t) - 0.1 * q.dot - q - q**3)
+    system.defaults = {m: 1, force: 0.1}
+    found = system.embedding().compile().periodic(np.pi, [0.0], [0.0]).branch("force", 0, 3, step=0.4, n=80)
+    forces = np.array([one.params[1] for one in found])
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(forces))))
+    assert len(turns) == 2 and all(one.period == np.pi and one.residual < 1e-6 for one in found)
+    stable, parts = np.array([one.stable for one in found]), np.split(np.arange(len(found)), turns + 1)
+    assert [stable[part[1:-1]].all() for part in parts] == [True, False, True] and not stable[parts[1][1:-1]].any()
 
 
 def test_forced_oscillator_against_its_closed_form() -> None:
