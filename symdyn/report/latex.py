@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Letters in a line of an A4 page at 11 pt, roughly.
 WIDTH = 80
 NARROWEST = 20
+# Letters that may follow a macro of MathJax, with some to spare.
+EXPANDED = 4500
 # Named steps with fewer operations than this are written out.
 WORTH_A_NAME = 3
 
@@ -59,8 +61,13 @@ class Typeset:
 
 
 def without_macros(text: str) -> str:
-    r"""LaTeX for MathJax, which expands \bigl in no more than 5 kB: \mathopen{\big[} is no macro there."""
-    return text.replace(r"\bigl[", r"\mathopen{\big[}").replace(r"\bigr]", r"\mathclose{\big]}")
+    r"""LaTeX for MathJax, which expands \bigl, \mathbf and \textbf where no more than 5 kB follow: \mathopen{\big[} and {\bf M}
+    are no macros there."""
+    text = text.replace(r"\bigl[", r"\mathopen{\big[}").replace(r"\bigr]", r"\mathclose{\big]}")
+    if len(text) <= EXPANDED:
+        return text
+    text = re.sub(r"\\mathbf\{([^{}]*)\}", r"{\\bf \1}", text)
+    return re.sub(r"\\textbf\{([^{}]*)\}", r"{\\bf\\text{\1}}", text)
 
 
 def latex(value: Scalar | Matrix | Equations, name: str = "", shorthand: bool = False, width: int = WIDTH) -> Typeset:
