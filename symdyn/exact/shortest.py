@@ -448,10 +448,20 @@ def _taken_out(e: Any) -> Any:
     return sp.Mul(common, _taken_out(inside)) + _taken_out(sp.Add(*[sp.Mul(*term) for term in terms if common not in term]))
 
 
+def _is_square(value: Any) -> bool:
+    return isinstance(value, Node) and value.op == "mul" and value.args[0] is value.args[1]
+
+
+def _is_root_of_square(e: Any) -> bool:
+    return bool(e.is_Pow and abs(e.exp) == sp.Rational(1, 2) and e.base.is_Pow and e.base.exp == 2)
+
+
 def _as_derived(entry: Node, symbols: Mapping[Node, sp.Expr], size: float, near: float) -> tuple[sp.Expr, int]:
     """As it stands on the tape, and its operations; where these are no more than `near`, common factors are taken out of sums if
     that is shorter and does not take long."""
     found = expand(Output.of("entry", entry), symbols)
+    if any(node.op == "sqrt" and _is_square(node.args[0]) for node in reachable([entry])):
+        found = found.replace(_is_root_of_square, lambda root: sp.Abs(root.base.base) ** (2 * root.exp))
     count = int(sp.count_ops(found))
     if size > FACTOR_TERMS or count > near:
         return found, count

@@ -151,3 +151,19 @@ def test_values_are_bounded_together(monkeypatch):
     monkeypatch.setattr("symdyn.exact.ring.KEPT", 50)
     with pytest.raises(TooLarge, match="values have more than 50 terms together"):
         shortest(sp.Add(*[a**k * b**(20 - k) for k in range(20)]))
+
+
+def test_springs_along_an_axis_have_absolute_values_in_place_of_roots_of_squares():
+    x = sd.coordinates("x")
+    m, k, d, rest = sd.parameters("m k d L", positive=True)
+    system = sd.System("spring")
+    body = system.add_body("body", mass=m)
+    system.add_joint(sd.Prismatic("rail", system.ground, body, axis=[1, 0, 0], coordinate=x))
+    system.add_spring_damper(system.ground, body, point_a=[-d, 0, 0], stiffness=k, length=rest)
+    eq = system.embedding()
+    assert str(eq.V) == "k*(L - Abs(d + x))**2/2" and not any(e.exp == sp.Rational(1, 2) for e in eq.F_tilde.atoms(sp.Pow))
+    for value in (sp.Rational(7, 3), sp.Rational(-19, 3)):  # on both sides of the point
+        numbers = {x: value, k: sp.Rational(5, 2), d: sp.Rational(1, 3), rest: sp.Rational(4, 3)}
+        assert eq.V.subs(numbers) == sp.Rational(5, 4) * (sp.Rational(4, 3) - abs(value + sp.Rational(1, 3))) ** 2
+        force = -sp.Rational(5, 2) * (abs(value + sp.Rational(1, 3)) - sp.Rational(4, 3)) * sp.sign(value + sp.Rational(1, 3))
+        assert eq.F_tilde[0].subs(numbers) == force
