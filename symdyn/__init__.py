@@ -52,7 +52,7 @@ _HOME = {
 _WHERE = {name: module for module, names in _HOME.items() for name in names}
 _PACKAGES = {name: f"symdyn.{name}" for name in ("bench", "frames", "lecture", "rotation", "stress", "systems")} | {
     name: f"symdyn.comparison.{name}" for name in ("conventions", "proofs")} | {
-    "contacts": "symdyn.model.contacts.shapes", "shapes": "symdyn.model.shapes"}
+    "contacts": "symdyn.model.contacts", "shapes": "symdyn.model.shapes"}
 
 __all__ = [*_WHERE, *_PACKAGES, "t"]
 

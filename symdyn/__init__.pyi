@@ -110,6 +110,7 @@ from symdyn.formulation.by_hand.augmented import augmented as augmented
 from symdyn.formulation.by_hand.embedding import embedding as embedding
 from symdyn.frames import Frame as Frame
 from symdyn.frames import rate as rate
+from symdyn.model import contacts as contacts
 from symdyn.model import shapes as shapes
 from symdyn.model.closures import Gear as Gear
 from symdyn.model.closures import Rod as Rod

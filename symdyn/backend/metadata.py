@@ -134,6 +134,13 @@ class ContactRecord(NamedTuple):
         return (self.closed, *([self.sticking] if self.sticking else ()), *self.sliding)
 
 
+class CompliantRecord(NamedTuple):
+    """A compliant contact in one place, and its number of rows."""
+
+    name: str
+    rows: int
+
+
 class Chart(NamedTuple):
     """Euler angles of a joint: their sequence, the kind of its speeds, the coordinate of the second angle."""
 
@@ -177,7 +184,7 @@ class ModuleMetadata(Metadata):
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
     output_units           of outputs that are points
-    contacts               rigid ones, see ContactRecord
+    contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord
     """
 
     functions: tuple[str, ...] = ()
@@ -205,6 +212,7 @@ class ModuleMetadata(Metadata):
     flexible: tuple[Mapping[str, Any], ...] = ()
     output_units: Mapping[str, str] = field(default_factory=dict)
     contacts: tuple[ContactRecord, ...] = ()
+    compliant: tuple[CompliantRecord, ...] = ()
 
 
 def _plain(value: Any) -> Any:

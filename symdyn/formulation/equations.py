@@ -83,7 +83,7 @@ class Equations:
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     events       what is looked for along a motion (see model.event), in the order of the quantity events
-    contacts     rigid ones, place by place (see model.contacts.lowering)
+    contacts     rigid ones, place by place (see model.contacts.lowering); compliant: likewise
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
@@ -114,6 +114,7 @@ class Equations:
     watched: Callable[[], Sequence[Any]] = tuple
     events: tuple[Any, ...] = ()
     contacts: tuple[Any, ...] = ()
+    compliant: tuple[Any, ...] = ()
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

@@ -6,7 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from symdyn.backend.metadata import Chart, ContactRecord, EventRecord, JumpRecord, Metadata, ModuleMetadata, ValidityRange
+from symdyn.backend.metadata import (
+    Chart,
+    CompliantRecord,
+    ContactRecord,
+    EventRecord,
+    JumpRecord,
+    Metadata,
+    ModuleMetadata,
+    ValidityRange,
+)
 from symdyn.backend.right_side import RightSide
 from symdyn.backend.source import Content
 from symdyn.formulation.constraints.motion import BAUMGARTE
@@ -92,7 +101,8 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         drawn=tuple(equations.drawn), flexible=tuple(equations.flexible), output_units=dict(equations.symbols.point_units),
         contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name,
                                      c.switches[1].name if len(c.rows) > 1 else "", tuple(s.name for s in c.sliding), c.events,
-                                     c.impact) for c in equations.contacts))
+                                     c.impact) for c in equations.contacts),
+        compliant=tuple(CompliantRecord(c.name, len(c.rows)) for c in equations.compliant))
 
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:

@@ -79,6 +79,8 @@ FUNCTIONS = _entries(
     ("positions", "positions", None, "centres of mass, n-frame, m", ""),
     ("watches", "watches", None,
      "values that have a range of validity: draft, tilt and the like", "loads with a range of validity"),
+    ("compliant_contacts", "compliant_contacts", None,
+     "gap, m, slip speed that counts as sticking, forces, N, and slips, m/s, of every compliant contact", "compliant contacts"),
     ("contacts", "contacts", None,
      "gap, friction, restitution of every contact; slips, free accelerations, forces of its rows; D, M^-1 J^T, N M^-1 J^T",
      "rigid contacts"),

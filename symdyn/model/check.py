@@ -107,8 +107,8 @@ class _Checker:
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             constraints, tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), units,
-            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.chosen_speeds.items()),
-            self.own_speeds if s.chosen_speeds else (), self.eliminated)
+            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.compliant_contacts),
+            tuple(s.chosen_speeds.items()), self.own_speeds if s.chosen_speeds else (), self.eliminated)
 
     # -- names
 

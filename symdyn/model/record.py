@@ -11,18 +11,11 @@ import sympy as sp
 from symdyn.counting import counted
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
-from symdyn.model.contacts.lowering import RigidContact
+from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.event import Event
 from symdyn.model.joints import Joint
 from symdyn.model.shapes import Drawn
-
-
-@dataclass(frozen=True)
-class State:
-    """An extra state (actuator, controller) with its rate."""
-
-    symbol: sp.Symbol
-    rate: sp.Expr
+from symdyn.model.state import State
 
 
 @dataclass(frozen=True)
@@ -46,7 +39,7 @@ class Model:
     units         symbol -> unit
     shapes        what bodies look like
     doubts        sentences on what is possible, but hardly meant
-    contacts      rigid ones, place by place; their forces are among the loads, their events among the events
+    contacts      rigid ones, place by place; their forces are among the loads, their events among the events; compliant: likewise
     chosen        generalized speeds of the user's choice: symbol, expression in the speeds that the joints would have,
                   own_speeds; eliminated: velocity constraints that the chosen speeds fulfil, which are not among `constraints`
     """
@@ -76,6 +69,7 @@ class Model:
     events: tuple[Event, ...] = ()
     doubts: tuple[str, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
+    compliant: tuple[CompliantContact, ...] = ()
     chosen: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     own_speeds: tuple[sp.Symbol, ...] = ()
     eliminated: tuple[Constraint, ...] = ()
@@ -96,7 +90,8 @@ class Model:
         named = f": {_first(self.parameters)}" if self.parameters else ""
         rows.append(f"  {_number(self.parameters, 'parameter')}{named}{without}")
         rows += [f"  {_number(things, one)}" for things, one in ((self.outputs, "output"), (self.events, "event"),
-                                                                       (self.contacts, "rigid contact")) if things]
+                                                                       (self.contacts, "rigid contact"),
+                                                                       (self.compliant, "compliant contact")) if things]
         rows += [f"  doubtful: {doubt}" for doubt in self.doubts]
         return "\n".join(rows)
 

@@ -18,7 +18,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.contacts.contact import Contact
-from symdyn.model.contacts.lowering import RigidContact
+from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import Event, make_event
 from symdyn.model.faults import Faults
@@ -27,8 +27,9 @@ from symdyn.model.joints import Free, Joint
 from symdyn.model.loads import Force, ForceBetween, JointForce, SpringDamper, Torque
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.points import Point
-from symdyn.model.record import Model, NamedOutput, State
+from symdyn.model.record import Model, NamedOutput
 from symdyn.model.shapes import Drawn, drawn
+from symdyn.model.state import State
 from symdyn.model.symbols import Coordinate, as_coordinate
 from symdyn.model.sympy_vectors import as_frame, frames_of, is_dyadic, is_sympy_vector
 from symdyn.real_numbers import length_of
@@ -99,6 +100,7 @@ class System:
         self.loops: list[Joint | Gear] = []
         self.contacts: list[Contact] = []
         self.rigid_contacts: list[RigidContact] = []
+        self.compliant_contacts: list[CompliantContact] = []
         self.ground_motion: Joint | None = None
         self.shapes: list[Drawn] = []
         self.extra_coordinates: list[sp.Symbol] = []

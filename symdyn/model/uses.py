@@ -76,6 +76,8 @@ def _uses(system: System, joints: Sequence[Joint], loads: Sequence[Any]) -> Iter
     for contact in s.rigid_contacts:
         yield f"contact {contact.name}", contact.expressions, Scope.MOTION
         yield f"contact {contact.name}: friction and restitution", contact.constants, Scope.PARAMETERS
+    for compliant in s.compliant_contacts:
+        yield f"contact {compliant.name}", compliant.expressions, Scope.MOTION
     if s.rigid_contacts:
         yield "contacts", [SOFTNESS], Scope.PARAMETERS
     for event in s.events:

@@ -119,6 +119,9 @@ class Loads:
         """What elements want to be looked at, and how far elastic bodies bend."""
         found = [watch for load in self.model.loads if isinstance(load, Element) for watch in self._action(load).watches]
         found += [self._bending(body) for body in self.tree.flexible]
+        found += [Watch(f"depth of contact {c.name}", -self.algebra.expression(c.gap), -math.inf, c.depth,
+                        f"contact {c.name}: it goes {{value}} m deep, its compliance is meant for {c.depth:g} m; a larger "
+                        "stiffness keeps it shallower") for c in self.model.compliant if c.depth is not None]
         return [*found, self.settled.watch] if self.implicit else found
 
     def _bending(self, body: FlexibleLink) -> Watch:

@@ -78,6 +78,10 @@ class TreeQuantities(Motion):
         return self.recall("contact_rows").numbers(self.loads.contact_forces, lambda change: forward(  # type: ignore[no-any-return]
             self.algebra.recorder, self.rates, dict(zip(leaves, change, strict=True))))
 
+    def compliant_contacts(self) -> np.ndarray:
+        """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
+        return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
+
     def _apart(self, memory: dict[str, Any]) -> Self:
         """The same quantities, to be recorded apart from these."""
         other = copy(self)
@@ -105,7 +109,10 @@ class TreeQuantities(Motion):
                "joint_points": self.joint_points, "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
-        if self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
+        if self.model.compliant:
+            own["compliant_contacts"] = self.compliant_contacts
+        deep = any(contact.depth is not None for contact in self.model.compliant)
+        if deep or self.tree.flexible or self.loads.implicit or any(isinstance(load, Element) for load in self.model.loads):
             own["watches"] = lambda: vector(*[watch.value for watch in self.loads.watches()])
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation

@@ -1,1 +1,9 @@
-"""Contacts: where bodies touch, by which law, and the loads, events and rows that this makes of them."""
+"""Contacts: where bodies touch, by which law, and the loads, events and rows that this makes of them.
+
+What users call as sd.contacts: shapes, and what a compliant contact yields by.
+"""
+
+from symdyn.model.contacts.compliance import Bristles, Compliance, hertz
+from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
+
+__all__ = ["Box", "Bristles", "Compliance", "Curve", "Cylinder", "Disc", "Plane", "Point", "Sphere", "Surface", "hertz"]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.model.contacts.compliance import Compliance, compliance_faults
 from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
 from symdyn.model.faults import Faults
 from symdyn.real_numbers import length_of
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from symdyn.given import BodyOrName, Scalar
     from symdyn.model.contacts.shapes import Counterpart, Shape
 
-LAWS, IMPACTS = ("rigid",), ("newton", "poisson")
+LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson")
 ORIGIN_OF_A = Point()
 ON_A, ON_B = (Point, Sphere, Disc, Cylinder, Box), (Plane, Sphere, Curve, Surface)
 
@@ -30,8 +31,10 @@ class Contact:
                   Curve, Surface); default on b: the plane y = 0 of a planar system, z = 0 in space
     friction      coefficient of Coulomb friction, or (static, kinetic); numbers or expressions of parameters
     restitution   normal velocity after an impact by that before it, 0 to 1, likewise
-    law           "rigid": no penetration; open, sticking and sliding are modes that change at located events
-    impact        law of impacts: "newton" (velocities) or "poisson" (impulses of compression and expansion)
+    law           "rigid": no penetration; open, sticking and sliding are modes that change at located events; "compliant": forces
+                  by the depth of penetration and the slip, smooth in every formulation and method
+    impact        law of rigid impacts: "newton" (velocities) or "poisson" (impulses of compression and expansion)
+    compliance    how a compliant contact yields, sd.contacts.Compliance(...)
 
     A rigid contact is open as long as its gap is positive. Closed, it transmits a normal force N >= 0 and in its tangential
     directions (one in a plane, two in space) a friction force of at most static times N while it sticks, and of kinetic times N
@@ -44,8 +47,9 @@ class Contact:
 
     def __init__(self, name: str, a: BodyOrName, b: BodyOrName, shape: Shape | tuple[Shape, Counterpart] = ORIGIN_OF_A,
                  friction: Scalar | tuple[Scalar, Scalar] = 0, restitution: Scalar = 0, law: str = "rigid",
-                 impact: str = "newton") -> None:
+                 impact: str = "newton", compliance: Compliance | None = None) -> None:
         self.name, self.a, self.b, self.law, self.impact = name, a, b, law, impact
+        self.compliance = compliance
         self.faults = faults = Faults()
         self.where = where = f"contact {shown(name)}"
         if not isinstance(name, str) or not name.isidentifier():
@@ -68,13 +72,17 @@ class Contact:
             faults.append(f"{where}: law is {shown(law)}; there are {', '.join(map(repr, LAWS))}")
         if impact not in IMPACTS:
             faults.append(f"{where}: impact is {shown(impact)}; there are {', '.join(map(repr, IMPACTS))}")
+        if law == "compliant" and self.restitution != 0:
+            faults.append(f"{where}: restitution belongs to rigid contacts; pass the dissipation of the compliance")
+        if law != "compliant" and compliance is not None:
+            faults.append(f"{where}: compliance belongs to law='compliant'; pass that law, or leave compliance out")
 
     @property
     def frictionless(self) -> bool:
         """Whether there is no friction by structure."""
         return self.static == 0 and self.kinetic == 0
 
-    def number_faults(self, defaults: dict[Any, float]) -> list[str]:
+    def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
         """Friction, restitution and radii that cannot be, with the numbers that parameters have."""
         found = []
         values = {"static friction": self.static, "kinetic friction": self.kinetic, "restitution": self.restitution}
@@ -83,13 +91,23 @@ class Contact:
                 if hasattr(shape, kind):
                     values[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
         by_name = {getattr(key, "name", key): value for key, value in defaults.items()}
+
+        def number(value: Any) -> float | None:
+            expression = Faults().expression(value, "a number")
+            try:
+                return float(expression.xreplace({s: sp.Float(by_name[s.name]) for s in expression.free_symbols
+                                                  if s.name in by_name}))
+            except (TypeError, ValueError):
+                return None
+
+        if self.law == "compliant":
+            found += compliance_faults(self.where, self.compliance, number, self.kinetic)
         numbers: dict[str, float] = {}
         for what, expression in values.items():
-            try:
-                numbers[what] = float(expression.xreplace({s: sp.Float(by_name[s.name]) for s in expression.free_symbols
-                                                           if s.name in by_name}))
-            except (TypeError, ValueError):
+            value = number(expression)
+            if value is None:
                 continue
+            numbers[what] = value
             if numbers[what] < 0:
                 found.append(f"{self.where}: {what} is {numbers[what]:g}; pass a number that is not negative")
         if numbers.get("restitution", 0) > 1:

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.model.contacts.compliance import Compliance, law_of
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
 from symdyn.model.event import Event
 from symdyn.model.faults import Faults
 from symdyn.model.loads import Force, Torque
 from symdyn.model.quantity import Measure, Quantity
+from symdyn.model.state import State
+from symdyn.model.symbols import Coordinate
 
 if TYPE_CHECKING:
     from symdyn.model.system import System
@@ -67,6 +70,24 @@ class RigidContact:
         return [self.static, self.kinetic, self.restitution]
 
 
+@dataclass(frozen=True)
+class CompliantContact:
+    """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, and the depth
+    that is reported, m."""
+
+    name: str
+    gap: sp.Expr
+    rows: tuple[sp.Expr, ...]
+    forces: tuple[sp.Expr, ...]
+    slip_speed: sp.Expr
+    depth: float | None
+
+    @property
+    def expressions(self) -> list[sp.Expr]:
+        """What it shows along a motion: gap, slip speed, forces, slips."""
+        return [self.gap, self.slip_speed, *self.forces, *self.rows[1:]]
+
+
 def contact_force(name: str, row: int) -> Quantity:
     """The force of a rigid contact along one of its rows, N."""
     return Quantity(Measure("contact", (name,), index=(row,)))
@@ -78,7 +99,8 @@ def with_contacts(system: System) -> System:
         return system
     result = copy.copy(system)
     result._faults = faults = Faults(system._faults)
-    result.loads, result.events, result.rigid_contacts = list(system.loads), list(system.events), []
+    result.loads, result.events, result.states = list(system.loads), list(system.events), list(system.states)
+    result.rigid_contacts, result.compliant_contacts = [], []
     result.defaults = dict(system.defaults)
     known = {"ground", *[b.name for b in system.bodies if isinstance(b.name, str)]}
     for contact in system.contacts:
@@ -109,9 +131,12 @@ def _body_faults(contact: Contact, known: set[str]) -> list[str]:
 
 
 def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> None:
-    """Loads, events and rows of a rigid contact in one place."""
+    """Loads, events and rows of a contact in one place."""
     directions = [touch.normal, *(() if contact.frictionless else touch.tangents)]
     name, rows = touch.name, geometry.rows(touch)[:len(directions)]
+    if contact.law == "compliant":
+        _add_compliant(system, contact, geometry, touch, directions, rows)
+        return
     forces = tuple(contact_force(name, k) for k in range(len(rows)))
     closed, sticking = sp.Symbol(f"{name}_closed", real=True), sp.Symbol(f"{name}_sticking", real=True)
     switches = (closed, *[sticking] * (len(rows) - 1))
@@ -127,6 +152,20 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
         system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
+
+
+def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: Touch, directions: list[Any],
+                   rows: tuple[sp.Expr, ...]) -> None:
+    """Loads of a compliant contact, and the states of its bristles."""
+    compliance = contact.compliance
+    assert isinstance(compliance, Compliance)  # checked before
+    names = [f"{touch.name}_bristle"] if len(rows) == 2 else [f"{touch.name}_bristle_{axis}" for axis in "xy"]
+    deflections = [Coordinate(name) for name in names[:len(rows) - 1]] if compliance.bristles is not None else []
+    law = law_of(compliance, contact.static, contact.kinetic, touch.gap, rows, deflections, geometry.faults, contact.where)
+    system.states += [State(z, rate) for z, rate in zip(deflections, law.rates, strict=True)]
+    slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
+    system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth))
+    _act(system, geometry, touch, directions, law.forces)
 
 
 def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],

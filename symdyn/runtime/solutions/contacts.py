@@ -1,4 +1,4 @@
-"""What rigid contacts did in a motion."""
+"""What contacts did in a motion."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
 from symdyn.runtime.integrating.outcome import Impact, Phase
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
+
+COMPLIANT = "compliant_contacts"
 
 
 class Impacts(NamedTuple):
@@ -25,16 +28,16 @@ class Impacts(NamedTuple):
 
 
 class ContactMotion(NamedTuple):
-    """A rigid contact along a motion.
+    """A contact along a motion.
 
-    mode      "open", "sticking" or "sliding" at every time, (n_t,)
+    mode      "open", "sticking" or "sliding" at every time, (n_t,); a compliant one sticks where its slip is at most slip_speed
     gap       m, (n_t,)
     force     on body a along the normal, then along the tangents, N, (n_t, 1 + n_tangents); zero where it is open
     slip      velocity of body a against body b along the tangents, m/s, (n_t, n_tangents)
     impulse   sum of the impulses since the start, N s, (n_t, 1 + n_tangents)
     impacts   one by one, see Impacts
     rests     times at which infinitely many impacts have come to their end, s, (n,)
-    switches  times from which on the contact is in another mode, with that mode
+    switches  times from which on the contact is in another mode, with that mode; of a compliant one as far as times were stored
     """
 
     mode: np.ndarray
@@ -49,8 +52,32 @@ class ContactMotion(NamedTuple):
 
 def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
                     impacts: Sequence[Impact]) -> Mapping[str, ContactMotion]:
-    """Every rigid contact of a motion by name, one for each place where a shape touches."""
+    """Every contact of a motion by name, one for each place where a shape touches."""
+    return {**_rigid(solution, phases, row_phases, impacts), **_compliant(solution)}
+
+
+def _compliant(solution: Solution) -> dict[str, ContactMotion]:
+    """Compliant contacts: what they do follows from the state alone."""
+    records, found, first = solution.module.metadata.compliant, {}, 0
+    values = solution.rows(COMPLIANT).reshape(len(solution.t), -1) if records else np.zeros((len(solution.t), 0))
+    for record in records:
+        gap, slow = values[:, first], values[:, first + 1]
+        force, slip = np.split(values[:, first + 2:first + 1 + 2 * record.rows], [record.rows], axis=1)
+        first += 1 + 2 * record.rows
+        still = (np.linalg.norm(slip, axis=1) <= slow) & (record.rows > 1)
+        mode = np.where(gap > 0, OPEN, np.where(still, STICKING, SLIDING)).astype(object)
+        changes = [0, *(1 + np.flatnonzero(mode[1:] != mode[:-1]))] if len(mode) else []
+        none = np.zeros((0, record.rows))
+        found[record.name] = ContactMotion(mode, gap, force, slip, np.zeros_like(force), Impacts(np.zeros(0), none, none, none),
+                                           np.zeros(0), tuple((float(solution.t[k]), str(mode[k])) for k in changes))
+    return found
+
+
+def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
+           impacts: Sequence[Impact]) -> dict[str, ContactMotion]:
     records = solution.module.metadata.contacts
+    if not records:
+        return {}
     n = sum(record.rows for record in records)
     values = solution.rows(CONTACTS).reshape(len(solution.t), -1)
     k = len(records)

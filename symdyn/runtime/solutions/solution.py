@@ -241,13 +241,13 @@ class Solution:
 
     @cached_property
     def contacts(self) -> Mapping[str, ContactMotion]:
-        """What rigid contacts did: name -> mode, gap, force, slip and impulse over time, impacts, see ContactMotion.
+        """What contacts did: name -> mode, gap, force, slip and impulse over time, impacts, see ContactMotion.
 
         >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
         >>> dict(solution.contacts)
         {}
         """
-        return contact_motions(self, self._phases, self._row_phases, self._impacts) if self.module.metadata.contacts else {}
+        return contact_motions(self, self._phases, self._row_phases, self._impacts)
 
     @property
     def energy_balance(self) -> dict[str, np.ndarray]:

@@ -1,0 +1,167 @@
+"""The compliant law: a normal force by the depth of penetration, friction by the slip or by bristles.
+
+Source: Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, 1975; Johnson, Contact Mechanics,
+1985, section 4.2 (Hertz); Canudas de Wit, Olsson, Astrom and Lischinsky, A new model for control of systems with friction, 1995
+(LuGre); Dupont, Hayward, Armstrong and Altpeter, Single state elastoplastic friction models, 2002.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from symdyn.model.faults import Faults
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.given import Scalar
+
+# The exponent of Hertz's contact.
+HERTZ = sp.Rational(3, 2)
+# The square of a deflection is smoothed below this part of that at sliding, and that of a slip in space below STILL, m^2/s^2.
+SMOOTH, STILL = sp.Rational(1, 10**18), sp.Rational(1, 10**30)
+
+
+@dataclass(frozen=True)
+class Bristles:
+    """Friction by the deflection z of bristles, one state for each tangent, which sticks truly: F = -N (s0 z + s1 z_dot).
+
+    stiffness   s0, 1/m: friction force by normal force and deflection
+    damping     s1, s/m
+    elastic     part of the deflection at sliding up to which bristles only deflect (Dupont's elasto-plastic model: loads below
+                that part of the friction make no creep); None: the LuGre model, which creeps
+
+    >>> sd.contacts.Bristles(1e5, 300.0).elastic
+    0.7
+    """
+
+    stiffness: Scalar
+    damping: Scalar = 0
+    elastic: Scalar | None = 0.7
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """How a compliant contact yields: N = stiffness d^exponent (1 + dissipation d_dot) at the depth d, never below 0.
+
+    stiffness    N/m^exponent; `sd.contacts.hertz` gives that of spheres and planes
+    exponent     a number from 1 on; 3/2: Hertz
+    dissipation  s/m; about 3/2 (1 - e)/v for a restitution e near 1 at the speed v
+    slip_speed   m/s: friction grows linearly with the slip up to about this speed, kinetic N slip/sqrt(slip^2 + slip_speed^2)
+    stribeck     m/s: friction falls from the static to the kinetic one over this speed, as exp(-(slip/stribeck)^2); None: kinetic
+                 friction only
+    viscous      s/m: friction that grows with the slip, by the normal force
+    bristles     friction by bristles in place of the slip alone, see Bristles
+    depth        m: runs that go deeper report it; None: no limit
+
+    >>> sd.contacts.Compliance(1e5).exponent
+    3/2
+    """
+
+    stiffness: Scalar
+    exponent: Scalar = HERTZ
+    dissipation: Scalar = 0
+    slip_speed: Scalar = 1e-3
+    stribeck: Scalar | None = None
+    viscous: Scalar = 0
+    bristles: Bristles | None = None
+    depth: float | None = None
+
+
+def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scalar | None = None,
+          modulus_b: Scalar | None = None, poisson_b: Scalar = 0.3) -> sp.Expr:
+    """The stiffness 4/3 E* sqrt(R) of Hertz's contact of a sphere with a plane or a sphere, N/m^(3/2).
+
+    radius, modulus, poisson   of the sphere on a, m and Pa; radius_b: of that on b, None: a plane
+    modulus_b, poisson_b       of the material of b; None: as rigid
+
+    >>> round(float(sd.contacts.hertz(0.01, 2.1e11) / 1e10), 3)
+    3.077
+    """
+    yielding = (1 - sp.sympify(poisson) ** 2) / sp.sympify(modulus)
+    if modulus_b is not None:
+        yielding = yielding + (1 - sp.sympify(poisson_b) ** 2) / sp.sympify(modulus_b)
+    curved = 1 / sp.sympify(radius)
+    if radius_b is not None:
+        curved = curved + 1 / sp.sympify(radius_b)
+    return sp.Rational(4, 3) / yielding / sp.sqrt(curved)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A compliant contact's forces along its rows, and the rates of its bristles."""
+
+    forces: tuple[sp.Expr, ...]
+    rates: tuple[sp.Expr, ...]
+
+
+def law_of(compliance: Compliance, static: sp.Expr, kinetic: sp.Expr, gap: sp.Expr, rows: Sequence[sp.Expr],
+           deflections: Sequence[sp.Symbol], faults: Faults, where: str) -> Law:
+    """The forces by the gap, the relative velocities (normal, tangents) and the deflections of bristles."""
+    def number(value: Any, what: str) -> sp.Expr:
+        return faults.expression(value, f"{where}: {what}")
+
+    depth = sp.Max(0, -gap)
+    elastic = number(compliance.stiffness, "stiffness") * depth ** number(compliance.exponent, "exponent")
+    damped = 1 - number(compliance.dissipation, "dissipation") * rows[0]
+    normal = elastic if damped == 1 else elastic * sp.Max(0, damped)
+    slips = rows[1:]
+    if not slips:
+        return Law((normal,), ())
+    square = sp.Add(*[v**2 for v in slips])
+    coefficient = kinetic
+    if compliance.stribeck is not None:
+        coefficient = kinetic + (static - kinetic) * sp.exp(-square / number(compliance.stribeck, "stribeck") ** 2)
+    viscous = number(compliance.viscous, "viscous")
+    if compliance.bristles is None:
+        speed = sp.sqrt(square + number(compliance.slip_speed, "slip_speed") ** 2)
+        return Law((normal, *[-normal * (coefficient / speed + viscous) * v for v in slips]), ())
+    bristles = compliance.bristles
+    stiffness, damping = number(bristles.stiffness, "stiffness of bristles"), number(bristles.damping, "damping of bristles")
+    limit = coefficient / stiffness
+    if bristles.elastic is None:
+        speed = sp.Abs(slips[0]) if len(slips) == 1 else sp.sqrt(square + STILL)
+        rates = [v - speed * z / limit for v, z in zip(slips, deflections, strict=True)]
+    else:
+        part = number(bristles.elastic, "elastic part of bristles")
+        size = sp.sqrt(sp.Add(*[z**2 for z in deflections]) + SMOOTH * (kinetic / stiffness) ** 2)
+        share = sp.Max(0, sp.Min(1, (size / limit - part) / (1 - part)))
+        plastic = (1 - sp.cos(sp.pi * share)) / 2
+        outwards = sp.Max(0, sp.Add(*[v * z for v, z in zip(slips, deflections, strict=True)]))
+        rates = [v - plastic * outwards * z / (size * limit) for v, z in zip(slips, deflections, strict=True)]
+    forces = [-normal * (stiffness * z + damping * rate + viscous * v)
+              for z, rate, v in zip(deflections, rates, slips, strict=True)]
+    return Law((normal, *forces), tuple(rates))
+
+
+def compliance_faults(where: str, given: Any, numbers: Any, kinetic: Any) -> list[str]:
+    """What is wrong with a compliance; numbers: gives the number of an expression, None where it has none."""
+    if not isinstance(given, Compliance):
+        return [f"{where}: law='compliant' takes compliance=sd.contacts.Compliance(stiffness, ...), found {shown(given)}"]
+    found = []
+    checks: list[tuple[str, Any, float, bool]] = [
+        ("stiffness", given.stiffness, 0.0, False), ("exponent", given.exponent, 1.0, True),
+        ("dissipation", given.dissipation, 0.0, True), ("slip_speed", given.slip_speed, 0.0, False),
+        ("viscous", given.viscous, 0.0, True)]
+    checks += [("stribeck", given.stribeck, 0.0, False)] * (given.stribeck is not None)
+    checks += [("depth", given.depth, 0.0, False)] * (given.depth is not None)
+    if isinstance(given.bristles, Bristles):
+        checks += [("stiffness of bristles", given.bristles.stiffness, 0.0, False),
+                   ("damping of bristles", given.bristles.damping, 0.0, True)]
+        part = None if given.bristles.elastic is None else numbers(given.bristles.elastic)
+        if part is not None and not 0 <= part < 1:
+            found.append(f"{where}: elastic part of bristles is {part:g}; pass a number from 0 to below 1, or None for the LuGre "
+                         "model")
+        if numbers(kinetic) == 0:
+            found.append(f"{where}: bristles need friction; pass friction, or leave bristles out")
+    elif given.bristles is not None:
+        found.append(f"{where}: bristles is {shown(given.bristles)}; pass sd.contacts.Bristles(...), or None")
+    for what, value, least, reached in checks:
+        number = numbers(value)
+        if number is not None and not (number >= least if reached else number > least):
+            found.append(f"{where}: {what} is {number:g}; pass a number {'from' if reached else 'above'} {least:g}"
+                         f"{' on' if reached else ''}")
+    return found

@@ -1,0 +1,155 @@
+"""Compliant contacts against closed forms, differences and each other."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import symdyn as sd
+from symdyn.errors import ModelError, SimulationWarning
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
+
+G, TILT, MU, STIFFNESS = 9.81, np.radians(20), 0.5, 1e6
+C = sd.contacts
+
+
+def slope(bristles: Any = None, tilt: float = TILT, **more: Any) -> sd.System:
+    """A block of 2 kg that moves along and across a slope."""
+    x, y = sd.coordinates("x y")
+    system = sd.System("slope", gravity=[G * np.sin(tilt), -G * np.cos(tilt)])
+    slide, block = system.add_body("slide", mass=0), system.add_body("block", mass=2.0)
+    system.add_joint(sd.Prismatic("along", system.ground, slide, axis=[1, 0], coordinate=x))
+    system.add_joint(sd.Prismatic("across", slide, block, axis=[0, 1], coordinate=y))
+    law = {"stiffness": STIFFNESS, "exponent": 1, "dissipation": 10.0, "bristles": bristles, **more}
+    system.add_contact(sd.Contact("sole", block, system.ground, friction=(0.6, MU), law="compliant",
+                                  compliance=C.Compliance(**law)))
+    return system
+
+
+def resting(system: sd.System, end: float = 100.0, **more: Any) -> Any:
+    return system.compile().simulate((0, end), q=[0, -2 * G * np.cos(TILT) / STIFFNESS], method="radau", **more)
+
+
+def test_spheres_part_after_hertzs_time() -> None:
+    """Depth (15 m v^2/(16 E* sqrt R))^(2/5), time 2 d/v int_0^1 ds/sqrt(1 - s^(5/2)) = 2.94 d/v (Johnson 1985, section 11.4)."""
+    stiffness = float(C.hertz(0.01, 2.1e11, 0.3, 0.02, 2.1e11, 0.3))
+    curved, modulus = 1 / (1 / 0.01 + 1 / 0.02), 1 / (2 * (1 - 0.3**2) / 2.1e11)
+    assert stiffness == pytest.approx(4 / 3 * modulus * np.sqrt(curved), rel=1e-14)
+    system = sd.System("spheres")
+    for name, mass in (("a", 0.03), ("b", 0.2)):
+        body = system.add_body(name, mass=mass)
+        system.add_joint(sd.Prismatic(f"along_{name}", system.ground, body, axis=[1, 0, 0]))
+    system.add_contact(sd.Contact("touch", "a", "b", shape=(C.Sphere(0.01), C.Sphere(0.02)), law="compliant",
+                                  compliance=C.Compliance(stiffness)))
+    system.add_event("parts", sd.distance("a", "b") - 0.03, 1)
+    mass, speed = 0.03 * 0.2 / 0.23, 1.0
+    depth = (15 * mass * speed**2 / (16 * modulus * np.sqrt(curved))) ** 0.4
+    lasts = 2 * depth / speed * quad(lambda s: 1 / np.sqrt(1 - s**2.5), 0, 1, epsabs=0, epsrel=1e-11)[0]
+    assert lasts == pytest.approx(2.94 * depth / speed, rel=2e-3)
+    solution = system.compile().simulate(np.linspace(0, 1.5 * lasts, 3001), q=[-0.03, 0], u=[speed, 0], rtol=1e-12)
+    assert solution.events["parts"].t[-1] == pytest.approx(lasts, rel=1e-9)
+    touch = solution.contacts["touch"]
+    assert -touch.gap.min() == pytest.approx(depth, rel=1e-9 + 1e-6)
+    assert touch.force[:, 0].max() == pytest.approx(stiffness * depth**1.5, rel=2e-6)
+    assert [mode for _, mode in touch.switches] == [SLIDING, OPEN]
+    assert np.abs(solution.u[-1] - np.array([(0.03 - 0.2) / 0.23, 0.06 / 0.23])).max() < 1e-10
+
+
+@pytest.mark.parametrize("elastic", [0.7, None])
+def test_block_on_bristles_stays_on_the_slope(elastic: float | None) -> None:
+    """s0 z = tan(tilt), and no creep at a load that stays."""
+    solution = resting(slope(C.Bristles(1e5, 300.0, elastic)), rtol=1e-10, atol=1e-16)
+    z = solution["sole_bristle"]
+    assert z[-1] == pytest.approx(np.tan(TILT) / 1e5, rel=1e-6)
+    assert abs(solution["x"][-1] - solution["x"][500]) < 1e-12
+    assert solution.contacts["sole"].mode[-1] == STICKING
+    assert solution.contacts["sole"].force[-1] == pytest.approx([2 * G * np.cos(TILT), -2 * G * np.sin(TILT)], rel=1e-6)
+
+
+def test_block_on_regularized_friction_creeps_with_the_speed_that_is_stated() -> None:
+    """mu v/sqrt(v^2 + s^2) = tan(tilt)."""
+    solution = resting(slope(slip_speed=1e-4), 1.0, rtol=1e-10)
+    creep = 1e-4 * np.tan(TILT) / np.sqrt(MU**2 - np.tan(TILT) ** 2)
+    assert solution["x_dot"][-1] == pytest.approx(creep, rel=1e-8)
+    assert solution.contacts["sole"].slip[-1, 0] == pytest.approx(creep, rel=1e-8)
+
+
+def test_friction_falls_with_the_slip_by_stribeck_and_grows_by_viscous_friction() -> None:
+    module = slope(stribeck=0.1, viscous=0.02, slip_speed=1e-6).compile(backend="numpy")
+    y, slip = -1e-4, np.array([0.05, 0.1, 1.0])
+    forces = [module.evaluate("compliant_contacts", 0.0, [0, y, v, 0])[3] for v in slip]
+    assert np.allclose(forces, -STIFFNESS * 1e-4 * (MU + 0.1 * np.exp(-((slip / 0.1) ** 2)) + 0.02 * slip), rtol=1e-9)
+
+
+@pytest.mark.parametrize("bristles", [None, C.Bristles(1e5, 300.0), C.Bristles(1e5, 300.0, None)])
+@pytest.mark.parametrize("space", [False, True])
+def test_jacobians_are_exact(bristles: Any, space: bool) -> None:
+    """Against central differences, sliding at a depth."""
+    if space:
+        system = sd.System("ball", gravity=[0, 0, -G])
+        body = system.add_body("ball", mass=1.0, inertia=[0.01] * 3)
+        system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerAngles("ZYX")))
+        system.add_contact(sd.Contact("sole", body, system.ground, shape=C.Sphere(0.1), friction=(0.6, MU), law="compliant",
+                                      compliance=C.Compliance(1e5, dissipation=0.5, stribeck=0.1, bristles=bristles)))
+        x = [0.1, 0.2, 0.0995, 0.1, 0.2, 0.3, 0.3, -0.2, -0.1, 1.0, 2.0, 3.0]
+    else:
+        system, x = slope(bristles, stribeck=0.1), [0.1, -1e-4, 0.3, -0.01]
+    module = system.compile(backend="numpy")
+    state = np.array([*x, *([4e-6] if not space else [4e-6, -2e-6]) * (bristles is not None)])
+    exact = module.jacobian(0.0, state).x
+    steps = np.array([1e-10 if "bristle" in name else 1e-8 for name in module.metadata.x])
+    differences = np.array([(module.rhs(0.0, state + h * e) - module.rhs(0.0, state - h * e)) / (2 * h)
+                            for h, e in zip(steps, np.eye(len(state)), strict=True)]).T
+    assert np.abs(exact - differences).max() <= 1e-5 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("formulation", ["recursive", "augmented", "absolute"])
+def test_all_formulations_and_batches_make_the_same_motion(formulation: str) -> None:
+    x, y, angle = sd.coordinates("x y angle")
+    system = sd.System("rod", gravity=[0, -G])
+    body = system.add_body("rod", mass=1.0, inertia=0.1)
+    system.add_joint(sd.Planar("free", system.ground, body, [x, y, angle]))
+    for name, end in (("left", -0.5), ("right", 0.5)):
+        system.add_contact(sd.Contact(name, body, system.ground, shape=C.Point([end, 0]), friction=0.4, law="compliant",
+                                      compliance=C.Compliance(1e5, dissipation=0.3, slip_speed=1e-2)))
+    start, t = [0.0, 0.3, 0.4], np.linspace(0, 0.5, 101)
+    reference = system.embedding().compile().simulate(t, q=start, rtol=1e-11, work=True)
+    equations = system.augmented(coordinates="absolute") if formulation == "absolute" else getattr(system, formulation)()
+    solution = equations.compile().simulate(t, q=start, rtol=1e-11)  # steps across the kink where a gap closes lose digits
+    rates = [module.rhs(0.0, x) for module in (solution.module, reference.module) for x in reference.x]
+    assert np.allclose(rates[:101], rates[101:], rtol=1e-11, atol=1e-11)
+    assert np.abs(solution.x - reference.x).max() < 1e-6
+    radau = system.embedding().compile().simulate(t, q=start, rtol=1e-11, method="radau")
+    assert np.abs(radau.x - reference.x).max() < 1e-6
+    batch = system.embedding().compile().simulate_batch(q=[start, start], t=t, rtol=1e-11)
+    assert np.abs(batch.x[1] - reference.x).max() < 1e-6
+    assert (reference.contacts["left"].force[:, 0] > 0).any()
+    assert np.abs(reference.energy_balance["error"]).max() < 1e-8
+    assert reference.work[-1] < 0
+
+
+def test_depth_beyond_what_is_meant_is_reported() -> None:
+    with pytest.warns(SimulationWarning, match=r"contact sole: it goes .* m deep, its compliance is meant for 1e-05 m"):
+        resting(slope(depth=1e-5), 0.01)
+
+
+def test_faults_of_compliances_are_reported_together() -> None:
+    system = slope()
+    for name, law in (("none", {}), ("number", {"compliance": 3}),
+                      ("numbers", {"friction": 0.3, "compliance": C.Compliance(
+                          0, exponent=0.5, dissipation=-1, slip_speed=0, stribeck=-1, viscous=-2, depth=0.0,
+                          bristles=C.Bristles(0, -1, 1.0))}),
+                      ("smooth", {"compliance": C.Compliance(1, bristles=C.Bristles(1e5))}),
+                      ("brush", {"compliance": C.Compliance(1, bristles=3)}),  # type: ignore[arg-type]
+                      ("bouncing", {"restitution": 0.5, "compliance": C.Compliance(1)})):
+        system.add_contact(sd.Contact(name, "block", "ground", law="compliant", **law))  # type: ignore[arg-type]
+    system.add_contact(sd.Contact("hard", "block", "ground", compliance=C.Compliance(1)))
+    with pytest.raises(ModelError) as caught:
+        system.check()
+    for part in ("'none': law='compliant' takes compliance", "'number': law='compliant' takes compliance", "stiffness is 0",
+                 "exponent is 0.5; pass a number from 1 on", "dissipation is -1", "slip_speed is 0", "stribeck is -1",
+                 "viscous is -2", "depth is 0", "stiffness of bristles is 0", "damping of bristles is -1",
+                 "elastic part of bristles is 1", "'smooth': bristles need friction", "bristles is 3",
+                 "restitution belongs to rigid contacts", "'hard': compliance belongs to law='compliant'"):
+        assert part in str(caught.value)
