@@ -26,7 +26,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
          specialize: Mapping[Any, float] | None = None, work: bool = False, baumgarte: bool = False,
          batch: bool = False, method: str = METHOD, states: int = 2, sensitivities: tuple[str, ...] = (),
          adjoint: tuple[str, ...] | None = None, held: tuple[str, ...] = (),
-         followed: tuple[str, ...] = ()) -> Source:
+         followed: tuple[str, ...] = (), open_contacts: bool = False) -> Source:
     """The source of the named functions (default: the standard ones, those the formulation has) in a backend.
 
     specialize   parameters, by symbol or name, that become numbers in the code and are folded
@@ -37,6 +37,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     sensitivities   what x is differentiated by in further states of rhs, see symdyn.backend.right_side.RightSide
     adjoint      what weights of x_dot are carried back to by further functions, see RightSide
     held, followed   inputs with derivatives along these further states, see RightSide
+    open_contacts   leave out what closed rigid contacts do, see RightSide
     states       how many random states the reference vectors of a standalone source begin with
 
     Raises SymdynError for an unknown function, parameter, backend, method or a broken template.
@@ -52,7 +53,7 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
         jacobians = backend == "c" and not standalone and templates is None
-        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed)
+        right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts)
         content = content_of(equations, names, standalone, bound, right_side, jacobians)
         return render(content, backend, templates, standalone, integrator, batch, method, states)
 

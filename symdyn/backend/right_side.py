@@ -19,6 +19,7 @@ class RightSide:
     sensitivities   what the state is differentiated by along the motion, a column each: parameters, inputs, "" for initial values
     held        inputs whose derivatives along the columns are parameters: those of x_dot by them count, too
     followed    inputs that follow the state by a function of the user, whose derivatives along the columns are further inputs
+    open_contacts   whether all rigid contacts are open, whatever their parameters say: what they do is left out
     adjoint     what weights of x_dot are carried back to besides x: parameters and inputs; None: nothing is carried back
     """
 
@@ -29,11 +30,13 @@ class RightSide:
     adjoint: tuple[str, ...] | None = None
     held: tuple[str, ...] = ()
     followed: tuple[str, ...] = ()
+    open_contacts: bool = False
 
     @property
     def in_lanes(self) -> bool:
-        """Whether sensitivities may be columns in SIMD lanes: a series takes every statement of x_dot."""
-        return bool(self.sensitivities) and self.method != "taylor"
+        """Whether sensitivities may be columns in SIMD lanes: a series takes every statement of x_dot, and inputs that
+        follow the state have derivatives of their own in every column."""
+        return bool(self.sensitivities) and self.method != "taylor" and not self.followed
 
     @property
     def label(self) -> str:
@@ -41,7 +44,7 @@ class RightSide:
         parts = (("the work of the loads", self.work), ("Baumgarte's stabilization", self.baumgarte),
                  (f"the method {self.method}", self.method != METHOD),
                  (f"sensitivities in {len(self.sensitivities)} columns", bool(self.sensitivities)),
-                 ("the way back", self.adjoint is not None))
+                 ("the way back", self.adjoint is not None), ("all contacts open", self.open_contacts))
         added = " and ".join(text for text, there in parts if there)
         return f"rhs with {added}" if added else "rhs"
 

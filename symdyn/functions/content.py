@@ -55,8 +55,9 @@ def content_of(equations: Equations, names: Sequence[str], standalone: bool, bou
         there = tapes_of(equations.otherwise, names, right_side)
         differ = {n: t for n, t in there.items() if n in several or _entries(t) != _entries(tapes[n])}
         tapes |= {f"{n} otherwise": t for n, t in differ.items()}
-    if bound:
-        tapes = _together(tapes, lambda whole: specialize(whole, bound))
+    folded = {**bound, **(dict.fromkeys(closed_names(equations), 0.0) if right_side.open_contacts else {})}
+    if folded:
+        tapes = _together(tapes, lambda whole: specialize(whole, folded))
     tapes = _together(tapes, balance)
     otherwise = {n: tapes.pop(f"{n} otherwise") for n in names if f"{n} otherwise" in tapes}
     groups = {"q": [s.name for s in symbols.coordinates], "u": [s.name for s in symbols.speeds],
@@ -118,6 +119,11 @@ def event_records(equations: Equations) -> tuple[EventRecord, ...]:
     about = zip(equations.events, enclosed(equations), unproved(equations), unknowns(equations), strict=True)
     return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
                              tuple(functions), why) for e, can, why, (inputs, functions) in about)
+
+
+def closed_names(equations: Equations) -> list[str]:
+    """Parameters that say in which mode rigid contacts are."""
+    return list(dict.fromkeys(s.name for c in equations.contacts for s in (*c.switches, *c.sliding)))
 
 
 def _leaf_places(equations: Equations, n_x: int) -> list[int]:

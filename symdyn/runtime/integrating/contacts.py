@@ -26,7 +26,7 @@ from symdyn.runtime.integrating.stops import describe_stop
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
-Part = Callable[[Request, bool], Outcome]
+Part = Callable[[Request, bool, bool], Outcome]
 CONTACTS, SHARED = "contacts", "contacts_shared"
 # Gaps, m, and velocities, m/s, that count as none at the start.
 TOUCHING = 1e-9
@@ -113,7 +113,7 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
 def run_contacts(module: Module, request: Request, part: Part, method: object = None) -> Outcome:
     """Integrate with rigid contacts.
 
-    part     integrates a request in one mode, by an implicit method if so told
+    part     integrates a request in one mode; by an implicit method, and with all contacts open, if so told
     method   the one that it integrates by else
 
     Raises ArgumentError for what contacts do not take.
@@ -257,7 +257,8 @@ class _Phases:
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
         stiff = self._stiff()
-        outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff)
+        outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff,
+                            all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
         if wanted is not None:
             rows = np.isin(outcome.t, wanted)

@@ -143,13 +143,13 @@ def integrate(module: Module, request: Request, method: Any, bar: Any = None) ->
     """A request, checked, by any method."""
     if module.metadata.contacts:
         stiff = "radau" if is_compiled(method) else "Radau"
-        return run_contacts(module, request,
-                            lambda part, slow: _run_smooth(module, part, stiff if slow else method, bar), method)
+        return run_contacts(module, request, lambda part, slow, parted: _run_smooth(
+            module, part, stiff if slow else method, bar, parted), method)
     return _run_smooth(module, request, method, bar)
 
 
-def _run_smooth(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
-    """Without rigid contacts, or in one mode of them."""
+def _run_smooth(module: Module, request: Request, method: Any, bar: Any = None, open_contacts: bool = False) -> Outcome:
+    """Without rigid contacts, or in one mode of them; open_contacts: all are open."""
     if request.inputs.are_held:
         return run_held(module, request, lambda part: _run_smooth(module, part, method, bar), method)
     if method == "ggl":
@@ -157,7 +157,7 @@ def _run_smooth(module: Module, request: Request, method: Any, bar: Any = None) 
 
         return run_ggl(module, request, bar)
     field = RightSide(work=request.works, baumgarte=request.stabilization.way == "baumgarte", sensitivities=request.columns,
-                      held=request.held, followed=request.followed)
+                      held=request.held, followed=request.followed, open_contacts=open_contacts)
     run = run_series if method == SERIES else run_compiled if is_compiled(method) else run_scipy
     return run(module, request, method, bar, field)
 
