@@ -38,6 +38,7 @@ _HOME = {
     "symdyn.frames": ("Frame", "rate"),
     "symdyn.urdf.read": ("read_urdf",),
     "symdyn.sympy_mechanics.border": ("from_sympy",),
+    "symdyn.sympy_mechanics.system": ("from_system",),
     "symdyn.comparison": ("Case", "Erratum", "Formula", "Remark", "Slide", "compare"),
     "symdyn.ensembles": ("Ensemble", "Samples", "ensemble"),
     "symdyn.estimation": ("Experiment", "Fit", "Identification", "MeasuredMotion", "fit", "identify"),
