@@ -9,13 +9,18 @@ import time as clock
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from symdyn.collector import collector_paused
 from symdyn.comparison.case import Case
 from symdyn.comparison.judge import judge
 from symdyn.comparison.result import Comparison, Comparisons
-from symdyn.errors import CaseError, UnknownCase
+from symdyn.errors import ArgumentError, CaseError, UnknownCase
+from symdyn.exact.mechanism import Proofs
+from symdyn.formulation.equations import Equations
+
+if TYPE_CHECKING:
+    from symdyn.sympy_mechanics.border import Derived
 
 _SECTION = re.compile(r"\d+(\.\d+)*")
 
@@ -32,18 +37,28 @@ def compare(case: str) -> Any: ...  # a Comparison, of a section Comparisons
 def compare(case: Iterable[Case | str]) -> Comparisons: ...
 
 
-def compare(case: Case | str | Iterable[Case | str]) -> Any:
+@overload
+def compare(case: Equations, other: Equations | Derived) -> Proofs: ...
+
+
+def compare(case: Case | str | Equations | Iterable[Case | str], other: Equations | Derived | None = None) -> Any:
     """What slides print compared with what symdyn derives, entry by entry, with a verdict each.
 
     case   a Case of your own; the name of a case of the lecture ("pendulum-augmented"; names: symdyn.lecture.names()); a section
-           or a chapter of it ("3.5", "3"), for all of its cases; or several of these
-    Returns a Comparison of one case, Comparisons of a section or of several.
+           or a chapter of it ("3.5", "3"), for all of its cases; or several of these. Equations, together with
+    other  equations of the same mechanism: of symdyn's, or a KanesMethod, a LagrangesMethod or (q, u, M, f) of SymPy's. Whether
+    both
+           are the same is proved or refuted by exact algebra; those of SymPy's may be in other speeds, independent ones included
+    Returns a Comparison of one case, Comparisons of a section or of several; Proofs of equations.
 
-    Raises UnknownCase (the nearest names are offered) and CaseError with every fault of a case.
+    Raises UnknownCase (the nearest names are offered) and CaseError with every fault of a case; ArgumentError for equations of
+    other coordinates, and what sd.from_sympy raises.
 
     >>> sd.compare("pendulum-embedding").name
     'pendulum-embedding'
     """
+    if isinstance(case, Equations) or other is not None:
+        return _proved(case, other)
     if isinstance(case, Case):
         return _compared(case)
     if not isinstance(case, Iterable):
@@ -53,6 +68,18 @@ def compare(case: Case | str | Iterable[Case | str]) -> Any:
     if isinstance(case, str) and not _SECTION.fullmatch(case):
         return _compared(cases[0])
     return Comparisons(tuple(map(_compared, cases)), clock.monotonic() - start)
+
+
+def _proved(equations: Any, other: Any) -> Proofs:
+    """Whether equations are the same."""
+    from symdyn.sympy_mechanics.proof import prove_same
+
+    if not isinstance(equations, Equations) or other is None:
+        what, found = ("the first", equations) if not isinstance(equations, Equations) else ("the second", other)
+        raise ArgumentError(f"compare takes equations with others of the same mechanism, {what} is {found!r:.80}; pass what "
+                            "system.embedding(), .augmented() or .recursive() returns, then a KanesMethod, a LagrangesMethod, "
+                            "(q, u, M, f), or other equations")
+    return equations.prove(other) if isinstance(other, Equations) else prove_same(equations, other)
 
 
 def compare_lecture(names: Sequence[str] | None = None, jobs: int = 1) -> Comparisons:

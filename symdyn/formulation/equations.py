@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from symdyn.given import Numbers
     from symdyn.report.latex import Typeset
     from symdyn.runtime.module import Module
+    from symdyn.sympy_mechanics.back import SympyEquations
     from symdyn.verification import Verification
 
 
@@ -402,6 +403,22 @@ class Equations:
         from symdyn.exact.mechanism import prove_equations
 
         return prove_equations(self)
+
+    def to_sympy(self, simplify: bool = True) -> SympyEquations:
+        """The equations in SymPy's terms: functions of time, mass matrix and forcing under the names that KanesMethod has.
+
+        simplify   False: matrices as they were derived, in any time that this takes
+        Coordinates, speeds and inputs become functions of time, motions with derivatives, speeds q.dot derivatives of the
+        coordinates. Constraints come with multipliers. sd.from_sympy((s.q, s.u, s.mass_matrix, s.forcing)) is the way back of
+        equations without constraints. Raises SymdynError for what is too large to be written out, or has no explicit form.
+
+        >>> equations = sd.systems.pendulum().embedding().to_sympy()
+        >>> equations.mass_matrix, equations.forcing
+        (Matrix([[l**2*m]]), Matrix([[-g*l*m*sin(q1(t))]]))
+        """
+        from symdyn.sympy_mechanics.back import to_sympy
+
+        return to_sympy(self, simplify)
 
     def check_units(self) -> UnitReport:
         """Dimensional analysis of all entries by the units of the symbols (system.units): true where they agree, prints what does
