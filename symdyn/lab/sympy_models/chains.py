@@ -77,27 +77,31 @@ def chaos_pendulum() -> Derived:
 
 
 def conical_pendulum(n: int = 3, published: bool = False) -> Derived:
-    """n bobs on massless rods that swing in space, two angles each.
+    """n bars that swing in space, each with two space-fixed angles against the one before, about z, then x; y points up.
 
-    published   True: with angular velocities alpha_dot N.x + beta_dot N.y, as if both angles were turned about fixed axes, in
-                place of those that follow from the orientations
+    published   True: with the angular velocities of PyDy's example, alpha_dot N.z + beta_dot N.x for every bar, which contradict
+                the orientations, in place of those that follow from these
     """
     q, u = dynamicsymbols(f"alpha1:{n + 1}") + dynamicsymbols(f"beta1:{n + 1}"), dynamicsymbols(f"u1:{2 * n + 1}")
     m, l, I, g = *[sp.symbols(f"{name}1:{n + 1}") for name in "mlI"], sp.Symbol("g")
     N, at = ReferenceFrame("N"), Point("O")
     at.set_vel(N, 0)
-    bodies, loads = [], []
+    bodies, loads, before = [], [], N
     for k in range(n):
+        alpha, beta, alpha_dot, beta_dot = q[k], q[n + k], u[k], u[n + k]
         frame = ReferenceFrame(f"B{k + 1}")
-        frame.orient(N, "Body", [q[k], q[n + k], 0], "XYZ")
-        spin = u[k] * N.x + u[n + k] * N.y if published else sp.cos(q[n + k]) * u[k] * frame.x + u[n + k] * frame.y \
-            + sp.sin(q[n + k]) * u[k] * frame.z
-        frame.set_ang_vel(N, spin)
-        tip = at.locatenew(f"P{k + 1}", -l[k] * frame.z)
+        frame.orient(before, "Space", [alpha, beta, 0], "ZXY")
+        if published:
+            frame.set_ang_vel(N, alpha_dot * N.z + beta_dot * N.x)
+        else:
+            turned = sp.cos(beta) * before.z - sp.sin(beta) * before.y
+            frame.set_ang_vel(before, beta_dot * before.x + alpha_dot * turned)
+        center, tip = at.locatenew(f"G{k + 1}", -l[k] / 2 * frame.y), at.locatenew(f"P{k + 1}", -l[k] * frame.y)
+        center.v2pt_theory(at, N, frame)
         tip.v2pt_theory(at, N, frame)
-        bodies.append(RigidBody(f"bob{k + 1}", tip, frame, m[k], (inertia(frame, I[k], I[k], I[k]), tip)))
-        loads.append((tip, -m[k] * g * N.z))
-        at = tip
+        bodies.append(RigidBody(f"bar{k + 1}", center, frame, m[k], (inertia(frame, I[k], 0, I[k]), center)))
+        loads.append((center, -m[k] * g * N.y))
+        at, before = tip, frame
     kane = KanesMethod(N, q, u, [a.diff() - b for a, b in zip(q, u, strict=True)])
     kane.kanes_equations(bodies, loads)
     return Derived(kane)
