@@ -1,4 +1,4 @@
-"""Optimal motions beside the same problems in plain CasADi, one run: `symdyn bench optimize`.
+"""Optimal motions compared with the same problems in plain CasADi, one run: `symdyn bench optimize`.
 
 CasADi gets Hermite and Simpson's separated collocation on the same mesh from the same guess, written in its scalar symbols: its
 own derivatives and virtual machine, the same IPOPT. The right-hand sides of the cart with a pole and of the biped are symdyn's

@@ -145,10 +145,10 @@ class Discretized:
         missing = program.violations(self.z)
         wrong = np.flatnonzero(~depends & ~(missing <= GIVEN))
         if len(wrong) and not self.elastic:
-            told = [f"{self.text(program, row)} by {missing[row]:.3g}" for row in wrong[:4]]
+            texts = [f"{self.text(program, row)} by {missing[row]:.3g}" for row in wrong[:4]]
             how = " (module.consistent finds states that fulfil constraints)" if len(self.rows_of_loops) else ""
-            raise ArgumentError(f"{self.problem.module.name}: what is given violates {'; '.join(told)}; change the start, the "
-                                f"end or the condition{how}")
+            raise ArgumentError(f"{self.problem.module.name}: what is prescribed violates {'; '.join(texts)}; change the start, "
+                                f"the end or the condition{how}")
         kept = np.flatnonzero(depends)
         labels, first = [], 0
         for label in program.labels:
@@ -238,7 +238,17 @@ class Discretized:
         N, at = len(states), self.layout
         columns = np.hstack([at.X[states], at.U[inputs], np.broadcast_to(at.params, (N, len(at.params)))])
         block = self._pointwise(of.expressions, columns, shares, sp.identity(N * m, format="csr"), np.zeros(N * m))
-        return [_Part(N * m, None, block, np.tile(of.least, N), np.tile(of.most, N), [Label("", 0, shares, of.texts, True)])]
+        found = [_Part(N * m, None, block, np.tile(of.least, N), np.tile(of.most, N), [Label("", 0, shares, of.texts, True)])]
+        n_x, n_in = self.problem.of.n_x, self.problem.of.n_in
+        without = np.flatnonzero(~of.expressions.slopes[:, n_x:n_x + n_in].any(axis=1))
+        if shares[0] > 0 and len(without):  # at the start there are no inputs
+            columns = np.concatenate([at.X[0], np.full(n_in, -1), at.params])[None, :]
+            A = sp.csr_matrix((np.ones(len(without)), (np.arange(len(without)), without)), (len(without), m))
+            block = self._pointwise(of.expressions, columns, np.zeros(1), A, np.zeros(m))
+            texts = tuple(of.texts[k] for k in without)
+            found.insert(0, _Part(len(without), None, block, of.least[without], of.most[without],
+                                  [Label("", 0, np.zeros(1), texts, True)]))
+        return found
 
     def _boundary(self) -> list[_Part]:
         at, problem = self.layout, self.problem

@@ -437,9 +437,9 @@ class _Search:
         if missed.max(initial=0.0) <= MISSED:
             return NoOptimum(f"{head}; a motion that fulfils all conditions exists, so begin with another guess: "
                              f"{self._worst(made, found.z)}", optimum)
-        told = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
+        texts = [f"{elastic.text(elastic.program, int(elastic.slacks[k]))} is missed by {missed[k]:.4g}"
                 for k in np.argsort(-missed)[:4] if missed[k] > MISSED]
-        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(told)}",
+        return NoOptimum(f"{head}: the conditions cannot all be met within the bounds. Of the nearest motion {'; '.join(texts)}",
                          optimum)
 
     def _worst(self, made: Discretized, z: np.ndarray) -> str:

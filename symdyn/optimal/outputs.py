@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 def output_names(module: Module) -> tuple[str, ...]:
     """Names of all entries of the outputs: "height" of a number, "tip[0]" and "frame[0,1]" of arrays."""
-    return tuple(name + (f"[{','.join(map(str, place))}]" if place else "")
-                 for name, shape in module.metadata.outputs for place in product(*map(range, shape)))
+    return tuple(name + (f"[{','.join(map(str, index))}]" if index else "")
+                 for name, shape in module.metadata.outputs for index in product(*map(range, shape)))
 
 
 class WithOutputs:

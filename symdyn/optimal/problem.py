@@ -101,12 +101,12 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     """The problem, checked. Raises ArgumentError with all faults."""
     metadata, faults = module.metadata, Faults(module.name)
     if metadata.motions:
-        raise ArgumentError(f"{module.name}: optimize was asked for a mechanism with motions as inputs "
+        raise ArgumentError(f"{module.name}: optimize was called for a mechanism with motions as inputs "
                             f"({', '.join(metadata.motions)}), whose rates and accelerations are not free; make the joint a "
                             "coordinate and drive it by a force")
     resets = [event.name for event in metadata.events if event.reset]
     if resets:
-        raise ArgumentError(f"{module.name}: optimize was asked for a motion, and the events {', '.join(resets)} reset the "
+        raise ArgumentError(f"{module.name}: optimize was called, and the events {', '.join(resets)} reset the "
                             "state; a motion is optimized between two of them: leave the events out, and write what they do as "
                             "boundary conditions")
     free_bounds = _free_parameters(metadata, parameters, faults)

@@ -40,7 +40,7 @@ class Block:
 @dataclass(frozen=True)
 class Label:
     """What rows of g are: text and entry, with the time of each as a share of the duration (NaN: of no time), from row `first`
-    on; soft: whether the user asked for it."""
+    on; soft: whether the user requested it."""
 
     text: str
     first: int
@@ -103,7 +103,7 @@ class Program:
         parts = [self._constant]
         for (at, factors), J in zip(self._of_constraints, self._all("jacobian", z), strict=True):
             parts.append(factors * J.ravel()[at])
-        return np.bincount(self._jacobian_places, np.concatenate(parts), self.jacobian_nonzeros)
+        return np.bincount(self._jacobian_index, np.concatenate(parts), self.jacobian_nonzeros)
 
     def hessian(self, z: np.ndarray, cost: float, multipliers: np.ndarray) -> np.ndarray:
         """Of cost f + multipliers^T g, the entries of the upper triangle's pattern."""
@@ -114,10 +114,10 @@ class Program:
             if len(at):
                 H = block.rows.hessian(block.at(z), weights.reshape(len(block.columns), -1))
                 parts.append(factors * H.ravel()[at])
-        return np.bincount(self._hessian_places, np.concatenate(parts) if parts else np.zeros(0), self.hessian_nonzeros)
+        return np.bincount(self._hessian_index, np.concatenate(parts) if parts else np.zeros(0), self.hessian_nonzeros)
 
     def _all(self, what: str, z: np.ndarray) -> list[np.ndarray]:
-        """Values or derivatives of all blocks; the last ones are kept: f and g are asked for at the same z."""
+        """Values or derivatives of all blocks; the last ones are kept: f and g are evaluated at the same z."""
         key = z.tobytes()
         seen = self._seen.get(what)
         if seen is None or seen[0] != key:
@@ -145,7 +145,7 @@ class Program:
             kept, factors = self._kept(block, at, row, factor, [], to, m, n)
             self._of_cost.append((kept, to[0], factors))
         key = np.concatenate(columns) * max(self.m, 1) + np.concatenate(rows)
-        unique, self._jacobian_places = np.unique(key, return_inverse=True)
+        unique, self._jacobian_index = np.unique(key, return_inverse=True)
         self.jacobian_rows, self.jacobian_columns = unique % max(self.m, 1), unique // max(self.m, 1)
         self.jacobian_nonzeros = len(unique)
 
@@ -175,7 +175,7 @@ class Program:
             rows.append(row[there])
             columns.append(column[there])
         key = np.concatenate(columns) * self.n + np.concatenate(rows)
-        unique, self._hessian_places = np.unique(key, return_inverse=True)
+        unique, self._hessian_index = np.unique(key, return_inverse=True)
         self.hessian_rows, self.hessian_columns = unique % self.n, unique // self.n
         self.hessian_nonzeros = len(unique)
 
@@ -195,12 +195,12 @@ class Program:
         raise IndexError(row)
 
 
-def _expanded(rows: np.ndarray, places: np.ndarray, data: np.ndarray, m: int, n: int, by: np.ndarray,
+def _expanded(rows: np.ndarray, indices: np.ndarray, data: np.ndarray, m: int, n: int, by: np.ndarray,
               first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Entries of a map of values, one for each derivative of the value: indices in the derivatives (N, m, n), rows, factors."""
-    of = places % m
+    of = indices % m
     count = first[of + 1] - first[of]
-    each = np.repeat(np.arange(len(places)), count)
+    each = np.repeat(np.arange(len(indices)), count)
     within = np.arange(len(each)) - np.repeat(np.cumsum(count) - count, count)
     column = by[first[of[each]] + within]
-    return places[each] * n + column, rows[each].astype(np.int64), data[each]
+    return indices[each] * n + column, rows[each].astype(np.int64), data[each]

@@ -90,12 +90,12 @@ class Optimum:
 
     def __getitem__(self, name: Key) -> np.ndarray:
         """A state or input over the times t, (n_t,). Raises ArgumentError for another name."""
-        metadata, asked = self.module.metadata, name_of(name)
-        if asked in metadata.x:
-            return self.x[:, metadata.x.index(asked)]
-        if asked in metadata.inputs:
-            return self.inputs[:, metadata.inputs.index(asked)]
-        raise ArgumentError(f"{self.module.name}: the optimal motion has no {shown(asked)}; it has "
+        metadata, requested = self.module.metadata, name_of(name)
+        if requested in metadata.x:
+            return self.x[:, metadata.x.index(requested)]
+        if requested in metadata.inputs:
+            return self.inputs[:, metadata.inputs.index(requested)]
+        raise ArgumentError(f"{self.module.name}: the optimal motion has no {shown(requested)}; it has "
                             f"{', '.join((*metadata.x, *metadata.inputs))}")
 
     def at(self, t: Times) -> np.ndarray:

@@ -88,7 +88,7 @@ class Steps:
         return found
 
     def _through(self, at: np.ndarray, x: np.ndarray, cost: np.ndarray, D: np.ndarray | None) -> Iterator[list[Stage]]:
-        """Goes through the steps, in place of x (K, n_x), of the cost (K,) and of their derivatives D (K, n_x + 1, n)."""
+        """Goes through the steps and changes x (K, n_x), the cost (K,) and their derivatives D (K, n_x + 1, n)."""
         n_x, h = self.of.n_x, (self.h / self.n)[:, None]
         for step in range(self.n):
             stages: list[Stage] = []
@@ -125,10 +125,10 @@ class Steps:
         n_x, n_in = self.of.n_x, self.of.n_in
         G = np.zeros((len(at), self.of.n, self.size))
         G[:, :n_x] = of_x
-        place = np.arange(n_in)
-        G[:, n_x + place, n_x + place] = 1 if self.held else 1 - share
+        index = np.arange(n_in)
+        G[:, n_x + index, n_x + index] = 1 if self.held else 1 - share
         if not self.held:
-            G[:, n_x + place, n_x + n_in + place] = share
+            G[:, n_x + index, n_x + n_in + index] = share
         rest = np.arange(len(self.of.free) + 1)
         G[:, n_x + n_in + rest, self.size - len(rest) + rest] = 1
         return G
@@ -136,8 +136,8 @@ class Steps:
     def _unit(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of [x; cost] at the starts."""
         D = np.zeros((len(at), self.of.n_x + 1, self.size))
-        place = np.arange(self.of.n_x)
-        D[:, place, place] = 1
+        index = np.arange(self.of.n_x)
+        D[:, index, index] = 1
         return D
 
 

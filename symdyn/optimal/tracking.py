@@ -62,11 +62,11 @@ class Tracking:
         if not self._begin <= t <= self._end:
             t = float(optimum.within(t))
         found: np.ndarray = optimum.inputs_over_time(t)
-        found[self._places] -= self._K(t) @ (np.asarray(x, dtype=float) - optimum.states_over_time(t))
+        found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - optimum.states_over_time(t))
         return found
 
     @cached_property
-    def _places(self) -> list[int]:
+    def _driven_indices(self) -> list[int]:
         names = self.optimum.module.metadata.inputs
         return [names.index(n) for n in self.driven]
 
@@ -111,7 +111,7 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
     for matrix, names, what, strictly in ((of_states, states, "Q", False), (of_inputs, driven, "R", True),
                                           (at_end, states, "Qf", False)):
         demand_definite(matrix, names, what, owner, strictly=strictly)
-    places, n = [inputs.index(name) for name in driven], len(states)
+    indices, n = [inputs.index(name) for name in driven], len(states)
     inverse = np.linalg.inv(of_inputs)
     without = (f"{owner}: Riccati's equation along the motion has no finite solution to working precision; change the weights by "
                "less extreme ratios")
@@ -122,7 +122,7 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
             raise EvaluationError(without)
         found = module.jacobian(t, optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["x", "inputs"])
         assert found.x is not None and found.inputs is not None
-        A, SB = found.x, S @ found.inputs[:, places]
+        A, SB = found.x, S @ found.inputs[:, indices]
         return np.asarray(-(A.T @ S + S @ A - SB @ inverse @ SB.T + of_states)).ravel()
 
     first, last = float(optimum.t[0]), float(optimum.t[-1])
@@ -131,10 +131,10 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
         found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
     if not found.success:
         raise EvaluationError(without)
-    return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol, _gain(optimum, found, places, inverse))
+    return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol, _gain(optimum, found, indices, inverse))
 
 
-def _gain(optimum: Optimum, found: Any, places: Sequence[int], inverse: np.ndarray) -> PPoly:
+def _gain(optimum: Optimum, found: Any, indices: Sequence[int], inverse: np.ndarray) -> PPoly:
     """R^-1 B^T S as polynomials through its values in every interval of the mesh and step of Riccati's equation."""
     breaks = np.unique(np.concatenate([optimum.breaks, found.t[(found.t > optimum.t[0]) & (found.t < optimum.t[-1])]]))
     apart = np.append(np.diff(breaks) > CLOSE * (breaks[-1] - breaks[0]), True)
@@ -146,6 +146,6 @@ def _gain(optimum: Optimum, found: Any, places: Sequence[int], inverse: np.ndarr
     assert B is not None
     n = optimum.x.shape[1]
     S = np.asarray(found.sol(t)).T.reshape(-1, n, n)
-    K = np.einsum("ij,tkj,tkl->til", inverse, B[:, :, places], (S + S.transpose(0, 2, 1)) / 2)
+    K = np.einsum("ij,tkj,tkl->til", inverse, B[:, :, indices], (S + S.transpose(0, 2, 1)) / 2)
     c = through(inner, K.reshape(len(h), POINTS, -1), h)
-    return PPoly(c.reshape(*c.shape[:2], len(places), n), breaks)
+    return PPoly(c.reshape(*c.shape[:2], len(indices), n), breaks)

@@ -110,7 +110,7 @@ def test_an_infeasible_path_by_how_much(slider: Module) -> None:
 
 
 def test_conditions_that_what_is_given_violates(slider: Module) -> None:
-    with pytest.raises(sd.ArgumentError, match=r"what is given violates x >= 1/2 at t = 0 s by 0.5; change the start"):
+    with pytest.raises(sd.ArgumentError, match=r"what is prescribed violates x >= 1/2 at t = 0 s by 0.5; change the start"):
         sd.optimize(slider, EFFORT, 2.0, end=REST, path=[x >= sp.Rational(1, 2)])
     module = sd.systems.four_bar().compile(backend="c")
     with pytest.raises(sd.ArgumentError, match=r"the constraint hinge4_x at t = 0 s by .*module.consistent finds"):
@@ -218,7 +218,7 @@ def test_euler_parameters_that_vanish_on_the_way_of_the_guess() -> None:
     module, cost = system.compile(backend="c"), sd.Loss(integral=sum(e**2 for e in sp.symbols("T1:4")))
     with pytest.raises(sd.ArgumentError, match=r"p0, p1, p2, p3 have unit length together, and are zero in the guess"):
         sd.optimize(module, cost, 1.0, [1, 0, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0, 0])
-    with pytest.raises(sd.ArgumentError, match=r"what is given violates the unit length of p0, p1, p2, p3 at t = 1 s by 0.44"):
+    with pytest.raises(sd.ArgumentError, match=r"violates the unit length of p0, p1, p2, p3 at t = 1 s by 0.44"):
         sd.optimize(module, cost, 1.0, [1, 0, 0, 0, 0, 0, 0], [1.2, 0, 0, 0, 0, 0, 0])
 
 

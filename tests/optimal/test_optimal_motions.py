@@ -142,6 +142,10 @@ def test_path_and_boundary_conditions() -> None:
                         tolerance=None)
     assert found["x_dot"].max() < 0.6 + 1e-7 and (found["x_dot"] * found["F"]).max() < 1 + 1e-7
     assert found.multipliers["x_dot <= 3/5"].max() > 0.1
+    for transcription in ("radau", "hermite-simpson", "shooting"):  # a condition that holds the start alone
+        held = sd.optimize(slider(), EFFORT, 2.0, start={"x": None}, end={"x": 1, "x_dot": 0}, boundary=[v + x <= 3],
+                           path=[x <= sd.t - sp.Rational(1, 2)], tolerance=None, transcription=transcription)
+        assert held["x"][0] < -0.5 + 1e-7 and "x_dot + x <= 3" not in held.multipliers
     around = sd.optimize(slider(), EFFORT, 1.0, start="free", tolerance=None,
                          boundary=[sp.Eq(sp.Symbol("x(0)") + 1, x), sp.Eq(sp.Symbol("x_dot(0)"), v), sp.Symbol("x(0)") >= 2])
     assert set(around.multipliers) == {"x(0) + 1 = x", "x_dot(0) = x_dot", "x(0) >= 2"}
@@ -304,7 +308,7 @@ def test_what_is_printed_and_drawn(tmp_path: Any) -> None:
     assert [a.get_ylabel() for a in figure.axes] == ["coordinates", "speeds", "inputs", "error of an interval"]
 
 
-def test_measurement_beside_plain_casadi(capsys: pytest.CaptureFixture[str]) -> None:
+def test_measurement_compared_with_plain_casadi(capsys: pytest.CaptureFixture[str]) -> None:
     """Minimum time: the same iterations and the same cost."""
     from symdyn.lab.optimize import run
 
