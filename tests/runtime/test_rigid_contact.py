@@ -237,6 +237,15 @@ def test_all_formulations_make_the_same_motion(formulation: str) -> None:
     assert np.abs(tip.gap - expected.gap).max() < 1e-7
 
 
+def test_friction_across_a_joint_that_does_not_move_is_none() -> None:
+    """A ball on a vertical rail does not slip: its tangential row moves nothing."""
+    solution = ball(restitution=0.5, friction=0.3).compile().simulate((0, 3), q=[0.5], rtol=1e-12)
+    floor = solution.contacts["floor"]
+    assert solution.success and floor.mode[-1] == STICKING
+    assert floor.force[-1] == pytest.approx([G, 0.0])
+    assert floor.rests[0] == pytest.approx(3 * np.sqrt(1 / G), abs=1e-12)
+
+
 def test_numpy_gives_the_same_motion_as_c() -> None:
     system = ball(restitution=0.5)
     runs = [system.compile(backend=backend).simulate((0, 0.9), q=[0.5], rtol=1e-12) for backend in ("c", "numpy")]

@@ -52,19 +52,23 @@ class ContactRows:
             held = [a.expression(s) for c in self.contacts for s in c.switches]
             n = len(held)
             H: np.ndarray = np.eye(n, dtype=int).astype(object)
-            reasons, first = [], 0
+            reasons: list[str] = []
+            sizes: list[Any] = []  # of the rows of each contact, of which some may not move: a tangent across a joint
+            first = 0
             for c in self.contacts:
                 for k, s in enumerate(c.slide, start=first + 1):
                     H[k, first] = (1 - held[k]) * a.expression(s)
                 reasons += [f"contact {c.name}: its friction jams, there is no acceleration with a finite force (Painleve)"] * (
                     1 + len(c.slide))
-                first += 1 + len(c.slide)
+                rows = range(first, first + 1 + len(c.slide))
+                sizes += [sum((self.D[k, k] for k in rows), 0)] * len(rows)
+                first += len(rows)
             A, shared = self.D @ H, a.expression(SOFTNESS)
             for i in range(n):
                 A[i] = held[i] * A[i]
                 A[i, i] = A[i, i] + (1 - held[i])
-            softened = A + np.diag([shared * held[i] * self.D[i, i] for i in range(n)])
-            least = [a.rounding * held[i] * self.D[i, i] for i in range(n)]
+            softened = A + np.diag([shared * held[i] * sizes[i] for i in range(n)])
+            least = [a.rounding * held[i] * sizes[i] for i in range(n)]
             factors = _Factors(a, softened, least, reasons)
             b = vector(*[-h * f for h, f in zip(held, self.free, strict=True)])
             x = factors.solve(b)
