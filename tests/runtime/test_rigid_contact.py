@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, ModelError, SimulationWarning
@@ -184,6 +185,44 @@ def test_billiard_ball_slides_then_rolls(billiard: Any, v: list[float], omega: l
     assert np.abs(solution.u[-1, :2] - (v - mu * G * ends * along)).max() < 1e-11
     if not any(omega):
         assert solution.u[-1, 0] == pytest.approx(5 / 7 * v[0], rel=1e-12)
+
+
+def test_tippe_top_turns_over_and_keeps_jelletts_integral() -> None:
+    """L r is constant, L the angular momentum about the centre of mass and r the way from there to the contact (Jellett 1872)."""
+    radius, offset, inertia = 0.02, 0.003, np.array([2.6e-6, 2.6e-6, 2.4e-6])
+    system = sd.System("tippe_top", gravity=[0, 0, -G])
+    body = system.add_body("top", mass=0.015, inertia=inertia.tolist())
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.Contact("foot", body, system.ground, shape=sd.contacts.Sphere(radius, [0, 0, offset]), friction=0.2))
+    tilt, spin = 0.3, 150.0
+    start = [0, 0, radius - offset * np.cos(tilt), np.cos(tilt / 2), np.sin(tilt / 2), 0, 0]
+    solution = system.compile().simulate(np.linspace(0, 1.3, 131), q=start, rtol=1e-12,
+                                         u=[0, 0, 0, 0, spin * np.sin(tilt), spin * np.cos(tilt)])
+    turned = Rotation.from_quat(solution.q[:, [4, 5, 6, 3]])
+    axis = turned.apply([0, 0, 1])
+    integral = (turned.apply(solution.u[:, 3:] * inertia) * (offset * axis - [0, 0, radius])).sum(axis=1)
+    assert np.ptp(integral) < 1e-10 * abs(integral[0])
+    assert (solution.contacts["foot"].mode == SLIDING).all()
+    assert axis[-1, 2] < -0.7 < 0.9 < axis[0, 2]
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+@pytest.mark.parametrize("speed", [0.5, 4.0])
+def test_sphere_that_hits_obliquely_rolls_off_or_slides_on(law: str, speed: float) -> None:
+    """The tangential impulse stops the slip, 2/7 m v, or is mu (1 + e) m v_n, whichever is less."""
+    mass, radius, mu, e, normal = 0.3, 0.05, 0.2, 0.6, 2.0
+    system = sd.System("sphere")
+    body = system.add_body("sphere", mass=mass, inertia=[2 / 5 * mass * radius**2] * 3)
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.add_contact(sd.Contact("wall", body, system.ground, shape=sd.contacts.Sphere(radius), friction=mu, restitution=e,
+                                  impact=law))
+    solution = system.compile().simulate((0, 0.2), q=[0, 0, radius + 0.1, 1, 0, 0, 0], rtol=1e-12,
+                                         u=[0.6 * speed, -0.8 * speed, -normal, 0, 0, 0])
+    wall = solution.contacts["wall"]
+    along = min(2 / 7 * mass * speed, mu * (1 + e) * mass * normal)
+    assert wall.impacts.impulse == pytest.approx(np.array([[(1 + e) * mass * normal, -0.6 * along, 0.8 * along]]), rel=1e-9)
+    assert solution.u[-1, :3] == pytest.approx(np.array([0.6, -0.8, 0]) * (speed - along / mass) + [0, 0, e * normal], abs=1e-9)
+    assert solution.u[-1, 3:6] == pytest.approx(np.array([0.8, 0.6, 0]) * along * radius / (2 / 5 * mass * radius**2), rel=1e-9)
 
 
 def test_box_rests_on_a_slope_on_two_corners_and_slides_on_a_smooth_one() -> None:
