@@ -70,7 +70,7 @@ class Solved:
 
 
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
-    """Solutions that differ in w or in what the forces do, the preferred one first; all of them up to MOST_COMBINATIONS."""
+    """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS."""
     options = [list(_options(site)) for site in sites]
     planar = all(len(site.rows) < 3 for site in sites)
     few = planar and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS
@@ -84,7 +84,7 @@ def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
             found.append(one)
         if not few:
             break
-    return found
+    return sorted(found, key=lambda one: float(np.abs(one.lam).sum()))
 
 
 def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Sequence[Site], law: str) -> list[Solved]:

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import symdyn as sd
 from symdyn.errors import ArgumentError, EvaluationError, ModelError, SimulationWarning
-from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, solutions
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Mode, Site, Solved, impact, solutions
+from symdyn.runtime.integrating import contacts
 
 G = 9.81
 
@@ -111,9 +112,10 @@ def test_rocking_block_keeps_housners_times() -> None:
     assert {str(mode) for mode in solution.contacts["left"].mode} == {OPEN, STICKING}
 
 
-def rod() -> Any:
+def rod(restitution: float = 0.0, impact: str = "newton") -> Any:
     mu = sd.parameters("mu")
-    tip = sd.Contact("tip", "body", "ground", shape=sd.contacts.Point([-1, 0]), friction=mu)
+    tip = sd.Contact("tip", "body", "ground", shape=sd.contacts.Point([-1, 0]), friction=mu, restitution=restitution,
+                     impact=impact)
     system = planar("rod", [tip], 1.0, 1 / 3)
     system.defaults[mu] = 1.5
     return system.compile()
@@ -153,6 +155,61 @@ def test_several_solutions_are_reported() -> None:
     assert len(found) == 2
     assert {one.modes[0].kind for one in found} == {OPEN, SLIDING}
     assert not solutions(D, np.array([-1.0, 0.0]), [Site((0, 1), 1.0, 1.0, slip=np.array([-1.0]))])
+
+
+def test_rod_that_may_leave_or_jam_leaves_with_a_warning() -> None:
+    """Spinning quickly in Painleve's region its tip would leave, but friction might hold it as well: two motions."""
+    angle, spin = 1.1, 5.0
+    start = {"q": [np.cos(angle), np.sin(angle), angle], "params": {"mu": 1.5},
+             "u": [-5 - spin * np.sin(angle), spin * np.cos(angle), spin]}
+    with pytest.warns(SimulationWarning, match="laws of contact and friction allow 2 motions .* tip open was taken"):
+        solution = rod().simulate((0, 0.01), **start)
+    assert solution.contacts["tip"].mode[-1] == OPEN
+
+
+def test_impact_that_gains_energy_by_newtons_law_is_reported_and_loses_it_by_poissons() -> None:
+    angle, slip = 0.9132638230032679, 0.64840807
+    start = {"q": [np.cos(angle), np.sin(angle) + 1e-6, angle], "u": [slip, -1.0, 0.0], "params": {"mu": 1.549500227313413}}
+    with pytest.warns(SimulationWarning, match=r"the impact of tip at t = .* adds 0.124 J, as Newton's law may .*'poisson'"):
+        gained = rod(1.0).simulate((0, 0.01), **start)
+    assert gained.energy[-1] > gained.energy[0]
+    lost = rod(1.0, "poisson").simulate((0, 0.01), **start)
+    assert lost.energy[-1] < lost.energy[0]
+
+
+def test_impacts_lose_energy_by_poissons_law_and_have_one_solution() -> None:
+    stream = np.random.default_rng(0)
+    for _ in range(300):
+        c, s = np.cos(angle := stream.uniform(0.1, 1.5)), np.sin(angle)
+        D = np.array([[1 + 3 * c * c, -3 * s * c], [-3 * s * c, 1 + 3 * s * s]])
+        v, mu = np.array([-1.0, stream.uniform(-3, 3)]), stream.uniform(0, 2)
+        for law in ("newton", "poisson"):
+            found = impact(D, v, [stream.uniform(0, 1)], [Site((0, 1), mu, mu)], law)
+            assert len(found) == 1
+            assert abs(found[0].lam[1]) <= mu * found[0].lam[0] * (1 + 1e-9)
+            assert law == "newton" or (v + found[0].w) @ found[0].lam <= 1e-12
+
+
+def test_modes_that_do_not_settle_and_impacts_without_solution_stop_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ball(restitution=0.9).compile()
+    with monkeypatch.context() as patched:
+        patched.setattr(contacts, "SAME_TIME", 10.0)
+        with pytest.warns(SimulationWarning, match="modes of contacts do not settle: 50 switches within .* of floor"):
+            module.simulate((0, 6), q=[0.5])
+    several = [Solved((Mode(SLIDING, np.zeros(0), True),), np.array([k]), np.array([0.0]), False) for k in (5.0, 4.0)]
+    for found, message in (([], "impact of floor has no solution under Coulomb's law and impact='newton'"),
+                           (several, "impact of floor at t = 0.319275428 s has 2 solutions")):
+        with monkeypatch.context() as patched:
+            patched.setattr(contacts, "impact", lambda *given, found=found: found)
+            with pytest.warns(SimulationWarning, match=message):
+                module.simulate((0, 0.4), q=[0.5])
+    assert "1 steps were done, as asked" in short(module).message
+
+
+def short(module: Any) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)
+        return module.simulate((0, 2), q=[0.5], max_steps=1)
 
 
 @pytest.fixture(scope="module")
@@ -376,8 +433,6 @@ def test_what_contacts_do_not_go_with_is_rejected() -> None:
 def test_contact_that_closes_unseen_stops_the_run() -> None:
     """Without a look at its events a contact would be passed."""
     module = ball().compile()
-    from symdyn.runtime.integrating import contacts
-
     seen = contacts._Phases._looked_for
     try:
         contacts._Phases._looked_for = lambda self: np.zeros_like(seen(self))  # type: ignore[method-assign]

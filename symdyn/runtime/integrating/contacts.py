@@ -174,7 +174,7 @@ class _Phases:
         self.shared = False
         begin, end = self.request.span
         self.same = max(SAME_TIME * (end - begin), 8 * np.finfo(float).eps * max(abs(begin), abs(end)))
-        self.at_once = 0
+        self.at_once, self.latest = 0, ""  # switches without time between, and the contacts of the latest
         self.ruled_out: dict[int, set[str]] = {}  # modes at this time
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
@@ -237,12 +237,12 @@ class _Phases:
             self.at_once, self.ruled_out, self.unlooked, self.until = 0, {}, set(), np.inf
             return
         self.at_once += 1
+        self.latest = ", ".join(dict.fromkeys(self.records[k].name for k, _ in fired)) or self.latest
         self.unlooked |= {self.events[k][what] for k, what in fired if what != "closes"}
         self._wait(t)
         if self.at_once >= MOST_SWITCHES:
-            names = ", ".join(dict.fromkeys(self.records[k].name for k, _ in fired))
             raise _Stop(f"the modes of contacts do not settle: {self.at_once} switches within {self.same:.3g} s, the latest of "
-                        f"{names}; a compliant element where they touch, or other coefficients, leave one mode")
+                        f"{self.latest}; a compliant contact where they touch, or other coefficients, leave one mode")
 
     def _phase(self, t: float, x: np.ndarray) -> Outcome:
         """From one switch to the next."""
