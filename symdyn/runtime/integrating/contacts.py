@@ -48,7 +48,6 @@ SOFTNESS = 1e-8
 GRACE = 1e-9
 # The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
 SLIP_GRACE = 1e-5
-STILL = np.zeros(0)
 
 
 class Numbers(NamedTuple):
