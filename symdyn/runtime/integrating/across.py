@@ -141,23 +141,26 @@ class Bridge:
         n_x, way, half = len(self.x), self.way, self.length / 2
         times = self.t + C * self.length
         costs = None if integral is None else integral(times, self.stages, way.request.inputs.rows(times, self.stages))
+        of_x, of_others = np.zeros((2, n_x)), np.zeros((2, len(weights) - n_x))
+        if costs is not None:
+            whole = np.hstack([costs.by_x, of_others if costs.by is None else costs.by])
+            for t, y, row in zip(times, self.stages, whole, strict=True):
+                way.feedback.fold(t, y, row)
+            of_x, of_others = whole[:, :n_x], whole[:, n_x:]
         gained = np.zeros((2, n_x))
         rows = np.zeros((2, len(weights)))
         for _ in range(ITERATIONS):
             along = self.length * (weights[:n_x] / 2 + A.T @ gained)
             rows = np.array([way.weights("rhs_weights", t, y, a) for t, y, a in zip(times, self.stages, along, strict=True)])
-            then = rows[:, :n_x] + (0.0 if costs is None else half * costs.by_x)
+            then = rows[:, :n_x] + half * of_x
             change, gained = np.abs(then - gained).max(), then
             if change <= ENOUGH * np.abs(then).max():
                 break
         _converged(way.module, self.t, change, gained)
         weights[:n_x] += gained.sum(axis=0)
         weights[n_x:] += rows[:, n_x:].sum(axis=0)
-        if costs is None:
-            return 0.0
-        if costs.by is not None:
-            weights[n_x:] += half * costs.by.sum(axis=0)
-        return half * float(costs.values.sum())
+        weights[n_x:] += half * of_others.sum(axis=0)
+        return 0.0 if costs is None else half * float(costs.values.sum())
 
 
 def _converged(module: Module, t: float, change: float, values: np.ndarray) -> None:
@@ -235,7 +238,10 @@ class Jump:
         J: Any = module.jacobian(self.t, self.x, request.p, inputs, ["x", "t", "params", "inputs"], of)
         known = dict(zip((*metadata.parameters, *metadata.inputs), np.hstack([J.params, J.inputs]).T, strict=True))
         others = np.array([known[name] for name in self.way.carried]).reshape(len(self.way.carried), len(J.x)).T
-        return J.x, J.t[:, 0], others
+        rows = np.hstack([J.x, others])
+        for row in rows:
+            self.way.feedback.fold(self.t, self.x, row)
+        return rows[:, :len(self.x)], J.t[:, 0], rows[:, len(self.x):]
 
 
 @dataclass

@@ -30,7 +30,7 @@ from symdyn.runtime.integrating.simulate import (
     stabilization_of,
     start_of,
 )
-from symdyn.runtime.integrating.way_back import Way
+from symdyn.runtime.integrating.way_back import Feedback, Way
 from symdyn.runtime.losses import Cost, Costs, Loss, cost_of
 from symdyn.runtime.masses import real_parameters
 from symdyn.shown import name_of, shown
@@ -102,7 +102,8 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     check_start(module, span[0], start, p)
     request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))
     asked.check(module, request, method, False)
-    carried = tuple(dict.fromkeys(name for name in asked.columns if name))
+    followed = Feedback(module, free, ()).names
+    carried = tuple(dict.fromkeys([*[name for name in asked.columns if name], *followed]))
     way = _way(module, request, method, carried)
     names = way.carried
     integral, end = (None if given is None else cost_of(module, what, given, names, p)
@@ -115,6 +116,7 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
         if at.by is not None:
             weights[len(x):] = at.by[0]
         value = float(at.values[0])
+    Feedback(module, free, names).fold(t, x, weights)
     if isinstance(way, Chain):
         value += way.back(integral, weights, lambda: 0.0 if end is None else _by_time(end, request, t, x))
     else:
@@ -161,10 +163,6 @@ def _checked(module: Module, request: Request, asked: Asked, method: Any) -> str
     if not asked.names:
         raise ArgumentError(f"{module.name}: a gradient by nothing was asked for; name parameters, inputs or initial values")
     check_compiled(module, request, method)
-    if request.inputs.gradients:
-        raise ArgumentError(f"{module.name}: a gradient was asked for, but the way back does not go through functions of "
-                            "inputs that follow the state; write the law into the system's loads, or take simulate(..., "
-                            "sensitivities=[...])")
     return method
 
 

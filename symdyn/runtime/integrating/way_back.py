@@ -18,6 +18,7 @@ import numpy as np
 from symdyn.backend.methods import method_of
 from symdyn.backend.right_side import RightSide
 from symdyn.errors import EvaluationError
+from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.compiled import Run, stopped_because
 from symdyn.runtime.integrating.outcome import Request
 from symdyn.runtime.integrating.run_record import STATUS
@@ -26,8 +27,32 @@ from symdyn.runtime.losses import Cost
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
 
+
 # Steps that are tried in a stretch at first; doubled as often as there are more checkpoints than that.
 STRETCH = 128
+
+
+class Feedback:
+    """Inputs that follow the state by functions with gradients: their places among what weights are carried to besides x."""
+
+    def __init__(self, module: Module, inputs: Inputs, carried: Sequence[str]) -> None:
+        self._given = inputs
+        self._inputs = [place for places, *_ in inputs.gradients for place in places]
+        self.names = [module.metadata.inputs[place] for place in self._inputs]
+        self.places = np.array([carried.index(name) for name in self.names if name in carried], dtype=ctypes.c_long)
+
+    def slopes(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Derivatives of these inputs by the state at times (n,) and states (n, n_x), (n, n_followed, n_x)."""
+        eye = np.eye(x.shape[1])
+        rows = [self._given.slopes(tk, xk, eye)[self._inputs] for tk, xk in zip(t.tolist(), x, strict=True)]
+        return np.array(rows).reshape(len(t), len(self._inputs), x.shape[1])
+
+    def fold(self, t: float, x: np.ndarray, weights: np.ndarray) -> None:
+        """Make weights of these inputs, behind those of x (n_x,), weights of x."""
+        if len(self.places):
+            at = len(x) + self.places
+            weights[:len(x)] += weights[at] @ self.slopes(np.array([t]), x[None, :])[0]
+            weights[at] = 0.0
 
 
 @dataclass
@@ -54,6 +79,7 @@ class Way:
 
     def __init__(self, module: Module, request: Request, method: str, carried: Sequence[str], room: float) -> None:
         self.module, self.request, self.carried, self.room = module, request, tuple(carried), room
+        self.feedback = Feedback(module, request.inputs, self.carried)
         unit: Any = module.unit(RightSide(method=method, adjoint=tuple(carried)))
         self.unit, self.run = unit, Run(unit, request)
         tableau = method_of(method).tableau
@@ -102,7 +128,9 @@ class Way:
         evaluator = self.unit.evaluator(name)
         evaluator.set_params(self.request.p)
         inputs = self.request.inputs.rows(np.array([t]), x[None, :])[0]
-        return np.array(evaluator.one(t, x, inputs if len(inputs) else None, weights.copy()))
+        found = np.array(evaluator.one(t, x, inputs if len(inputs) else None, weights.copy()))
+        self.feedback.fold(t, x, found)
+        return found
 
     def _forth(self) -> _Steps:
         """To the end, with checkpoints; room for the steps of a stretch."""
@@ -154,17 +182,20 @@ class Way:
             value = float(steps.h[:n] @ costs.values.reshape(n, self.stages) @ self.b)
             of_x = np.ascontiguousarray(costs.by_x)
             of_others = None if costs.by is None else np.ascontiguousarray(costs.by)
+        places = self.feedback.places
+        feedback = self.feedback.slopes(times[:n].ravel(), states[:n].reshape(-1, self.n_x)) if len(places) else None
         ends = steps.x[1:]
         with self.run.guard:
             reason = self.unit.function("simulation_back")(
                 ctypes.byref(self.run.problem), ctypes.c_long(n),
-                *pointers(self.A, self.b, steps.h, ends, times, states, of_x, of_others, weights))
+                *pointers(self.A, self.b, steps.h, ends, times, states, of_x, of_others), ctypes.c_long(len(places)),
+                *pointers(places, feedback, weights))
         if self.run.trouble:
             raise self.run.trouble[0]
         if reason:
             raise EvaluationError(f"{self.module.name}: the derivatives along the motion cannot be evaluated: "
                                   f"{self.unit.reason(int(reason))}")
-        self._note(steps, sum(a.nbytes for a in (times, states, of_x, of_others) if a is not None))
+        self._note(steps, sum(a.nbytes for a in (times, states, of_x, of_others, feedback) if a is not None))
         return value
 
     def _inputs(self, t: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -48,11 +48,12 @@ SYMDYN_EXPORT void SYMDYN_NAME(simulation_stages)(long n, const double *A, const
 
 // Carry the weights of the state at the end of n steps back to their start, in place: weights[SYMDYN_NX], then those of
 // parameters and inputs, to which is added. ends: the states at the ends of the steps, where they were projected; b: weights of
-// the stages; of_x, of_others: what the weights of x and the others at each stage gain by time; null: nothing. Returns 0 or a
-// reason.
+// the stages; of_x, of_others: what the weights of x and the others at each stage gain by time; null: nothing. followed: places
+// among the others of n_followed inputs that follow the state, whose derivatives by it at each stage are feedback, n_followed
+// rows of SYMDYN_NX: their weights become weights of the state. Returns 0 or a reason.
 SYMDYN_EXPORT int SYMDYN_NAME(simulation_back)(const symdyn_problem *problem, long n, const double *A, const double *b,
     const double *h, const double *ends, const double *times, const double *states, const double *of_x, const double *of_others,
-    double *weights) {
+    long n_followed, const long *followed, const double *feedback, double *weights) {
     enum { WIDTH = SYMDYN_NX + SYMDYN_CARRIED };
     for (long step = n - 1; step >= 0; step--) {
         double gained[SYMDYN_STAGES][SYMDYN_NX], out[WIDTH], along[SYMDYN_NX];
@@ -79,6 +80,11 @@ SYMDYN_EXPORT int SYMDYN_NAME(simulation_back)(const symdyn_problem *problem, lo
             if (of_others)
                 for (int i = 0; i < SYMDYN_CARRIED; i++)
                     out[SYMDYN_NX + i] += h[step] * b[j] * of_others[stage * SYMDYN_CARRIED + i];
+            for (long k = 0; k < n_followed; k++) {
+                const double weight = out[SYMDYN_NX + followed[k]];
+                out[SYMDYN_NX + followed[k]] = 0.0;
+                symdyn_add(weight, feedback + (stage * n_followed + k) * SYMDYN_NX, out);
+            }
             for (int i = 0; i < SYMDYN_NX; i++) gained[j][i] = out[i];
             for (int i = SYMDYN_NX; i < WIDTH; i++) weights[i] += out[i];
         }
