@@ -38,6 +38,7 @@ class MeasuredMotion:
     cutoff   Hz: coordinates pass a low-pass filter forwards and backwards and are differentiated as a cubic spline; both sides of
              the equations pass the same filter, and two samples a period of it are kept, whose errors are independent then
     inputs   (n_t, n_in), or numbers, in order, or by name or symbol; default: their initial values
+    z        (n_t, n_z) extra states, where the system has some
     params   parameters of this motion alone, such as a load that was exchanged
 
     >>> motion = sd.MeasuredMotion(t=[0.0, 0.1], q=[[0.0], [0.1]], tau=[[1.0], [1.1]], u=[[1.0], [1.0]], ud=[[0.2], [0.3]])
@@ -50,6 +51,7 @@ class MeasuredMotion:
     ud: States | None = None
     cutoff: float | None = None
     inputs: States | None = None
+    z: States | None = None
     params: Named[float] = field(default_factory=dict)
 
 
@@ -136,6 +138,9 @@ def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str])
     elif np.shape(given) == (len(initial),) and len(initial) != n:
         given = np.broadcast_to(real_of(given, module.name, f"inputs of {which} must be numbers"), (n, len(initial)))
     inputs = table(given, metadata.inputs, "inputs") if initial else np.zeros((n, 0))
+    if motion.z is None and metadata.z:
+        faults.append(f"{which} has no z, and the system has the extra states {', '.join(metadata.z)}; give them")
+    z = np.zeros((n, 0)) if motion.z is None else table(motion.z, metadata.z, "z")
     sos, step, margin = _filter(t, motion.cutoff, which, faults)
     own = {"u": motion.u, "ud": motion.ud}
     known = {what: table(values, metadata.u, what) for what, values in own.items() if values is not None}
@@ -150,7 +155,6 @@ def _rows(module: Module, motion: MeasuredMotion, which: str, faults: list[str])
     if sos is not None and missing:
         smooth = CubicSpline(t, sosfiltfilt(sos, q, axis=0))
         q, known = smooth(t), {"u": smooth(t, 1), "ud": smooth(t, 2), **known}
-    z = np.broadcast_to(module._initial("z"), (n, metadata.sizes.z))
     params = module.parameters(dict(motion.params))
     return Rows(t, np.hstack([q, known["u"], z]), known["ud"], tau, np.ascontiguousarray(inputs), params, sos, step, margin)
 

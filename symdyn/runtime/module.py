@@ -692,7 +692,7 @@ class Module:
 
         They are the derivatives of what these steps compute, exact to rounding at given lengths of the steps; with constraints
         as far as the corrections are small. The cost is that of some simulations, however many numbers there are; memory grows
-        with the square root of the number of steps, and with the number of events. Across events, resets and instants of
+        with the square root of the number of steps; across events with that of steps. Across events, resets and instants of
         sampled controllers (which need their gradient) the motion is cut, and the derivatives are as exact as the tolerances; a
         loss at an end by an event moves with the time of it.
         Returns a Gradient. Raises ArgumentError for what does not fit, EvaluationError where the motion stops early or the loss

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -231,6 +232,13 @@ def test_other_faults() -> None:
     found = sd.identify(robot(), measured(0))
     with pytest.raises(ArgumentError, match=r"the parameters of body 'link1' were asked for, but base"):
         found.body("link1")
+    system, n = sd.systems.pendulum(), sd.coordinates("n")
+    system.add_state(n, -n)
+    with_state, rows = system.embedding().compile(backend="numpy"), np.linspace(0, 1, 9)[:, None]
+    rest = sd.MeasuredMotion(rows[:, 0], rows, rows, rows, rows)
+    with pytest.raises(ArgumentError, match="motion 1 has no z, and the system has the extra states n; give them"):
+        sd.identify(with_state, rest)
+    assert len(sd.identify(with_state, replace(rest, z=rows)).values) == 2
     loop = sd.systems.four_bar().augmented().compile(backend="numpy")
     with pytest.raises(ArgumentError, match="identification takes a tree of bodies, and there are the constraints"):
         sd.identify(loop, sd.MeasuredMotion([0, 1], np.zeros((2, 3))))

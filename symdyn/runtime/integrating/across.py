@@ -267,7 +267,7 @@ class Chain:
         self.carried = tuple(dict.fromkeys([*carried, *held]))
         self.direction = 1.0 if request.span[1] >= request.span[0] else -1.0
         self.pieces: list[Way | Bridge | Jump | Instant] = []
-        self.n_steps, self.memory = 0, 0
+        self.n_steps, self.memory = 0, outcome.t.nbytes + outcome.x.nbytes
         self.end = (request.span[0], request.x0)
         self.way: Way | None = None
 
