@@ -1,4 +1,4 @@
-"""Sensitivities of motions: errors, times beside CasADi's CVODES and diffrax's adjoints, the cost of gradients: `symdyn bench
+"""Sensitivities of motions: errors, times compared with CasADi's CVODES and diffrax's, the cost of gradients: `symdyn bench
 sensitivities`.
 
 All figures of one group come from one run. CVODES (Hindmarsh and others, ACM TOMS 31, 2005) gets the same right-hand side:
@@ -124,8 +124,8 @@ def gradient() -> Iterator[Figure]:
 
 
 def diffrax() -> Iterator[Figure]:
-    """A loss of PUMA's free fall for 1 s by the ten inertial parameters of its six links, beside diffrax's adjoints: the discrete
-    one, which is its default, and the continuous one, which integrates the motion backwards."""
+    """A loss of PUMA's free fall for 1 s by the ten inertial parameters of its six links, compared with diffrax's adjoints: the
+    discrete one, which is its default, and the continuous one, which integrates the motion backwards."""
     missing = _missing()
     if missing:
         raise MissingExtra(f"the Python package {missing[0]} is not installed; run: pip install jax diffrax")

@@ -77,7 +77,7 @@ def _matter(module: Module, request: Request, outcome: Outcome, t: float, events
     inputs = request.inputs if outcome.record is None else request.inputs.recorded(outcome.record)
     field = _Field(module, replace(request, inputs=inputs))
     length = SHORT * MOST * _spacing(outcome, t, request)
-    before, after = field.beside(t, x, -length), field.beside(t, x, length)
+    before, after = field.one_sided(t, x, -length), field.one_sided(t, x, length)
     return bool((np.abs(after - before) > JUMPS * (np.abs(after) + np.abs(before))).any())
 
 
@@ -101,7 +101,7 @@ class _Field:
     def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
         return self.module.evaluate("rhs", t, x, self.p, self.inputs(t, x))
 
-    def beside(self, t: float, x: np.ndarray, step: float) -> np.ndarray:
+    def one_sided(self, t: float, x: np.ndarray, step: float) -> np.ndarray:
         """The slope at a state as it is on one side of it, to second order in the step, which has a sign."""
         slope = self(t, x)
         for _ in range(3):  # the first ones go over to the side
@@ -126,7 +126,7 @@ class Bridge:
     def over(cls, way: Way, t: float, x: np.ndarray, length: float, side: float = 0.0) -> Bridge:
         """From a state; side: a step that leads to the side of the state where it goes on, 0: it is there already."""
         field = _Field(way.module, way.request)
-        slopes = np.tile(field.beside(t, x, side) if side else field(t, x), (2, 1))
+        slopes = np.tile(field.one_sided(t, x, side) if side else field(t, x), (2, 1))
         for _ in range(ITERATIONS):
             stages = x + length * (A @ slopes)
             then = np.array([field(t + c * length, y) for c, y in zip(C, stages, strict=True)])
@@ -354,7 +354,7 @@ class Chain:
         self.n_steps += 1
         t, x = at + bridge.length, bridge.end
         field = _Field(self.module, way.request)
-        jump = Jump(way, t, x, field.beside(t, x, -BESIDE * bridge.length), cut.events, first)
+        jump = Jump(way, t, x, field.one_sided(t, x, -BESIDE * bridge.length), cut.events, first)
         before = self.module.evaluate("events", bridge.t, bridge.x, self.request.p, field.inputs(bridge.t, bridge.x))[first]
         if abs(before) > GRAZES * abs(jump.rate() * bridge.length):
             raise EvaluationError(f"{self.module.name}: the quantity of the event {records[first].name} vanishes at t = {t:.9g} "
@@ -369,7 +369,7 @@ class Chain:
         if places:
             after[places] = self.module.evaluate("event_resets", t, x, self.request.p, field.inputs(t, x))[rows]
         length = min(bridge.length, MOST * (later - t), key=abs)
-        jump.after, jump.slope_after = after, field.beside(t, after, BESIDE * length)
+        jump.after, jump.slope_after = after, field.one_sided(t, after, BESIDE * length)
         if not length:
             return t, after, False
         bridge = Bridge.over(way, t, after, length, BESIDE * length)
