@@ -31,7 +31,7 @@ class SquareSystem:
 
     def __init__(self, algebra: Any, A: np.ndarray, reason: str) -> None:
         self.algebra, self.A, self.reason = algebra, np.asarray(A, dtype=object), reason
-        self.blocks = _blocks(np.array([[not is_zero(e) for e in row] for row in self.A], dtype=bool).reshape(self.A.shape))
+        self.blocks = blocks(np.array([[not is_zero(e) for e in row] for row in self.A], dtype=bool).reshape(self.A.shape))
         self.inverses = [self._inverse(rows, columns) for rows, columns in self.blocks]
 
     def solve(self, right: Sequence[Any] | np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def _adjugate(A: np.ndarray) -> np.ndarray:
     return np.array([cross(b, c), cross(c, a), cross(a, b)], dtype=object)
 
 
-def _blocks(structure: np.ndarray) -> list[tuple[list[int], list[int]]]:
+def blocks(structure: np.ndarray) -> list[tuple[list[int], list[int]]]:
     """Rows and columns of the diagonal blocks, in the order in which they are solved.
 
     Raises ZeroDivisionError if no choice of entries makes the matrix regular.

@@ -2,7 +2,8 @@
 
 SymPy projects the equations of systems with dependent speeds by the inverse of a part of the velocity constraints, which makes
 them long, and undefined where that part is singular. The same sums over the bodies without the projection, one equation for each
-speed, are short and defined everywhere; with multipliers for the constraints they have the same accelerations.
+speed, are short and defined everywhere; with multipliers for the constraints they have the same accelerations. Likewise where
+SymPy's solution of the kinematic equations divides by what may vanish.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError, ModelWarning
 from symdyn.formulation.by_hand.matrices import ROUNDING, GivenMatrices, GivenRow, Recorded, at_random_states
+from symdyn.formulation.square_systems import LARGEST, blocks
 from symdyn.sympy_mechanics.options import Options
 from symdyn.sympy_mechanics.taken import Taken, functions_of_time
 from symdyn.tape.differentiate import forward
@@ -67,14 +69,39 @@ def of_kane(kane: Any, options: Options) -> GivenMatrices:
 
 def _unprojected(kane: Any) -> tuple[sp.MatrixBase, sp.MatrixBase, sp.MatrixBase, sp.MatrixBase]:
     """M, f, generalized active and generalized inertia forces, one row for each speed."""
-    n = len(kane.u)
-    if not len(kane._udep):
+    n, rates = len(kane.u), _rates(kane)
+    if not len(kane._udep) and rates is None:
         return kane._k_d, -kane._f_d, kane._fr[:n, 0], kane._frstar[:n, 0]
     whole = copy.copy(kane)
     whole._udep = sp.Matrix()
+    whole._qdot_u_map = rates or kane._qdot_u_map
     active = whole._form_fr(kane._forcelist)
     inertial = whole._form_frstar(kane._bodylist)
     return whole._k_d, -whole._f_d, active, inertial
+
+
+def _rates(kane: Any) -> dict[sp.Expr, sp.Expr] | None:
+    """q' in terms of u by determinants, which vanish only where the kinematic equations are singular; None where they are solved
+    one after the other, or hold more than three derivatives together, so that SymPy's elimination stays.
+
+    SymPy eliminates without a choice of pivots, and divides by entries such as sin(roll), which vanish elsewhere, too.
+    """
+    K, A, b = kane._k_kqdot_implicit, kane._k_ku_implicit, kane._f_k_implicit
+    right = -(A * kane.u + b)
+    try:
+        order = blocks(np.array([[e != 0 for e in K.row(i)] for i in range(K.rows)], dtype=bool))
+    except ZeroDivisionError:
+        return None  # which is a fault that is reported with the equations
+    if not 1 < max(len(rows) for rows, _ in order) <= LARGEST:
+        return None
+    found = sp.zeros(K.rows, 1)
+    for rows, columns in order:
+        block = K.extract(rows, columns)
+        rest = right.extract(rows, [0]) - K.extract(rows, list(range(K.cols))) * found
+        solved = block.adjugate() * rest / block.det()
+        for place, column in enumerate(columns):
+            found[column] = solved[place]
+    return dict(zip(kane._qdot, found, strict=True))
 
 
 def _auxiliary(kane: Any, taken: Taken) -> tuple[sp.MatrixBase | None, Mapping[str, sp.Basic]]:

@@ -1,4 +1,4 @@
-"""Equations of SymPy's mechanics taken over, against SymPy's own matrices in numbers, and against published eigenvalues."""
+"""Equations of SymPy's mechanics taken over, against SymPy's own matrices in numbers, and against closed forms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from sympy.physics.mechanics import (
 import symdyn as sd
 from symdyn.lab.sympy_models import EXAMPLES, Example
 from symdyn.lab.sympy_models.chains import conical_pendulum, pendulum_on_cart
-from symdyn.lab.sympy_models.examples import BICYCLE_EIGENVALUES
 from symdyn.lab.sympy_models.measure import lambdified, random_states, taken
 
 BY_NAME = {example.name: example for example in EXAMPLES}
@@ -58,16 +57,47 @@ def test_linear_equations_are_sympys(name: str) -> None:
     assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
-def test_the_bicycle_has_the_published_eigenvalues() -> None:
-    """At 5 m/s; SymPy's own equations are undefined there, since its elimination of the dependent speeds divides by zero."""
-    example = BY_NAME["bicycle"]
-    module = taken(example, example.make()).compile()
-    eigenvalues = np.linalg.eigvals(module.linearize().A)
-    moving = sorted(eigenvalues[np.abs(eigenvalues) > 1e-6], key=lambda e: (e.real, e.imag))
-    assert np.abs(np.array(moving) - np.array(BICYCLE_EIGENVALUES)).max() < 1e-10
-    q, u = module.consistent({}, {"u2": 0.2, "u4": -5 / 0.3}, keep=["u2", "u4", "u5"])
-    sol = module.simulate((0, 2), q=q, u=u)
-    assert sol.t[-1] == 2 and sol.constraint_violation.max() < 1e-12
+def test_linear_equations_of_dependent_coordinates_have_sympys_eigenvalues() -> None:
+    derived = BY_NAME["four_bar"].make()
+    equations, kane, t = taken(BY_NAME["four_bar"], derived), derived.equations, dynamicsymbols._t
+    module = equations.compile()
+    rest = module.equilibrium(start={"q1": 0.5, "q2": 0.3, "q3": -1.5})
+    point = dict(zip(kane.q, rest.q, strict=True)) | dict.fromkeys([*kane.u, *kane.q.diff(t), *kane.u.diff(t)], 0)
+    numbers = {p: BY_NAME["four_bar"].numbers[p.name] for p in equations.symbols.parameters}
+    A, _, _ = kane.linearize(A_and_B=True, op_point=[point, {dynamicsymbols("T"): 0}, numbers])
+    expected = np.sort_complex(np.linalg.eigvals(np.array(A, dtype=float)))
+    assert np.sort_complex(np.linalg.eigvals(module.linearize(rest).A)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_linear_equations_of_lagranges_method_are_sympys() -> None:
+    example = BY_NAME["mass_spring_damper"]
+    derived = example.make()
+    equations, method, t = taken(example, derived), derived.equations, dynamicsymbols._t
+    rates = method.q.diff(t)
+    A, _, _ = method.linearize(q_ind=list(method.q), qd_ind=list(rates), A_and_B=True)
+    numbers = {p: example.numbers[p.name] for p in equations.symbols.parameters}
+    found = equations.compile().jacobian(0.0, [0.3, 0.0]).x
+    assert found == pytest.approx(np.array(A.subs(numbers), dtype=float), rel=1e-14)
+
+
+def test_a_rattleback_rests_upright_where_sympys_own_equations_are_undefined() -> None:
+    """SymPy's elimination of the derivatives of the angles divides by sin(roll); the determinant is -cos(roll)."""
+    derived = BY_NAME["rattleback"].make()
+    equations = taken(BY_NAME["rattleback"], derived)
+    assert equations.compile().rhs(0.0, np.zeros(8)) == pytest.approx(np.zeros(8), abs=1e-15)
+    at = dict.fromkeys([*derived.equations.q, *derived.equations.u], 0)
+    assert derived.equations.forcing.xreplace(at).has(sp.nan, sp.zoo)
+
+
+@pytest.mark.parametrize("spin", [2.0, 4.0])
+def test_an_upright_rolling_disc_has_the_roots_of_its_closed_form(spin: float) -> None:
+    """lambda^2 = 4 g / (5 r) - 12 spin^2 / 5 of a thin disc; the bicycle's published eigenvalues are in `symdyn bench sympy`."""
+    example = BY_NAME["rolling_disc"]
+    linear = taken(example, example.make()).compile().linearize({"q2": 0.0, "u2": spin})
+    roots = np.linalg.eigvals(linear.A)
+    expected = 0.8 * example.numbers["g"] / example.numbers["r"] - 2.4 * spin**2
+    assert np.sort(np.abs(roots))[-2:]**2 == pytest.approx([abs(expected)] * 2, rel=1e-10)
+    assert (roots.real.max() > 1e-3) == (expected > 0)
 
 
 def test_dependent_coordinates_stay_on_their_constraints() -> None:
