@@ -62,7 +62,7 @@ def of_kane(kane: Any, options: Options) -> GivenMatrices:
     found = GivenMatrices(
         name, "kane", symbols, taken.same, mass, forcing, kinematics, (active, inertial), n_d if n_d else None, tuple(rows),
         given, None, options.rates(taken), options.outputs_of(taken),
-        auxiliary if unknown else None, unknown, tuple(remarks))
+        auxiliary if unknown else None, _homogeneous(kane), unknown, tuple(remarks))
     _compare_angular_velocities(kane, found)
     return found
 
@@ -102,6 +102,14 @@ def _rates(kane: Any) -> dict[sp.Expr, sp.Expr] | None:
         for place, column in enumerate(columns):
             found[column] = solved[place]
     return dict(zip(kane._qdot, found, strict=True))
+
+
+def _homogeneous(kane: Any) -> bool:
+    """Whether velocities and angular velocities of all bodies vanish with the speeds."""
+    N, rest = kane._inertial, dict.fromkeys([*kane.u, *kane._uaux], 0)
+    vectors = [v for body in kane.bodies for v in (
+        [body.masscenter.vel(N), body.frame.ang_vel_in(N)] if hasattr(body, "central_inertia") else [body.point.vel(N)])]
+    return all(e.xreplace(kane._qdot_u_map).xreplace(rest) == 0 for v in vectors for components, _ in v.args for e in components)
 
 
 def _auxiliary(kane: Any, taken: Taken) -> tuple[sp.MatrixBase | None, Mapping[str, sp.Basic]]:

@@ -187,6 +187,20 @@ def test_equations_that_are_taken_over_pickle_print_and_prove() -> None:
     assert "kane equations of motion" in str(equations.compile().report())
 
 
+def test_the_kinetic_energy_is_known_where_nothing_moves_without_the_speeds() -> None:
+    kane = pendulum_on_cart(1).equations
+    N = kane._inertial
+    equations = sd.from_sympy(kane)
+    own = dict(zip([*kane.q, *kane.u], [*equations.symbols.coordinates, *equations.symbols.speeds], strict=True))
+    assert sd.prove(equations.T, sum(b.kinetic_energy(N) for b in kane.bodies).xreplace(own)).proved
+    q, u, x = dynamicsymbols("q u x")
+    P = Point("P")
+    P.set_vel(N, (u + x.diff()) * N.x)
+    carried = KanesMethod(N, [q], [u], [q.diff() - u])
+    carried.kanes_equations([Particle("bob", P, 1)], [(P, -q * N.x)])
+    assert "kinetic_energy" not in sd.from_sympy(carried).quantities
+
+
 def test_a_frame_whose_angular_velocity_contradicts_its_orientation_is_reported() -> None:
     with pytest.warns(sd.ModelWarning, match=r"contradict the orientations of the frames B1 \(.*\), B2"):
         sd.from_sympy(conical_pendulum(2, published=True).equations)

@@ -62,6 +62,7 @@ class GivenMatrices:
                  themselves: their sum is f - M u_dot; None: F_tilde = f, k_tilde = 0
     dependent    number of speeds that the constraints of speeds determine, where it is known
     accelerations   coefficients of u_dot and rest of the velocity constraints' derivatives, where these are given, too
+    homogeneous  whether all velocities are linear in u, without a rest, so that the kinetic energy is u^T M u / 2
     energy       kinetic and potential energy, and the power of all other forces, where they are known
     states       extra states with their rates; outputs: by name
     unknown      name -> expression for what is not in the equations of motion but follows from `auxiliary`, linear in these
@@ -83,6 +84,7 @@ class GivenMatrices:
     states: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     outputs: tuple[tuple[str, Any], ...] = ()
     auxiliary: sp.MatrixBase | None = None
+    homogeneous: bool = False
     unknown: Mapping[str, sp.Basic] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
@@ -159,6 +161,8 @@ class _Matrices(Motion):
         given = self.recorded.given
         own: dict[str, Any] = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde,
                                **{f"output_{name}": partial(self.output, name, e) for name, e in given.outputs}}
+        if given.homogeneous:
+            own["kinetic_energy"] = self.kinetic_energy
         if given.energy is not None:
             own |= {"energy": self.energy, "power": self.power, "power_x": self.power_x}
         own |= {f"output_{name}": partial(self.unknown, k) for k, name in enumerate(given.unknown)}
@@ -186,6 +190,11 @@ class _Matrices(Motion):
 
     def inverse_dynamics(self) -> np.ndarray:
         return self.recorded.M @ self.speed_rates - self.recorded.f  # type: ignore[no-any-return]
+
+    def kinetic_energy(self) -> Any:
+        """u^T M u / 2, J."""
+        u = self.recorded.speeds
+        return inner(u, self.recorded.M @ u) / 2
 
     def energy(self) -> np.ndarray:
         """Kinetic and potential energy, J."""
