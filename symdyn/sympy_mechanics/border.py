@@ -58,6 +58,10 @@ def from_sympy(equations: Derived, name: str = "system", defaults: Numbers | Non
     >>> eq.M_tilde, eq.F_tilde
     (Matrix([[l**2*m]]), Matrix([[-g*l*m*sin(q)]]))
     """
+    for what, given_as in (("states", states), ("outputs", outputs)):
+        if given_as is not None and not isinstance(given_as, Mapping):
+            raise ArgumentError(f"{what} is {shown(given_as)}; pass a mapping, such as {{z: rate}} for states, "
+                                "{'tip': expression} for outputs")
     given = given_matrices(equations, Options(name, defaults, initial, units, duration, dict(states or {}), dict(outputs or {})),
                            kinematics)
     return from_matrices(given)

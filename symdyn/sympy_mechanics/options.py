@@ -28,11 +28,11 @@ class Options:
     def use(self, taken: Taken) -> None:
         """Take the symbols of rates and outputs over."""
         for z, rate in self.states.items():
-            taken.use(f"the rate of {z}", sp.sympify(rate))
+            taken.use(f"the rate of {z}", taken.expression(rate, f"the rate of {z}"))
         for name, value in self.outputs.items():
             if not isinstance(name, str) or not name.isidentifier():
                 taken.faults.append(f"an output is named {shown(name)}; pass an identifier such as 'tip'")
-            taken.use(f"the output {name}", *_entries(value))
+            taken.use(f"the output {name}", *[taken.expression(e, f"the output {name}") for e in _entries(value)])
 
     def symbols(self, taken: Taken) -> Symbols:
         """The symbols of the equations, with numbers. Raises ModelError with all faults."""
@@ -44,9 +44,9 @@ class Options:
 
     def outputs_of(self, taken: Taken) -> tuple[tuple[str, Any], ...]:
         """Outputs by name."""
-        return tuple((name, sp.sympify(value) if len(_entries(value)) == 1 and not hasattr(value, "__len__")
-                      else tuple(_entries(value))) for name, value in self.outputs.items())
+        return tuple((name, tuple(map(sp.sympify, _entries(value))) if hasattr(value, "__len__") else sp.sympify(value))
+                     for name, value in self.outputs.items())
 
 
 def _entries(value: Any) -> list[Any]:
-    return [sp.sympify(e) for e in (list(value) if isinstance(value, (list, tuple, sp.MatrixBase)) else [value])]
+    return list(value) if isinstance(value, (list, tuple, sp.MatrixBase)) else [value]

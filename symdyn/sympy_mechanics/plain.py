@@ -9,6 +9,7 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.formulation.by_hand.matrices import GivenMatrices
+from symdyn.shown import shown
 from symdyn.sympy_mechanics.options import Options
 from symdyn.sympy_mechanics.taken import Taken
 
@@ -22,7 +23,7 @@ def of_matrices(q: Any, u: Any, mass: Any, forcing: Any, kinematics: Any, option
     q, u, forcing = (_column(values, what, options.name) for values, what in ((q, "q"), (u, "u"), (forcing, "the forcing")))
     taken = Taken(options.name, q, u, options.states)
     faults, n = taken.faults, len(u)
-    M = mass if isinstance(mass, sp.MatrixBase) else sp.Matrix(mass) if isinstance(mass, (list, tuple)) else None
+    M = mass if isinstance(mass, sp.MatrixBase) else _matrix(mass, taken)
     if M is None or M.shape != (n, n):
         faults.append(f"the mass matrix has the shape {'none' if M is None else f'{M.rows} x {M.cols}'}, there are {n} speeds; "
                       f"pass a matrix {n} x {n}")
@@ -51,7 +52,10 @@ def of_matrices(q: Any, u: Any, mass: Any, forcing: Any, kinematics: Any, option
 
 
 def _linear(kinematics: Any, q: Sequence[Any], u: Sequence[Any], taken: Taken) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix] | None:
-    rows = sp.Matrix([sp.sympify(e) for e in kinematics])
+    if not isinstance(kinematics, (list, tuple, sp.MatrixBase)):
+        taken.faults.append(f"kinematics is {shown(kinematics)}; pass a list of expressions that are zero")
+        return None
+    rows = sp.Matrix([taken.expression(e, f"kinematics[{k + 1}]") for k, e in enumerate(kinematics)])
     if len(rows) != len(q):
         taken.faults.append(f"there are {len(rows)} kinematic equations and {len(q)} coordinates; pass one for each")
         return None
@@ -62,6 +66,15 @@ def _linear(kinematics: Any, q: Sequence[Any], u: Sequence[Any], taken: Taken) -
                             "them so")
         return None
     return K, A, rows.xreplace(dict.fromkeys([*rates, *u], 0))
+
+
+def _matrix(rows: Any, taken: Taken) -> sp.Matrix | None:
+    """A matrix from rows; None where these are none."""
+    if not isinstance(rows, (list, tuple)) or not all(isinstance(row, (list, tuple)) for row in rows):
+        return None
+    if len({len(row) for row in rows}) > 1:
+        return None
+    return sp.Matrix([[taken.expression(e, "an entry of the mass matrix") for e in row] for row in rows])
 
 
 def _column(values: Any, what: str, name: str) -> list[Any]:

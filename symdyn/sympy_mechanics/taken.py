@@ -30,7 +30,11 @@ class Taken:
             self.faults.append(f"name is {shown(name)}; pass an identifier such as 'pendulum', it names files and functions")
         self.t = _time()
         self.same: dict[sp.Basic, Any] = {} if self.t == time else {self.t: time}
-        self.coordinates = [self._made(f, Coordinate, "coordinate") for f in coordinates]
+        given = list(coordinates)
+        if not given:
+            self.faults.append("there are no coordinates; pass functions of time, made with dynamicsymbols")
+        self.faults += [f"coordinate {f} is given {count} times" for f, count in Counter(map(str, given)).items() if count > 1]
+        self.coordinates = [self._made(f, Coordinate, "coordinate") for f in dict.fromkeys(given)]
         for f, q in list(self.same.items()):
             if isinstance(q, Coordinate):
                 self.same[sp.Derivative(f, self.t)] = q.dot
@@ -46,6 +50,18 @@ class Taken:
         self.inputs: dict[Input, None] = {}
         self.parameters: dict[sp.Symbol, None] = {}
         self._seen: set[sp.Basic] = set()
+
+    def expression(self, value: Any, what: str) -> sp.Expr:
+        """A number or an expression; text, which is never evaluated, and anything else is a fault."""
+        if not isinstance(value, str):
+            try:
+                found = sp.sympify(value, strict=True)
+            except (sp.SympifyError, TypeError, ValueError):
+                found = None
+            if isinstance(found, sp.Expr):
+                return found
+        self.faults.append(f"{what} is {shown(value)}; pass a number or an expression of SymPy's")
+        return sp.S.Zero
 
     def vanishing(self, functions: Iterable[Any]) -> None:
         """Functions of time that are zero, with their derivatives, such as auxiliary speeds."""
@@ -100,6 +116,9 @@ class Taken:
             self.faults.append(f"duration is {shown(duration)} s; pass a positive number")
         named = {s.name: s for s in everything}
         of_units: dict[sp.Symbol, str] = {}
+        if units is not None and not isinstance(units, Mapping):
+            self.faults.append(f"units is {shown(units)}; pass a mapping from symbols or names to text such as 'm'")
+            units = None
         for key, unit in (units or {}).items():
             symbol = named.get(name_of(take_over(key) if isinstance(key, sp.Basic) else key))
             if symbol is None or not isinstance(unit, str):

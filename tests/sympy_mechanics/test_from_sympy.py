@@ -254,6 +254,21 @@ def test_all_faults_of_plain_equations_in_one_message() -> None:
     assert "the forcing holds 'text'" in refused(([q], [u], sp.eye(1), ["text"]))
 
 
+def test_text_is_never_evaluated_and_other_values_are_named() -> None:
+    q, u = dynamicsymbols("q u")
+    plain = [q], [u], sp.eye(1), [0]
+    assert "kinematics[1] is '1/0'; pass a number" in refused(plain, kinematics=["1/0"])
+    assert "the output tip is '1/0'; pass a number" in refused(plain, outputs={"tip": "1/0"})
+    assert "the rate of z(t) is 'x'; pass a number" in refused(plain, states={dynamicsymbols("z"): "x"})
+    assert "an entry of the mass matrix is 'a'; pass a number" in refused(([q], [u], [["a"]], [0]))
+    assert "kinematics is 3; pass a list" in refused(plain, kinematics=3)
+    assert "units is 3; pass a mapping" in refused(plain, units=3)
+    assert "states is 3; pass a mapping" in refused(plain, states=3)
+    assert "outputs is 3; pass a mapping" in refused(plain, outputs=3)
+    assert "there are no coordinates" in refused(([], [], sp.zeros(0, 0), []))
+    assert "coordinate q(t) is given 2 times" in refused(([q, q], [u, u], sp.eye(2), [0, 0]))
+
+
 def test_configuration_constraints_that_the_speeds_do_not_follow() -> None:
     q1, q2, u1, u2 = dynamicsymbols("q1 q2 u1 u2")
     N, P = ReferenceFrame("N"), Point("P")
