@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
 from symdyn.analytic.linear import State
 from symdyn.errors import SymdynError
-from symdyn.exact.prove import prove
+from symdyn.exact.prove import prove, with_known_angles
 from symdyn.exact.represent import plain
 from symdyn.exact.shortest import Writer, not_negative, written
 from symdyn.exact.taken import recorded
@@ -122,8 +123,10 @@ def equilibria(equations: Equations, fixed: Mapping[Any, Any] | None = None, val
     try:
         return within(seconds, search.result)
     except TimeUp:
-        raise SymdynError(f"{equations.name}: equilibria in closed form were not found within {seconds:g} s; pass numbers for "
-                          "parameters with values=..., fix coordinates, or use module.equilibria()") from None
+        left = len(equations.symbols.parameters) - len(state.parameters)
+        numbers = "pass numbers for parameters with values=..., " if left else ""
+        raise SymdynError(f"{equations.name}: equilibria in closed form were not found within {seconds:g} s; {numbers}fix "
+                          "coordinates, or use module.equilibria()") from None
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,8 @@ class _Case:
         real = [c for c in conditions if c != True]  # noqa: E712
         return _Case(tuple(e.subs(values) for e in self.left),
                      (*[(x, e.subs(values)) for x, e in self.found], *values.items()),
-                     (*self.angles, *(angles or {}).items()), (*self.conditions, *real))
+                     (*[(k, e.subs(values)) for k, e in self.angles], *(angles or {}).items()),
+                     (*self.conditions, *real))
 
 
 def _within(point: EquilibriumPoint, other: EquilibriumPoint) -> bool:
@@ -176,10 +180,11 @@ class _Search:
         self.coordinates = [symbol for q, symbol in zip(m.q, s.coordinates, strict=True)
                             if q not in state.values and symbol not in state.drifting]
         states = [symbol for z, symbol in zip(m.z, s.states, strict=True) if z not in state.values]
-        self.unknown: list[sp.Symbol] = [*self.coordinates, *states, *multipliers.values()]
+        self.multipliers = list(multipliers.values())
+        self.unknown: list[sp.Symbol] = [*self.coordinates, *states, *self.multipliers]
         # In their shortest form sums of angles stand as such, so that they become base angles.
         found = written(entries, {**self.equations.printed_leaves(), **state.symbols, **multipliers})
-        self.entries = [e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)}) for e in found]
+        self.entries = [with_known_angles(e.xreplace({f: _decimal(f) for f in e.atoms(sp.Float)})) for e in found]
         if any(time in symbols_of(e) for e in self.entries):
             raise SymdynError(f"{self.equations.name}: equilibria in closed form were requested, but the time stands in its "
                               "equations, so that a state of rest at one time is none at another; use module.periodic, or "
@@ -297,6 +302,9 @@ class _Search:
             left.append(e)
         if not left:
             return None
+        solved = self._forces(case, left)
+        if solved is not None:
+            return [solved]
         # The simplest first: what it gives makes the others shorter.
         left.sort(key=lambda e: (len(self._unknowns(e)), sp.count_ops(e)))
         for k, e in enumerate(left):
@@ -313,7 +321,8 @@ class _Search:
             linear = self._linear(case, e)
             if linear is not None:
                 return [linear]
-        return self._by_basis(case)
+        closed = self._closed(case)
+        return self._by_basis(case) if closed is None else [closed]
 
     def _factors(self, e: sp.Expr) -> list[sp.Expr]:
         """Factors that hold unknowns, each once; those in parameters are taken not to be zero."""
@@ -345,6 +354,36 @@ class _Search:
                 if p.degree() == 1 and not p.coeff_monomial(x).free_symbols & self._names:
                     self._assume(p.coeff_monomial(x))
                     return case.put({x: -p.coeff_monomial(1) / p.coeff_monomial(x)})
+        return None
+
+    def _forces(self, case: _Case, left: Sequence[sp.Expr]) -> _Case | None:
+        """Multipliers where nothing else is unknown and as many equations as multipliers are left."""
+        unknown = [x for x in self.multipliers if any(e.has(x) for e in left)]
+        if len(unknown) != len(left) or any(e.free_symbols & (self._names - set(unknown)) for e in left):
+            return None
+        matrix, right = sp.linear_eq_to_matrix(list(left), unknown)
+        below = matrix.det(method="berkowitz")
+        if _proved(below) or _vanishes(below):
+            return None
+        found = matrix.adjugate() * right / below
+        return _Case((), case.found, case.angles, case.conditions).put(dict(zip(unknown, found, strict=True)))
+
+    def _closed(self, case: _Case) -> _Case | None:
+        """Sine and cosine of an angle eliminated from two equations in which they stand linearly, as where a loop closes:
+        a s + b c + d = 0 twice; then s^2 + c^2 = 1 is an equation for what is in d."""
+        for k, (s, c) in self.pairs.items():
+            rows = [p for p in (sp.Poly(e, s, c) for e in case.left) if p.total_degree() == 1
+                    and not any(p.coeff_monomial(x).free_symbols & self._names for x in (s, c))]
+            for one, other in combinations(rows, 2):
+                matrix = sp.Matrix([[p.coeff_monomial(x) for x in (s, c)] for p in (one, other)])
+                regular = sp.factor(matrix.det())
+                if regular == 0:
+                    continue
+                self._assume(regular)
+                sine, cosine = (sp.factor(e) for e in matrix.adjugate() * sp.Matrix([-p.coeff_monomial(1) for p in (one, other)])
+                                / regular)
+                found = case.put({s: sine, c: cosine}, {k: sp.atan2(sine, cosine)})
+                return replace(found, left=(*found.left, sine**2 + cosine**2 - 1))
         return None
 
     def _single(self, case: _Case, e: sp.Expr, unknown: Any) -> list[_Case] | None:
@@ -491,7 +530,8 @@ def _decimal(value: Any) -> Any:
 
 
 def _proved(e: sp.Expr) -> bool:
-    return not e.has(sp.CRootOf, sp.atan2) and prove(_plain(e)).proved
+    e = _plain(e)
+    return not e.has(sp.CRootOf, sp.atan2) and prove(e).proved
 
 
 def _vanishes(e: sp.Expr) -> bool:

@@ -378,8 +378,11 @@ class _Linearization:
         m, equations = self.m, self.equations
         if not all(equations.holonomic):
             names = [n for n, holonomic in zip(equations.constraints, equations.holonomic, strict=True) if not holonomic]
-            raise SymdynError(f"{equations.name}: linear equations in symbols were requested, but {', '.join(names)} constrains "
-                              "velocities; use module.linearize(at)")
+            verb = "constrains" if len(names) == 1 else "constrain"
+            raise SymdynError(f"{equations.name}: linear equations in symbols were requested, but {', '.join(names)} {verb} "
+                              "velocities and no positions, so that more displacements are free than speeds, and there is no "
+                              "M eta_ddot + C eta_dot + K eta; use module.linearize(at), whose A and B hold displacements and "
+                              "speeds of their own number")
         if not all(map(is_zero, self._by(C, m.inputs).ravel())):
             raise SymdynError(f"{equations.name}: linear equations in symbols were requested, but inputs stand in its "
                               "constraints; use module.linearize(at)")

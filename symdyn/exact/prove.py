@@ -117,7 +117,7 @@ def prove(a: Scalar | Matrix | Equations, b: Scalar | Matrix | Equations = 0,
         left, right, relations = (list(map(take_over, side)) for side in (left, right, relations))
     try:
         entries = [*left, *right, *relations]
-        nodes, symbols = recorded(map(_with_known_angles, entries), _same_functions(entries))
+        nodes, symbols = recorded(map(with_known_angles, entries), _same_functions(entries))
     except (UnsupportedExpression, ZeroDivisionError) as error:
         return Proof(False, reason=str(error))
     n = len(left)
@@ -189,7 +189,7 @@ def _same_functions(entries: Sequence[sp.Expr]) -> dict[Any, Any]:
     return same
 
 
-def _with_known_angles(e: sp.Expr) -> sp.Expr:
+def with_known_angles(e: sp.Expr) -> sp.Expr:
     """The expression with sin(x + pi/3) and others by the sum, where SymPy has roots for sine and cosine of the number."""
     if not e.has(sp.pi):
         return e
@@ -234,7 +234,7 @@ def unproved(pairs: Sequence[tuple[sp.Expr, sp.Expr]], bound: int = BOUND, same:
     What stands in the way of all pairs together, such as a pair that is too large, is looked for pair by pair.
     """
     try:
-        nodes, symbols = recorded([_with_known_angles(side) for pair in pairs for side in pair], same)
+        nodes, symbols = recorded([with_known_angles(side) for pair in pairs for side in pair], same)
         recorder = _recorder(nodes)
         exact = Exact([recorder.sub(x, y) for x, y in zip(nodes[::2], nodes[1::2])], bound, positive=not_negative(symbols))
     except (UnsupportedExpression, ZeroDivisionError, TooLarge) as error:

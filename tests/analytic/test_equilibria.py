@@ -149,8 +149,10 @@ def test_time_is_bounded():
     import dataclasses
 
     eq = sd.systems.get("four_bar").augmented()
-    with pytest.raises(SymdynError, match=r"were not found within 1 s; pass numbers for parameters with values=\.\.\."):
+    with pytest.raises(SymdynError, match=r"were not found within 1 s; fix coordinates, or use module.equilibria"):
         dataclasses.replace(eq, simplify_seconds=1.0).equilibria(values=eq.symbols.defaults)
+    with pytest.raises(SymdynError, match=r"were not found within 1 s; pass numbers for parameters with values=\.\.\."):
+        dataclasses.replace(eq, simplify_seconds=1.0).equilibria({"q1": sp.Symbol("alpha", real=True)})
 
 
 def test_bounds_on_cases_and_angles(monkeypatch):
@@ -193,3 +195,28 @@ def test_held_coordinates():
         eq.equilibria(fixed=["q1"])
     with pytest.raises(ArgumentError, match="fixed has q9; it takes q1, q2, q1_dot, q2_dot, tau1, tau2"):
         eq.equilibria(fixed={"q9": 0})
+
+
+def test_loops_with_a_held_crank_are_closed():
+    """Four bars with numbers: the two positions of the loop, and multipliers that balance the weights, to 50 digits."""
+    eq = sd.systems.get("four_bar").augmented()
+    q1, q2, q3 = eq.symbols.coordinates
+    numbers = {p: sp.Rational(str(value)) for p, value in eq.symbols.defaults.items()}
+    found = eq.equilibria(fixed={"q1": sp.pi / 3}, values=eq.symbols.defaults)
+    assert len(found) == 2
+    lengths = {p.name: value for p, value in numbers.items()}
+    positions = set()
+    for point in found:
+        here = {**numbers, q1: sp.pi / 3, **{q: e for q, e in point.values.items() if q in (q2, q3)},
+                **dict.fromkeys(eq.symbols.speeds, 0)}
+        lam = sp.Matrix([e for s, e in point.values.items() if s.name.startswith("lambda")])
+        C, C_r, F = (e.subs(here).evalf(50) for e in (eq.C, eq.C_r, eq.F_tilde))
+        assert max(abs(e) for e in C) < 1e-45
+        assert max(abs(e) for e in (F - C_r.T * lam.evalf(50))[1:]) < 1e-42
+        angle = sp.N(here[q1] + here[q2], 50)
+        positions.add(round(float(sp.atan2(sp.sin(angle), sp.cos(angle))), 9))
+        # Freudenstein, Approximate synthesis of four-bar linkages, Trans. ASME 77 (1955).
+        coupler = (lengths["l1"] * sp.cos(here[q1]) + lengths["l2"] * sp.cos(angle) - lengths["d"]) ** 2 \
+            + (lengths["l1"] * sp.sin(here[q1]) + lengths["l2"] * sp.sin(angle)) ** 2
+        assert abs(sp.N(coupler - lengths["l3"] ** 2, 50)) < 1e-45
+    assert len(positions) == 2
