@@ -46,7 +46,7 @@ class EquilibriumPoint:
     """A state of rest in closed form.
 
     values       coordinate (or extra state, or multiplier) -> expression in parameters
-    free         coordinates that may have any value
+    free         coordinates that may have any value, and multipliers, where constraints are singular
     conditions   inequalities between parameters that make the values real
     proved       whether the equations are zero there by exact algebra; where not, by numbers of 30 digits
     """
@@ -211,7 +211,7 @@ class _Search:
         """What generators of the ring are in the polynomials. Raises SymdynError where unknowns stand elsewhere."""
         exact, name = self.exact, self.equations.name
         used = {k for v in exact.values for p in (v.num, *[exact.ring.factors[f] for f, _ in v.under])
-                for k, degree in enumerate(p.degrees()) if degree}
+                for k, degree in enumerate(p.degrees()) if degree > 0}  # of zero they are -1
         turning: set[Node] = set()
         unknown = self.unknown_leaves
         for k, (sine, cosine) in enumerate(exact.sines):
@@ -494,7 +494,7 @@ class _Search:
         """Coordinates of a case; None where it contradicts itself."""
         angles = dict(case.angles)
         values = {x: e for x, e in case.found if x in self.unknown}
-        free = [q for q in self.coordinates if q not in self.turning and q not in values]
+        free = [x for x in (*self.coordinates, *self.multipliers) if x not in self.turning and x not in values]
         for k in self.pairs:
             if k not in angles:
                 angles[k] = sp.Dummy("free")

@@ -21,7 +21,7 @@ import sympy as sp
 
 from symdyn.analytic.lagrange import Mechanics
 from symdyn.analytic.minors import solve
-from symdyn.errors import ArgumentError, SymdynError
+from symdyn.errors import ArgumentError, EvaluationError, SymdynError
 from symdyn.exact.prove import decide, drawn_state
 from symdyn.exact.ring import TooLarge
 from symdyn.exact.shortest import written
@@ -254,7 +254,11 @@ def linearized(equations: Equations, about: Mapping[Any, Any] | None = None, hol
     Raises ArgumentError for unknown names and values that move, SymdynError for what has no constant linear equations: where
     time appears, where what drifts appears, velocity constraints, steady motion under constraints or in quasi-velocities.
     """
-    return _Linearization(State(equations, about, hold)).result()
+    try:
+        return _Linearization(State(equations, about, hold)).result()
+    except EvaluationError as error:
+        raise SymdynError(f"{equations.name}: linear equations were requested at a state where an expression divides by zero "
+                          f"({error}); what about leaves out is zero: give another state") from None
 
 
 class State:

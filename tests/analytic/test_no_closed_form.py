@@ -120,3 +120,33 @@ def test_conditions_that_never_hold() -> None:
 def test_claims_at_states_where_what_is_compared_is_not_real() -> None:
     symbol = sp.Symbol("x")
     assert not sd.prove(sp.Max(sp.log(symbol), symbol), symbol).refuted
+
+
+def test_multipliers_at_singular_positions_are_free() -> None:
+    """A rod whose middle and end are guided: at its dead point the guide's force is any."""
+    system = sd.systems.get("slider_crank")
+    found = system.augmented().equilibria()
+    assert len(found) == 2 and all([str(s) for s in point.free] == ["lambda1"] for point in found)
+
+
+def test_a_spring_to_an_axis_has_no_polynomial_conditions() -> None:
+    z = sd.coordinates("z")
+    system = sd.System("cylinder", gravity=[0, 0, -g])
+    body = system.add_body("body", mass=m, inertia=[c, c, d])
+    system.add_joint(sd.Cylindrical("joint", system.ground, body, coordinates=[theta, z], axis=[0, 0, 1]))
+    system.add_spring_damper(system.ground, body, point_b=[length, 0, 0], stiffness=k, length=rest)
+    with pytest.raises(SymdynError, match="which is no polynomial; use module"):
+        system.embedding().equilibria()
+
+
+def test_linear_equations_where_an_expression_divides_by_zero() -> None:
+    system = sd.System("puck", planar=True)
+    arm, puck = system.add_body("arm"), system.add_body("puck", mass=m)
+    system.add_joint(sd.Revolute("turn", system.ground, arm, coordinate=theta))
+    system.add_joint(sd.Prismatic("slide", arm, puck, axis=[1, 0], coordinate=s))
+    system.add_spring_damper(system.ground, puck, stiffness=k, length=rest)
+    equations = system.embedding()
+    with pytest.raises(SymdynError, match="linear equations were requested at a state where an expression divides by zero"):
+        equations.linearized()
+    linear = equations.linearized({s: rest})
+    assert sp.Matrix([[0, 0], [0, k]]) == linear.K and linear.conditions == ()
