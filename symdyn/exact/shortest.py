@@ -383,10 +383,11 @@ def shortest(value: Any, form: str = "shortest") -> Any:
     return sp.Matrix(*value.shape, result) if isinstance(value, sp.MatrixBase) else result[0]
 
 
-def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "shortest", zeros: Sequence[Any] = ()) -> Any:
+def explicit(output: Output, symbols: Mapping[Node, sp.Expr], form: str = "shortest", zeros: Sequence[Any] = (),
+             unit_vectors: Sequence[Sequence[Node]] = ()) -> Any:
     """An output of a tape as explicit SymPy: a scalar expression, or a matrix (column for a vector); zeros: entries that vanish
-    where it is to hold. Raises as `written`."""
-    entries = written(output.entries, symbols, form, zeros=zeros)
+    where it is to hold; unit_vectors as for `written`. Raises as `written`."""
+    entries = written(output.entries, symbols, form, unit_vectors=unit_vectors, zeros=zeros)
     if output.shape == ():
         return entries[0]
     rows, columns = output.shape if len(output.shape) == 2 else (output.shape[0], 1)

@@ -204,7 +204,8 @@ class Equations:
             zeros = self._vanishing() if on_constraints else ()
             try:
                 with collector_paused():
-                    self._printed[key] = explicit(output, self.printed_leaves(), form, zeros)
+                    units = [[self.leaves[p] for p in group] for group in self.unit_groups]
+                    self._printed[key] = explicit(output, self.printed_leaves(), form, zeros, units)
             except (TooLarge, ZeroDivisionError) as error:
                 if form != "shortest":
                     raise SymdynError(f"{self.name}: {name} is too large for the form {shown(form)}: {error}; print its steps "

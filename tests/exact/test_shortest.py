@@ -167,3 +167,29 @@ def test_springs_along_an_axis_have_absolute_values_in_place_of_roots_of_squares
         assert eq.V.subs(numbers) == sp.Rational(5, 4) * (sp.Rational(4, 3) - abs(value + sp.Rational(1, 3))) ** 2
         force = -sp.Rational(5, 2) * (abs(value + sp.Rational(1, 3)) - sp.Rational(4, 3)) * sp.sign(value + sp.Rational(1, 3))
         assert eq.F_tilde[0].subs(numbers) == force
+
+
+@pytest.mark.parametrize("formulation", ["recursive", "embedding"])
+def test_squares_of_euler_parameters_add_up_to_one(formulation):
+    """The weight of a body that is free, and its equations at a random orientation, to 50 digits."""
+    m, g, l, I1, I2, I3 = sd.parameters("m g l I1 I2 I3", positive=True)
+    system = sd.System("ball", gravity=[0, 0, -g])
+    body = system.add_body("body", mass=m, inertia=[I1, I2, I3])
+    system.add_joint(sd.Free("joint", system.ground, body, orientation=sd.EulerParameters()))
+    eq = getattr(system, formulation)()
+    assert list(eq.F_tilde) == [0, 0, -g * m, 0, 0, 0]
+    assert sp.diag(m, m, m, I1, I2, I3) == eq.M_tilde
+    system = sd.System("top", gravity=[0, 0, -g])
+    body = system.add_body("body", mass=m, inertia=[I1, I2, I3], com=[0, 0, l])
+    system.add_joint(sd.Free("joint", system.ground, body, orientation=sd.EulerParameters()))
+    eq = getattr(system, formulation)()
+    q, u = eq.symbols.coordinates, eq.symbols.speeds
+    unit = [sp.Rational(n, 15) for n in (2, -4, 6, 13)]
+    assert sum(e**2 for e in unit) == 1
+    values = {**dict(zip(q, [*sp.Matrix([1, 2, 3]) / 7, *unit], strict=True)),
+              **{w: sp.Rational(2 * k - 5, 9) for k, w in enumerate(u)},
+              **{p: sp.Rational(k + 3, 7) for k, p in enumerate((m, g, l, I1, I2, I3))}}
+    for name in ("M_tilde", "k_tilde", "F_tilde", "T", "V"):
+        short, derived = (sp.Matrix([eq.explicit(name, simplify=way)]) for way in (True, False))
+        assert all(e == 0 for e in (short - derived).subs(values))
+        assert sp.count_ops(short) <= sp.count_ops(derived)
