@@ -58,6 +58,7 @@ class Mechanism:
 
     kinds      topology, motion, features, formulation and backend
     module     what is linearized at t, x, params (by name), inputs (n_in,), with what is named in `hold` held
+    equations  what `module` was compiled from
     reference  the same mechanism, but with constraints that hold what is held; `module` itself where nothing is
     constant   whether linear equations about the motion are constant along it
     redraws    how many draws were ill-conditioned before
@@ -66,6 +67,7 @@ class Mechanism:
     number: int
     kinds: tuple[str, ...]
     module: Any
+    equations: Any
     reference: Any
     t: float
     x: np.ndarray
@@ -148,7 +150,7 @@ class _Composer:
         features = tuple(sorted(self.features)) or ("plain",)
         constant = self.motion != "any" and not self.timed and not (formulation == "absolute" and self.motion == "steady")
         kinds = (self.topology, self.motion, *features, formulation, backend)
-        return Mechanism(self.number, kinds, module, reference, draft.t, x, params, inputs, hold, constant, redraws)
+        return Mechanism(self.number, kinds, module, equations, reference, draft.t, x, params, inputs, hold, constant, redraws)
 
     # -- the description
 

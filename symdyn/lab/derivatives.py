@@ -1,0 +1,288 @@
+"""Derivatives of random mechanisms and of the catalogue against differences of the tape with 60 digits.
+
+    python -m symdyn.lab.derivatives --count 1000 --seed 0      as many random mechanisms of all kinds
+    python -m symdyn.lab.derivatives --catalogue                all mechanisms of the catalogue
+    python -m symdyn.lab.derivatives --only 17                  one of them
+
+Of x_dot, multipliers and inverse dynamics, the derivatives by x, inputs, parameters, time and accelerations are taken along a
+random direction in each group, by module.jacobian, and compared with the central difference of the function's own tape.
+Along Euler parameters a direction keeps their norm; where constraints are redundant it stays on them. An error is that of J v
+relative to |J| |v| (Frobenius), or to the function where its derivative vanishes, by the condition number of the equations that
+accelerations and multipliers are solved from; it must be at most BOUND. Multipliers of redundant constraints are found by
+iteration (symdyn.tape.kernels.Multipliers): their derivatives are to be as exact as they are. Derivatives of rows of states must
+have the bits of those of each state.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time as clock
+import warnings
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import mpmath
+import numpy as np
+
+from symdyn.errors import SymdynError
+from symdyn.formulation.equations import Equations
+from symdyn.functions.tapes import function_tape, has_function
+from symdyn.lab.mechanisms import draw
+from symdyn.runtime.building.compiler import find_compiler
+from symdyn.systems import get, names
+from symdyn.tape.evaluate import evaluate
+
+FUNCTIONS = ("rhs", "lam", "inverse_dynamics")
+GROUPS = ("x", "inputs", "params", "t", "ud")
+BOUND = 1e-13
+DIGITS, STEP = 60, mpmath.mpf(10) ** -20
+# One random mechanism in so many is compiled to C besides.
+IN_C = 10
+# Derivatives of multipliers may have this times the relative error of the multipliers themselves.
+TIMES = 20
+# Singular values below this part of the largest are those of dependent constraints.
+RANK = 1e-8
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where derivatives are taken: t (s), x (n_x,), inputs (n_in,), params (n_p,), ud (n_u,)."""
+
+    t: float
+    x: np.ndarray
+    inputs: np.ndarray
+    params: np.ndarray
+    ud: np.ndarray
+
+    def group(self, by: str) -> np.ndarray:
+        """The numbers that a group of arguments has."""
+        return np.array([self.t]) if by == "t" else np.asarray(getattr(self, by), dtype=float)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Errors of one mechanism.
+
+    errors      "rhs by x" -> error, see above; condition: of the equations
+    own         error of the multipliers themselves, relative, by the condition number
+    same_bits   whether rows of states have the bits of each state
+    """
+
+    name: str
+    errors: dict[str, float]
+    condition: float
+    same_bits: bool
+    seconds: float
+    fault: str = ""
+    own: float = 0.0
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """Which derivative has the largest error, and the error."""
+        return max(self.errors.items(), key=lambda one: one[1] if np.isfinite(one[1]) else np.inf, default=("nothing", 0.0))
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is within the bound."""
+        return not self.fault and self.same_bits and all(e <= self.bound(what) for what, e in self.errors.items())
+
+    def bound(self, what: str) -> float:
+        """What an error is held to."""
+        return max(BOUND, TIMES * self.own) if what.startswith("lam") else BOUND
+
+    def __str__(self) -> str:
+        what, error = self.worst
+        verdict = "passed" if self.passed else "FAILED"
+        return (f"{self.name:44} {verdict}  {error:.1e} {what:26} condition {self.condition:.0e}"
+                f"{'' if self.same_bits else '  ROWS DIFFER'}{f'  {self.fault}' if self.fault else ''}  {self.seconds:.1f} s")
+
+
+def measure(name: str, equations: Equations, modules: Sequence[Any], point: Point, seed: int) -> Result:
+    """The errors of some modules of equations at a point."""
+    begun = clock.perf_counter()
+    rng = np.random.default_rng(seed)
+    values = _values(equations, point)
+    condition = condition_of(equations, values)
+    errors: dict[str, float] = {}
+    same, own = True, 0.0
+    for of in (f for f in FUNCTIONS if has_function(equations, f)):
+        tape = function_tape(equations, of)
+        value = next(iter(evaluate(tape, values, DIGITS).values())).astype(float)
+        level = float(np.linalg.norm(value))
+        if of == "lam":
+            far = max(np.linalg.norm(m.evaluate(of, point.t, point.x, point.params, point.inputs) - value) for m in modules)
+            own = float(far) / (level * condition) if level else 0.0
+        for by in _groups(of, point):
+            direction = _direction(equations, modules[0], by, point, rng)
+            exact = _difference(equations, tape, values, by, point, direction)
+            for module in modules:
+                found = _derivative(module, of, by, point, 1)[0]
+                size = max(float(np.linalg.norm(found) * np.linalg.norm(direction)), level, 1e-30)
+                error = float(np.linalg.norm(found @ direction - exact)) / (size * condition)
+                errors[f"{of} by {by}"] = max(errors.get(f"{of} by {by}", 0.0), error)
+                rows = _derivative(module, of, by, point, 3)
+                same &= all(np.array_equal(row, found) for row in rows)
+    return Result(name, errors, condition, same, clock.perf_counter() - begun, own=own)
+
+
+def _groups(of: str, point: Point) -> list[str]:
+    return [by for by in GROUPS if len(point.group(by)) and (by != "ud" or of == "inverse_dynamics")]
+
+
+def _derivative(module: Any, of: str, by: str, point: Point, n: int) -> np.ndarray:
+    """The matrix at n rows of the same state."""
+    rows = [np.repeat(a[None], n, axis=0) for a in (point.x, point.ud)]
+    ud = rows[1] if of == "inverse_dynamics" else ()
+    found = module.jacobian(np.full(n, point.t), rows[0], point.params, point.inputs, [by], of, ud)
+    return np.asarray(getattr(found, by))
+
+
+def _values(equations: Equations, point: Point) -> dict[str, float]:
+    """Leaf -> number."""
+    s = equations.symbols
+    named = zip((*s.coordinates, *s.speeds, *s.states, *s.inputs, *s.parameters),
+                (*point.x, *point.inputs, *point.params), strict=True)
+    rates = zip(s.speeds, point.ud, strict=True)
+    return {**{a.name: float(v) for a, v in named}, "t": point.t, **{f"{u.name}_dot": float(v) for u, v in rates}}
+
+
+def _names(equations: Equations, by: str) -> list[str]:
+    s = equations.symbols
+    found = {"x": [a.name for a in (*s.coordinates, *s.speeds, *s.states)], "inputs": [a.name for a in s.inputs],
+             "params": [a.name for a in s.parameters], "t": ["t"], "ud": [f"{u.name}_dot" for u in s.speeds]}
+    return found[by]
+
+
+def _direction(equations: Equations, module: Any, by: str, point: Point, rng: np.random.Generator) -> np.ndarray:
+    """A random direction, of parameters in the size of their numbers; of x one along which Euler parameters stay of unit length
+    and redundant constraints hold."""
+    numbers = point.group(by)
+    direction = rng.normal(size=len(numbers)) * (np.abs(numbers) if by == "params" else 1.0)
+    if by != "x":
+        return direction
+    s = equations.symbols
+    for group in equations.unit_groups:
+        at = [s.coordinates.index(q) for q in group]
+        e = numbers[at]
+        direction[at] -= e * (e @ direction[at]) / (e @ e)
+    if equations.constraints:
+        rows = np.vstack([module.jacobian(point.t, point.x, point.params, point.inputs, ["x"], of).x for of in ("C", "C_dot")])
+        if np.linalg.matrix_rank(rows, RANK * np.linalg.norm(rows)) < np.count_nonzero(rows.any(axis=1)):
+            direction -= np.linalg.pinv(rows, RANK) @ (rows @ direction)
+    return direction
+
+
+def _difference(equations: Equations, tape: Any, values: dict[str, float], by: str, point: Point,
+                direction: np.ndarray) -> np.ndarray:
+    """The derivative along a direction with 60 digits, rounded."""
+    with mpmath.workdps(DIGITS):
+        sides = []
+        for sign in (1, -1):
+            moved = {n: mpmath.mpf(v) + sign * STEP * mpmath.mpf(float(d))
+                     for n, v, d in zip(_names(equations, by), point.group(by), direction, strict=True)}
+            sides.append(next(iter(evaluate(tape, {**values, **moved}, DIGITS).values())))
+        return np.asarray((sides[0] - sides[1]) / (2 * STEP), dtype=object).astype(float)
+
+
+def condition_of(equations: Equations, values: dict[str, float]) -> float:
+    """Of the mass matrix or, with constraints, of the matrix that accelerations and multipliers are solved from, without what is
+    zero of dependent constraints."""
+    M = evaluate(equations.tape("M_tilde"), values, 30)["M_tilde"].astype(float)
+    if has_function(equations, "C_r"):
+        C = evaluate(equations.tape("C_r"), values, 30)["C_r"].astype(float)
+        M = np.block([[M, C.T], [C, np.zeros((len(C), len(C)))]])
+    sizes = np.linalg.svd(M, compute_uv=False)
+    kept = sizes[sizes > RANK * sizes[0]]
+    return float(kept[0] / kept[-1])
+
+
+def random_result(number: int, seed: int) -> Result:
+    """Of a random mechanism."""
+    m = draw(number, seed)
+    name = f"{number} {' '.join(m.kinds)}"
+    ud = np.random.default_rng(number).normal(size=len(m.module.metadata.u))
+    point = Point(m.t, m.x, m.inputs, m.module.parameters(m.params), ud)
+    modules = [m.module]
+    if number % IN_C == 0 and find_compiler() is not None:
+        modules.append(m.equations.compile(backend="c"))
+    return _measured(name, m.equations, modules, point, number)
+
+
+def catalogue_result(name: str) -> Result:
+    """Of a mechanism of the catalogue, in NumPy and in C, at its start."""
+    system = get(name)
+    equations = system.augmented() if name in names(constrained=True) else system.embedding()
+    modules = [equations.compile(backend=b) for b in (("numpy", "c") if find_compiler() is not None else ("numpy",))]
+    rng, s = np.random.default_rng(5), equations.symbols
+    start = np.array([float(s.initial.get(a, 0)) for a in (*s.coordinates, *s.speeds, *s.states)])
+    start += 0.05 * rng.normal(size=len(start))
+    n_q, n_u = len(s.coordinates), len(s.speeds)
+    if equations.constraints or equations.unit_groups:
+        q, u = modules[0].consistent(start[:n_q], start[n_q:n_q + n_u])
+        start[:n_q + n_u] = np.concatenate([q, u])
+    params = np.array([0.6 if v is None else v for v in modules[0].metadata.defaults])
+    point = Point(0.3, start, rng.normal(size=len(s.inputs)), params, rng.normal(size=n_u))
+    return _measured(name, equations, modules, point, 5)
+
+
+def _measured(name: str, equations: Equations, modules: Sequence[Any], point: Point, seed: int) -> Result:
+    """The result; what raises an error is a fault."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return measure(name, equations, modules, point, seed)
+        except SymdynError as error:
+            return Result(name, {}, np.nan, True, 0.0, f"{type(error).__name__}: {error}")
+
+
+def results(numbers: Sequence[int], seed: int, jobs: int) -> Iterator[Result]:
+    """Of random mechanisms, in their order."""
+    one = partial(random_result, seed=seed)
+    if jobs == 1:
+        yield from map(one, numbers)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        yield from pool.map(one, numbers)
+
+
+def summary(found: Sequence[Result]) -> str:
+    """Largest error of each derivative, and how many fail."""
+    kinds = dict.fromkeys(kind for r in found for kind in r.errors)
+    lines = [f"{kind:26} {max(r.errors[kind] for r in found if kind in r.errors):.1e} at most, in "
+             f"{sum(kind in r.errors for r in found)}" for kind in sorted(kinds)]
+    failed = sum(not r.passed for r in found)
+    differ = sum(not r.same_bits for r in found)
+    return "\n".join([*lines, f"{len(found)} mechanisms, {failed} fail, {differ} with rows that differ, "
+                      f"{sum(r.seconds for r in found) / max(1, len(found)):.2f} s each"])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    about = __doc__.splitlines()[0] if __doc__ else ""
+    parser = argparse.ArgumentParser(prog="python -m symdyn.lab.derivatives", description=about)
+    parser.add_argument("--count", type=int, default=1000, help="how many random mechanisms (default 1000)")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default 0)")
+    parser.add_argument("--only", type=int, nargs="+", metavar="K", help="these mechanisms alone, by number")
+    parser.add_argument("--catalogue", action="store_true", help="the mechanisms of the catalogue instead")
+    parser.add_argument("--names", nargs="+", metavar="NAME", help="some of the catalogue")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    parser.add_argument("--quiet", action="store_true", help="print failures and the summary alone")
+    options = parser.parse_args(arguments)
+    of_catalogue = options.catalogue or options.names
+    running = (map(catalogue_result, options.names or names()) if of_catalogue else
+               results(options.only or range(options.count), options.seed, options.jobs))
+    found = []
+    for result in running:
+        found.append(result)
+        if not (options.quiet and result.passed):
+            print(result, flush=True)
+    print(summary(found))
+    return int(not all(r.passed for r in found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

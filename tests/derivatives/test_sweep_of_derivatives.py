@@ -1,0 +1,49 @@
+"""The sweep of derivatives over random mechanisms and the catalogue: `python -m symdyn.lab.derivatives`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symdyn.lab import derivatives
+from symdyn.lab.derivatives import Result, catalogue_result, main, random_result, summary
+from symdyn.runtime.module import Module
+
+
+@pytest.mark.parametrize("number", [1, 3, 6])  # a loop, Euler parameters, redundant constraints
+def test_random_mechanisms(number: int) -> None:
+    found = random_result(number, 0)
+    assert found.passed, str(found)
+    assert {"rhs by x", "inverse_dynamics by ud"} <= found.errors.keys()
+
+
+@pytest.mark.parametrize("name", ["pendulum", "four_bar"])
+def test_catalogue(name: str) -> None:
+    found = catalogue_result(name)
+    assert found.passed, str(found)
+    assert found.worst[1] < derivatives.BOUND
+
+
+def test_wrong_derivatives_fail(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    right = Module.jacobian
+
+    def wrong(self: Module, *arguments: Any, **named: Any) -> Any:
+        found = right(self, *arguments, **named)
+        return found._replace(x=found.x * (1 + 1e-9)) if found.x is not None else found
+
+    monkeypatch.setattr(Module, "jacobian", wrong)
+    assert main(["--names", "pendulum"]) == 1
+    printed = capsys.readouterr().out
+    assert "FAILED" in printed and "1 mechanisms, 1 fail" in printed
+
+
+def test_verdicts() -> None:
+    one = Result("one", {"rhs by x": 1e-15, "lam by x": 1e-12}, 10.0, True, 0.1, own=1e-13)
+    assert one.passed and one.worst == ("lam by x", 1e-12)  # as exact as the multipliers themselves
+    assert not replace(one, own=0.0).passed and not replace(one, same_bits=False).passed
+    failed = replace(one, errors={"rhs by x": np.nan})
+    assert not failed.passed and "FAILED" in str(failed) and "2 mechanisms, 1 fail" in summary([one, failed])
+    assert "ROWS DIFFER  KeyError" in str(replace(one, same_bits=False, fault="KeyError"))
