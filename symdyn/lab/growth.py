@@ -1,4 +1,5 @@
-"""How derivation, generated code, compilation and run time grow with the number of bodies: O(n) recursion, O(n^3) mass matrix."""
+"""How derivation, generated code, compilation and run time grow with the number of bodies: O(n) recursion, O(n^3) mass matrix;
+and those of the derivative of x_dot by x, for which the recursion takes O(n^2) operations in O(n) code."""
 
 from __future__ import annotations
 
@@ -7,19 +8,21 @@ import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+from symdyn.backend.right_side import RightSide
 from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
-from symdyn.functions.tapes import function_tape
+from symdyn.functions.tapes import columns_of, function_tape
 from symdyn.lab.random_tree import random_tree
 from symdyn.model.system import System
 from symdyn.pipeline import emit
 from symdyn.runtime.building import cache
 from symdyn.runtime.building.compiler import require_compiler
 from symdyn.systems import get
-from symdyn.timing.loops import evaluation_times
+from symdyn.timing.loops import best_times, compiled_loop, evaluation_times
 
 SIZES = (2, 3, 4, 5, 7, 10, 14, 20, 30, 50, 70, 100)
 FORMULATIONS = ("embedding", "recursive")
@@ -27,6 +30,11 @@ FORMULATIONS = ("embedding", "recursive")
 LARGEST_EMBEDDING = 50_000
 HEADING = (f"{'n':>5} {'formulation':12}{'operations':>11}{'longest chain':>15}{'derive s':>10}{'C bytes':>10}{'compile s':>11}"
            f"{'evaluation us':>15}")
+
+
+JACOBIAN = "jacobian_x"
+# Lanes that operations of derivatives are counted with.
+LANES = 8
 
 
 @dataclass(frozen=True)
@@ -44,8 +52,35 @@ class Growth:
     evaluation: float
 
     def __str__(self) -> str:
-        return (f"{self.n:>5} {self.formulation:12}{self.operations:>11}{self.chain:>15}{self.derive:>10.3f}{self.size:>10}"
-                f"{self.compile:>11.2f}{self.evaluation * 1e6:>15.3f}")
+        return _line(self.n, self.formulation, self.operations, self.chain, self.derive, self.size, self.compile, self.evaluation)
+
+
+@dataclass(frozen=True)
+class JacobianGrowth:
+    """The same of the derivative of x_dot by x in articulated bodies; operations: executed in LANES lanes."""
+
+    n: int
+    formulation: str
+    operations: int
+    derive: float
+    size: int
+    compile: float
+    evaluation: float
+
+    def __str__(self) -> str:
+        return _line(self.n, self.formulation, self.operations, "", self.derive, self.size, self.compile, self.evaluation)
+
+
+def _line(n: int, formulation: str, operations: int, chain: int | str, derive: float, size: int, compiled: float,
+          evaluation: float) -> str:
+    return (f"{n:>5} {formulation:12}{operations:>11}{chain:>15}{derive:>10.3f}{size:>10}{compiled:>11.2f}"
+            f"{evaluation * 1e6:>15.3f}")
+
+
+JACOBIAN_VALUES: dict[str, Callable[[JacobianGrowth], float]] = {
+    "operations": lambda r: r.operations, "bytes of C": lambda r: r.size, "seconds of derivation": lambda r: r.derive,
+    "seconds of compilation": lambda r: r.compile, "seconds of evaluation": lambda r: r.evaluation}
+Row = TypeVar("Row", Growth, JacobianGrowth)
 
 
 def chain(n: int) -> System:
@@ -75,11 +110,21 @@ def measure(system: System, n: int, formulations: Sequence[str]) -> list[Growth]
     return rows
 
 
-def _derive(system: System, formulation: str) -> tuple[Equations, float, str]:
-    """Equations, seconds until their C text was there, and the text."""
+def measure_jacobian(system: System, n: int, formulation: str = "recursive") -> JacobianGrowth:
+    """The derivative of x_dot by x of one system."""
+    equations, seconds, text = _derive(system, formulation, JACOBIAN)
+    columns = columns_of(equations, JACOBIAN, RightSide())
+    operations = function_tape(equations, JACOBIAN).operations if columns is None else columns.operations(LANES)
+    size = len(equations.symbols.coordinates) + len(equations.symbols.speeds)
+    loop = compiled_loop(equations, name=JACOBIAN, last=size * size - 1)
+    return JacobianGrowth(n, formulation, operations, seconds, len(text), _compile(text), best_times([loop.run], 20)[0])
+
+
+def _derive(system: System, formulation: str, function: str = "rhs") -> tuple[Equations, float, str]:
+    """Equations, seconds until the C text of a function was there, and the text."""
     begun = clock.perf_counter()
     equations: Equations = getattr(system, formulation)()
-    source = emit(equations, "c", ("rhs",), standalone=False, integrator=False)
+    source = emit(equations, "c", (function,), standalone=False, integrator=False)
     return equations, clock.perf_counter() - begun, next(iter(source.files.values()))
 
 
@@ -90,7 +135,7 @@ def _compile(text: str) -> float:
     return clock.perf_counter() - begun
 
 
-def order(rows: Sequence[Growth], value: Callable[[Growth], float], upper: int = 3) -> float:
+def order(rows: Sequence[Row], value: Callable[[Row], float], upper: int = 3) -> float:
     """The exponent of n with which a value grows, fitted to the largest sizes."""
     last = sorted(rows, key=lambda r: r.n)[-upper:]
     return float(np.polyfit(np.log([r.n for r in last]), np.log([value(r) for r in last]), 1)[0])
@@ -153,8 +198,17 @@ def run(sizes: Sequence[int] | None = None, folder: Path | None = None) -> int:
                 print(f"{what} of {formulation} grow like n^{order(own, value):.2f} over the last sizes")
         where = crossover(rows, value)
         print(f"{what}: recursion ahead from n = {where}" if where else f"{what}: the mass matrix is ahead throughout")
+    print(f"the derivative of x_dot by x, articulated bodies, operations executed in {LANES} lanes:")
+    derivatives: list[JacobianGrowth] = []
+    for n in sizes:
+        derivatives.append(measure_jacobian(chain(n), n))
+        print(derivatives[-1], flush=True)
+    if len(derivatives) > 2:
+        for what, of in JACOBIAN_VALUES.items():
+            print(f"{what} of the derivative grow like n^{order(derivatives, of):.2f} over the last sizes")
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "growth.json").write_text(json.dumps([asdict(r) for r in [*rows, *tree]], indent=1), encoding="utf-8")
+    measured = {"rhs": [asdict(r) for r in [*rows, *tree]], JACOBIAN: [asdict(r) for r in derivatives]}
+    (folder / "growth.json").write_text(json.dumps(measured, indent=1), encoding="utf-8")
     picture(rows, folder / "growth.png")
     print(f"wrote {folder / 'growth.json'}\nwrote {folder / 'growth.png'}")
     return 0

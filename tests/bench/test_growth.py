@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 import symdyn as sd
+from symdyn.backend.right_side import RightSide
 from symdyn.cli import main
+from symdyn.functions.tapes import columns_of
 from symdyn.lab import growth
 from symdyn.lab.growth import Growth
 from symdyn.lab.random_tree import random_tree
@@ -27,6 +29,14 @@ def test_the_recursion_grows_linearly() -> None:
     assert counts[1] - counts[0] == counts[2] - counts[1] == counts[4] - counts[3]
     chains = [sd.systems.get("spatial_chain", n=n).recursive().tape("rhs").longest_chain() for n in (10, 13, 16)]
     assert chains[1] - chains[0] == chains[2] - chains[1]
+
+
+def test_derivatives_grow_quadratically_in_code_that_grows_linearly() -> None:
+    made = {n: columns_of(sd.systems.get("spatial_chain", n=n).recursive(), "jacobian_x", RightSide()) for n in (16, 32, 48, 64)}
+    one = [c.together(10**9) for c in made.values() if c is not None]  # statements of one direction in q, and of one in u
+    assert len(one) == 4 and max(one[2] - one[1], one[3] - one[2]) < 1.02 * (one[1] - one[0])
+    operations = [c.operations(growth.LANES) for c in made.values() if c is not None]
+    assert operations[3] / operations[1] < 4
 
 
 def test_order_and_crossover() -> None:
@@ -49,7 +59,9 @@ def test_table_picture_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().out
     assert "operations of recursive grow like n^" in said and said.count("embedding") >= 3
     assert "a random tree of 8 bodies" in said
-    assert len(json.loads((tmp_path / "growth.json").read_text(encoding="utf-8"))) == 7
+    assert "of the derivative grow like n^" in said
+    kept = json.loads((tmp_path / "growth.json").read_text(encoding="utf-8"))
+    assert len(kept["rhs"]) == 7 and [r["n"] for r in kept["jacobian_x"]] == [2, 3, 4]
     assert (tmp_path / "growth.png").stat().st_size > 10_000
 
 
