@@ -112,7 +112,7 @@ def measure(name: str, equations: Equations, modules: Sequence[Any], point: Poin
     same, own = True, 0.0
     for of in (f for f in FUNCTIONS if has_function(equations, f)):
         tape = function_tape(equations, of)
-        value = next(iter(evaluate(tape, values, DIGITS).values())).astype(float)
+        value = _exact(equations, tape, values).astype(float)
         level = float(np.linalg.norm(value))
         if of == "lam":
             far = np.linalg.norm(modules[0].evaluate(of, point.t, point.x, point.params, point.inputs) - value)
@@ -165,15 +165,16 @@ def _direction(equations: Equations, module: Any, by: str, point: Point, rng: np
     direction = rng.normal(size=len(numbers)) * (np.abs(numbers) if by == "params" else 1.0)
     if by != "x":
         return direction
-    s = equations.symbols
-    for group in equations.unit_groups:
-        at = [s.coordinates.index(q) for q in group]
-        e = numbers[at]
-        direction[at] -= e * (e @ direction[at]) / (e @ e)
+    held = np.zeros((len(equations.unit_groups), len(numbers)))
+    for row, group in zip(held, equations.unit_groups, strict=True):
+        at = [equations.symbols.coordinates.index(q) for q in group]
+        row[at] = numbers[at]
     if equations.constraints:
         rows = np.vstack([module.jacobian(point.t, point.x, point.params, point.inputs, ["x"], of).x for of in ("C", "C_dot")])
         if np.linalg.matrix_rank(rows, RANK * np.linalg.norm(rows)) < np.count_nonzero(rows.any(axis=1)):
-            direction -= np.linalg.pinv(rows, RANK) @ (rows @ direction)
+            held = np.vstack([held, rows])
+    if len(held):
+        direction -= np.linalg.pinv(held, RANK) @ (held @ direction)
     return direction
 
 
@@ -185,8 +186,17 @@ def _difference(equations: Equations, tape: Any, values: dict[str, float], by: s
         for sign in (1, -1):
             moved = {n: mpmath.mpf(v) + sign * STEP * mpmath.mpf(float(d))
                      for n, v, d in zip(_names(equations, by), point.group(by), direction, strict=True)}
-            sides.append(next(iter(evaluate(tape, {**values, **moved}, DIGITS).values())))
+            sides.append(_exact(equations, tape, {**values, **moved}))
         return np.asarray((sides[0] - sides[1]) / (2 * STEP), dtype=object).astype(float)
+
+
+def _exact(equations: Equations, tape: Any, values: dict[str, Any]) -> np.ndarray:
+    """A function with 60 digits, with Euler parameters of unit length to as many: rows may depend on each other only then."""
+    with mpmath.workdps(DIGITS):
+        for group in equations.unit_groups:
+            length = mpmath.sqrt(sum(mpmath.mpf(values[q.name]) ** 2 for q in group))
+            values = {**values, **{q.name: values[q.name] / length for q in group}}
+        return np.asarray(next(iter(evaluate(tape, values, DIGITS).values())))
 
 
 def condition_of(equations: Equations, values: dict[str, float]) -> float:
@@ -206,27 +216,32 @@ def random_result(number: int, seed: int) -> Result:
     m = draw(number, seed)
     name = f"{number} {' '.join(m.kinds)}"
     ud = np.random.default_rng(number).normal(size=len(m.module.metadata.u))
-    point = Point(m.t, m.x, m.inputs, m.module.parameters(m.params), ud)
+    x = beside(m.equations, m.x, np.random.default_rng(number)) if m.equations.constraints else m.x
+    point = Point(m.t, x, m.inputs, m.module.parameters(m.params), ud)
     modules = [m.module if m.module.backend == "numpy" else m.equations.compile(backend="numpy")]
     if number % IN_C == 0 and find_compiler() is not None:
         modules.append(m.equations.compile(backend="c"))
     return _measured(name, m.equations, modules, point, number)
 
 
-def catalogue_result(name: str) -> Result:
-    """Of a mechanism of the catalogue, in NumPy and in part in C, near its start.
+def beside(equations: Equations, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A state near x, Euler parameters of unit length, that is not on the constraints: on them rows that are redundant depend on
+    each other as far as doubles go, and not with 60 digits."""
+    moved = x + 0.05 * rng.normal(size=len(x))
+    for group in equations.unit_groups:
+        at = [equations.symbols.coordinates.index(q) for q in group]
+        moved[at] /= np.linalg.norm(moved[at])
+    return moved
 
-    The state is not on the constraints: on them redundant rows depend on each other as far as doubles go, and not with 60 digits.
-    """
+
+def catalogue_result(name: str) -> Result:
+    """Of a mechanism of the catalogue, in NumPy and in part in C, near its start."""
     system = get(name)
     equations = system.augmented() if name in names(constrained=True) else system.embedding()
     modules = [equations.compile(backend=b) for b in (("numpy", "c") if find_compiler() is not None else ("numpy",))]
     rng, s = np.random.default_rng(5), equations.symbols
     start = np.array([float(s.initial.get(a, 0)) for a in (*s.coordinates, *s.speeds, *s.states)])
-    start += 0.05 * rng.normal(size=len(start))
-    for group in equations.unit_groups:
-        at = [s.coordinates.index(q) for q in group]
-        start[at] /= np.linalg.norm(start[at])
+    start = beside(equations, start, rng)
     params = np.array([0.6 if v is None else v for v in modules[0].metadata.defaults])
     point = Point(0.3, start, rng.normal(size=len(s.inputs)), params, rng.normal(size=len(s.speeds)))
     return _measured(name, equations, modules, point, 5)
