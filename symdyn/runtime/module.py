@@ -17,7 +17,7 @@ from symdyn.arguments import fixed, take
 from symdyn.backend.metadata import Metadata, ModuleMetadata
 from symdyn.backend.right_side import RightSide
 from symdyn.counting import counted
-from symdyn.errors import ArgumentError
+from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.kinds import text
 from symdyn.real_numbers import DOUBLE, number_of, real_of
 from symdyn.runtime.building.library import Evaluator, Unit
@@ -59,6 +59,8 @@ Provider = Callable[[str | RightSide], Unit]
 # Times that the generated code takes as they are.
 _TIMES = (float, np.float64)
 _WHOLE = 2**53
+# Functions that depend on the choice among multipliers of redundant constraints.
+_OF_MULTIPLIERS = ("lam", "reactions", "cut_loads")
 
 
 class Jacobian(NamedTuple):
@@ -398,7 +400,8 @@ class Module:
         differentiated through what they are solved from, so that no factorization is differentiated.
 
         With Euler parameters the derivatives by the state hold along changes that keep their norm. Raises ArgumentError for what
-        there are no derivatives of or by.
+        there are no derivatives of or by, EvaluationError for those of multipliers and reactions at states where redundant
+        constraints leave a choice of multipliers.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.jacobian(0.0, [0.0, 0.0]).x.round(6)
@@ -418,7 +421,26 @@ class Module:
             raise ArgumentError(f"{self.name}: jacobian of {of} by ud asked for, and {of} takes no accelerations; leave ud "
                                 "out of wrt")
         found = {w: self.evaluate(names[w], t, x, params, inputs, ud if of != "rhs" else ()) for w in wrt}
+        if of in _OF_MULTIPLIERS:
+            self._demand_unique_multipliers(of, t, x, params)
         return FurtherDerivatives(**found) if {"t", "ud"}.intersection(wrt) else Jacobian(**found)
+
+    def _demand_unique_multipliers(self, of: str, t: Times, x: States, params: States | None) -> None:
+        """Raises EvaluationError where the motion does not determine all multipliers.
+
+        Those taken have the least norm, and how the choice turns with the state is no part of the equations that are
+        differentiated (the third term of Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)).
+        """
+        from symdyn.runtime.constraints import names, unique
+
+        rows = names(self)
+        alone = unique(self, t, x, params) if rows else np.ones(0, dtype=bool)
+        free = [name for k, name in enumerate(rows) if not alone[..., k].all()]
+        if free:
+            raise EvaluationError(f"{self.name}: derivatives of {of} were requested, but constraints that depend on each other "
+                                  f"leave a choice of the multipliers of {', '.join(free)}; leave out the redundant constraints "
+                                  "that system.diagnose() lists, or differentiate accelerations, which the choice does not "
+                                  "change")
 
     def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
                 wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:

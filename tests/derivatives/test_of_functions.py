@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, SymdynError
+from symdyn.errors import ArgumentError, EvaluationError, SymdynError
 from symdyn.functions.tapes import function_tape, has_function
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.tape.evaluate import evaluate
@@ -125,3 +125,19 @@ def test_faults() -> None:
         module.sparsity("y")
     with pytest.raises(SymdynError, match="has no function energy_by_lam"):
         module.evaluate("energy_by_lam", 0, [0, 0])
+
+
+def test_multipliers_that_the_motion_does_not_determine_have_no_derivatives() -> None:
+    """On the constraints one row of Bricard's loop depends on the others: which multipliers are taken is a choice, which turns
+    with the state."""
+    module = sd.systems.bricard().augmented().compile(backend="numpy")
+    q, u = module.consistent()
+    x = np.r_[q, u]
+    for of in ("lam", "reactions"):
+        said = f"derivatives of {of} were requested, .* leave a choice of the multipliers of .*; leave out the redundant"
+        with pytest.raises(EvaluationError, match=said):
+            module.jacobian(0.0, x, wrt=["x"], of=of)
+    assert np.isfinite(module.jacobian(0.0, x, wrt=["x"]).x).all()
+    four = sd.systems.four_bar().augmented().compile(backend="numpy")
+    q, u = four.consistent()
+    assert np.isfinite(four.jacobian(0.0, np.r_[q, u], wrt=["x"], of="lam").x).all()
