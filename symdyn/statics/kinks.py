@@ -2,7 +2,8 @@
 
 The balance is evaluated at a few steps to both sides, coordinate by coordinate, speed by speed, and so on. Of a smooth function
 the slopes on both sides differ by less and less, in proportion to the step; at a kink they differ by the same at each step, and
-at a jump the values do. Rounding does neither: what it makes of the values is measured where they are the same but for it.
+at a jump the values do. Rounding does neither: what it makes of the values is measured where they are the same but for it, and by
+data that differ in their last digit, since large terms that cancel, such as those of stiff springs, leave their own.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError, EvaluationWarning
 from symdyn.statics.manifold import held_indices
+from symdyn.statics.noise import SAMPLES, rounded
 from symdyn.statics.selection import Selection
 from symdyn.statics.terms import OperatingPoint
 
@@ -29,10 +31,8 @@ def kink(point: OperatingPoint, selection: Selection) -> str:
     held = {metadata.q[k] for k in coordinates} | {f"{metadata.q[k]}_dot" for k in coordinates}
     held |= {metadata.u[k] for k in speeds} | set(selection.held)
     entries = list(enumerate((*metadata.x, *metadata.inputs)))
-    for k, name in entries if metadata.not_smooth else entries[len(metadata.x):]:
-        if name not in held and _breaks(point, k):
-            return name
-    return ""
+    tried = [(k, name) for k, name in (entries if metadata.not_smooth else entries[len(metadata.x):]) if name not in held]
+    return next((name for k, name in tried if _breaks(point, k)), "")
 
 
 def no_linear_equations(name: str) -> str:
@@ -60,9 +60,22 @@ def _breaks(point: OperatingPoint, k: int) -> bool:
     rounding = np.ptp(sides, axis=2).max(axis=(0, 1)) + np.finfo(float).eps * np.abs(found).max(axis=0)
     widths = steps.reshape(len(STEPS), 2, len(SPREAD))[:, 0, 0, None]
     bent, across = sides[:, 0, 0] + sides[:, 1, 0] - 2 * middle, sides[:, 0, 0] - sides[:, 1, 0]
-    jumps = _constant(across) & (np.abs(across[-1]) > ABOVE * rounding)
-    kinks = _constant(bent / widths) & (np.abs(bent[0]) > ABOVE * rounding)
-    return bool((jumps | kinks).any())
+    alike = _constant(across), _constant(bent / widths)
+    sizes = np.abs(across[-1]), np.abs(bent[0])
+    broken = lambda least: any(bool((same & (size > ABOVE * least)).any()) for same, size in zip(alike, sizes, strict=True))
+    return broken(rounding) and broken(rounding + _noise(point, k, steps[0]))
+
+
+def _noise(point: OperatingPoint, k: int, step: float) -> np.ndarray:
+    """What data that differ in their last digit make of the balance, on both sides of the value of entry k."""
+    stream = np.random.default_rng(0)
+    found = []
+    for way in (step, -step):
+        moved = np.concatenate([point.x, point.inputs])
+        moved[k] += way
+        side = point.at(x=moved[:len(point.x)], inputs=moved[len(point.x):])
+        found.append(np.ptp([rounded(side, stream).balance for _ in range(SAMPLES)], axis=0))
+    return np.max(found, axis=0)  # type: ignore[no-any-return]
 
 
 def _constant(rows: np.ndarray) -> np.ndarray:
