@@ -8,6 +8,7 @@ import pytest
 
 from symdyn.errors import MissingExtra
 from symdyn.lab import sensitivities
+from symdyn.lab.casadi_field import casadi_field
 
 
 def test_programs_that_are_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,5 +38,5 @@ def test_a_field_in_the_words_of_another_program() -> None:
     words = SimpleNamespace(sin=np.sin, cos=np.cos, vertcat=lambda *entries: np.array(entries))
     names = [*module.metadata.x, *module.metadata.parameters, *module.metadata.inputs]
     values = [*x, *module.default_parameters, *[0.0] * len(module.metadata.inputs)]
-    found = sensitivities._field(words, equations, dict(zip(names, values, strict=True)))
+    found = casadi_field(words, equations, dict(zip(names, values, strict=True)))
     np.testing.assert_allclose(found, module.rhs(0.0, x), rtol=1e-14)

@@ -153,7 +153,7 @@ def test_gravity_on_the_blades_is_in_the_steady_state() -> None:
     S, I = p["m"] * p["r"], p["m"] * p["r"]**2
     kappa = p["k_b"] + W**2 * S * p["e"]
     assert np.isclose(a["b1 cosine"], -S * g / (kappa - I * W**2), rtol=1e-6) and abs(a["b1 sine"]) < 1e-12
-    y = state.place.q[rotor().metadata.q.index("y")]
+    y = state.point.q[rotor().metadata.q.index("y")]
     assert np.isclose(y, -(p["M"] + 3 * p["m"]) * g / p["k_h"], rtol=1e-6)
 
 
