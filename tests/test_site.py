@@ -47,7 +47,8 @@ def test_every_public_name_has_an_entry(site: Path) -> None:
         ids = [f"symdyn.{name}", f"module-{thing.__name__}" if module else f"{getattr(thing, '__module__', 'symdyn')}.{name}"]
         # Packages that can be called stand under the name of what they call.
         assert any(f'id="{one}"' in text for one in ids) or (module and callable(thing) and f"sd.{name}" in text), name
-    for method in ("symdyn.System.add_joint", "symdyn.runtime.module.Module.simulate", "symdyn.runtime.solutions.solution.Solution.plot"):
+    for method in ("symdyn.System.add_joint", "symdyn.runtime.module.Module.simulate",
+                   "symdyn.runtime.solutions.solution.Solution.plot"):
         assert f'id="{method}"' in text and f"#{method}" in listed, method
 
 
