@@ -290,8 +290,8 @@ def _motion_noise(module: Module, given: Any, noise: Any, faults: list[str]) -> 
     if given is None:
         return None
     if noise is None:
-        faults.append("motion_noise was given without noise; what both leave cannot be told apart, give the noise of the forces, "
-                      "too")
+        faults.append("motion_noise was given without noise; what both leave cannot be distinguished, give the noise of the "
+                      "forces, too")
     sizes = module.metadata.sizes
     if not isinstance(given, (list, tuple)) or len(given) != 3:
         faults.append(f"motion_noise is {shown(given)}; pass deviations of q, of u and of ud")
