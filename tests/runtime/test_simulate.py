@@ -548,16 +548,17 @@ from symdyn.errors import SimulationInterrupted
 from tests.mechanisms import driven_oscillator
 module = driven_oscillator().embedding().compile(backend="c")
 module.simulate((0, 1))
-started = threading.Event()
+started = [False]  # no lock, which Ctrl-C in its owner would leave locked
 def inputs(t, x):
-    started.set()
+    started[0] = True
     return 0.1, 0.2
 def press(k):
-    started.wait()  # before the run Ctrl-C ends the program, as everywhere
+    while not started[0]:  # before the run Ctrl-C ends the program, as everywhere
+        time.sleep(0.0005)
     time.sleep(0.005 + 0.0007 * k)
     os.kill(os.getpid(), signal.SIGINT)
 for k in range(30):
-    started.clear()
+    started[0] = False
     thread = threading.Thread(target=press, args=(k,))
     thread.start()
     try:
