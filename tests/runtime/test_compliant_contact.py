@@ -31,6 +31,13 @@ def resting(system: sd.System, end: float = 100.0, **more: Any) -> Any:
     return system.compile().simulate((0, end), q=[0, -2 * G * np.cos(TILT) / STIFFNESS], method="radau", **more)
 
 
+def test_hertz_takes_numbers_and_expressions_and_never_evaluates_text(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(sd.ModelError) as caught:
+        C.hertz("print('evaluated')", 2.1e11, "0.3")
+    assert "hertz: radius" in str(caught.value) and "hertz: poisson" in str(caught.value)
+    assert capsys.readouterr().out == ""
+
+
 def test_spheres_part_after_hertzs_time() -> None:
     """Depth (15 m v^2/(16 E* sqrt R))^(2/5), time 2 d/v int_0^1 ds/sqrt(1 - s^(5/2)) = 2.94 d/v (Johnson 1985, section 11.4)."""
     stiffness = float(C.hertz(0.01, 2.1e11, 0.3, 0.02, 2.1e11, 0.3))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.errors import ModelError
 from symdyn.model.faults import Faults
 from symdyn.shown import shown
 
@@ -78,15 +79,22 @@ def hertz(radius: Scalar, modulus: Scalar, poisson: Scalar = 0.3, radius_b: Scal
     radius, modulus, poisson   of the sphere on a, m and Pa; radius_b: of that on b, None: a plane
     modulus_b, poisson_b       of the material of b; None: as rigid
 
+    Raises ModelError with everything that is neither a number nor an expression; text is never evaluated.
+
     >>> round(float(sd.contacts.hertz(0.01, 2.1e11) / 1e10), 3)
     3.077
     """
-    yielding = (1 - sp.sympify(poisson) ** 2) / sp.sympify(modulus)
+    faults = Faults()
+    R, E, nu = (faults.expression(value, f"hertz: {what}") for what, value in (
+        ("radius", radius), ("modulus", modulus), ("poisson", poisson)))
+    yielding, curved = (1 - nu**2) / E, 1 / R
     if modulus_b is not None:
-        yielding = yielding + (1 - sp.sympify(poisson_b) ** 2) / sp.sympify(modulus_b)
-    curved = 1 / sp.sympify(radius)
+        nu_b = faults.expression(poisson_b, "hertz: poisson_b")
+        yielding = yielding + (1 - nu_b**2) / faults.expression(modulus_b, "hertz: modulus_b")
     if radius_b is not None:
-        curved = curved + 1 / sp.sympify(radius_b)
+        curved = curved + 1 / faults.expression(radius_b, "hertz: radius_b")
+    if faults:
+        raise ModelError(list(faults), "contact")
     return sp.Rational(4, 3) / yielding / sp.sqrt(curved)
 
 

@@ -223,8 +223,8 @@ def _cross(a: Sequence[Any], b: Sequence[Any]) -> Triple:
 
 
 def _unit(v: Sequence[Any]) -> Triple | None:
-    size = sp.sqrt(_dot([sp.sympify(e) for e in v], v))
-    return None if size == 0 else _scaled([sp.sympify(e) for e in v], 1 / size)
+    size = sp.sqrt(_dot(v, v))
+    return None if size == 0 else _scaled(v, 1 / size)
 
 
 def _across(n: Triple) -> tuple[Triple, Triple]:
