@@ -19,8 +19,7 @@ from symdyn.backend.metadata import ContactRecord
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, impact, solutions
 from symdyn.runtime.integrating.events import Happened
-from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request
-from symdyn.runtime.integrating.stabilization import Corrections
+from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.stops import describe_stop
 
 if TYPE_CHECKING:
@@ -518,18 +517,8 @@ class _Phases:
         if not self.done:
             return Outcome(times, states.reshape(-1, width), False, message, interrupted, 0, 0, 0, cause=cause,
                            happened=happened, doubts=tuple(self.doubts), **notes)
-        last, corrections = self.done[-1], [o.corrections for o in self.done]
         if message and not over and (not len(times) or t > times[-1]):
             times, states = np.append(times, t), np.vstack([states, x])
             phase_of = np.append(phase_of, len(self.ts) - 1)
-        seconds = [o.seconds for o in self.done if o.seconds is not None]
-        return replace(
-            last, t=times, x=states, success=last.success and (over or not message), message=message or last.message,
-            interrupted=interrupted or last.interrupted, n_steps=self.n_steps, n_rejected=sum(o.n_rejected for o in self.done),
-            n_evaluations=sum(o.n_evaluations for o in self.done), seconds=sum(seconds) if seconds else None,
-            corrections=Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
-                                    sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
-            happened=happened, n_jacobians=sum(o.n_jacobians for o in self.done),
-            n_factorizations=sum(o.n_factorizations for o in self.done),
-            doubts=(*self.doubts, *next((o.doubts for o in self.done if o.doubts), ())), cause=cause or last.cause,
-            row_phases=phase_of, **notes)
+        whole = of_pieces(self.done, times, states, self.n_steps, message, cause, interrupted, over)
+        return replace(whole, happened=happened, doubts=(*self.doubts, *whole.doubts), row_phases=phase_of, **notes)

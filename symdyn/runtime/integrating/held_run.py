@@ -19,8 +19,7 @@ from symdyn.runtime.inputs.sampled import Replay, Sampling
 from symdyn.runtime.integrating.chatter import SHRUNK, STEPS, STEPS_OF_SCIPY, chatter_of
 from symdyn.runtime.integrating.events import Carried, Happened, Locator, ended
 from symdyn.runtime.integrating.methods import is_compiled
-from symdyn.runtime.integrating.outcome import Outcome, Request
-from symdyn.runtime.integrating.stabilization import Corrections
+from symdyn.runtime.integrating.outcome import Outcome, Request, of_pieces
 from symdyn.runtime.integrating.stops import describe_stop
 from symdyn.runtime.raised import InputRaised
 
@@ -211,17 +210,8 @@ class _Pieces:
         x = np.concatenate(self.xs) if self.xs else self.request.x0[None, :].copy()
         if not self.done:
             return Outcome(t, x.reshape(-1, width), False, message, interrupted, 0, 0, 0, cause=cause)
-        last, corrections = self.done[-1], [o.corrections for o in self.done]
+        last = self.done[-1]
         if message and len(last.t) and (not len(t) or last.t[-1] > t[-1]):  # stopped at an instant that is no output time
             t, x = np.append(t, last.t[-1]), np.vstack([x, last.x[-1:]])
-        seconds = [o.seconds for o in self.done if o.seconds is not None]
-        return replace(
-            last, t=t, x=x, success=last.success and (over or not message), message=message or last.message,
-            interrupted=interrupted or last.interrupted, n_steps=self.n_steps, n_rejected=sum(o.n_rejected for o in self.done),
-            n_evaluations=sum(o.n_evaluations for o in self.done), seconds=sum(seconds) if seconds else None,
-            corrections=Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
-                                    sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
-            happened=sorted([*self.jumped, *(e for o in self.done for e in o.happened)], key=lambda one: one.t),
-            n_jacobians=sum(o.n_jacobians for o in self.done),
-            n_factorizations=sum(o.n_factorizations for o in self.done),
-            doubts=next((o.doubts for o in self.done if o.doubts), ()), cause=cause or last.cause)
+        happened = sorted([*self.jumped, *(e for o in self.done for e in o.happened)], key=lambda one: one.t)
+        return replace(of_pieces(self.done, t, x, self.n_steps, message, cause, interrupted, over), happened=happened)

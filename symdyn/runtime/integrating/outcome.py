@@ -119,3 +119,21 @@ class Outcome:
     phases: Sequence[Phase] = ()
     impacts: Sequence[Impact] = ()
     row_phases: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+
+def of_pieces(done: Sequence[Outcome], t: np.ndarray, x: np.ndarray, n_steps: int, message: str, cause: BaseException | None,
+              interrupted: bool, over: bool) -> Outcome:
+    """A motion that was integrated piece by piece, as one: counts are sums, what else there is that of the last piece.
+
+    message   why it ended, if not with the last piece; over: an event that stops ended it
+    """
+    last, corrections = done[-1], [o.corrections for o in done]
+    seconds = [o.seconds for o in done if o.seconds is not None]
+    return replace(
+        last, t=t, x=x, success=last.success and (over or not message), message=message or last.message,
+        interrupted=interrupted or last.interrupted, n_steps=n_steps, n_rejected=sum(o.n_rejected for o in done),
+        n_evaluations=sum(o.n_evaluations for o in done), seconds=sum(seconds) if seconds else None,
+        corrections=Corrections(max(c.position for c in corrections), max(c.speed for c in corrections),
+                                sum(c.n_steps for c in corrections), sum(c.n_evaluations for c in corrections)),
+        n_jacobians=sum(o.n_jacobians for o in done), n_factorizations=sum(o.n_factorizations for o in done),
+        doubts=next((o.doubts for o in done if o.doubts), ()), cause=cause or last.cause)
