@@ -11,7 +11,7 @@ from symdyn.formulation.equations import Equations
 from symdyn.functions.tapes import function_tape
 from symdyn.lab.peers.casadi_peer import CasadiPeer
 from symdyn.lab.peers.description import describe
-from symdyn.lab.peers.models import Bound, Case
+from symdyn.lab.peers.models import Bound, Case, Timed
 from symdyn.lab.peers.pinocchio_peer import PinocchioPeer
 from symdyn.lab.peers.program import State
 from symdyn.lab.peers.symdyn_peer import symdyn_program
@@ -23,7 +23,7 @@ SEED = 20
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(Timed):
     """What was measured of one mechanism.
 
     formulation       of symdyn's equations; operations, prologue, chain: of its right-hand side
@@ -43,23 +43,9 @@ class Row:
     difference: float
     bound: Bound = field(default=Bound())
 
-    def over(self, slower: str, faster: str) -> float | None:
-        """Ratio of two programs' times; None if one was not measured."""
-        if slower not in self.times or faster not in self.times:
-            return None
-        return self.times[slower] / self.times[faster]
-
     def misses(self) -> list[str]:
         """Bounds that are missed, in words; what was not measured misses nothing."""
-        casadi, pinocchio = self.over("symdyn", "casadi runtime"), self.over("pinocchio", "symdyn")
-        b, found = self.bound, []
-        if b.operations is not None and self.leanest > b.operations:
-            found.append(f"{self.leanest} operations > {b.operations}")
-        if b.ratio is not None and casadi is not None and casadi > b.ratio:
-            found.append(f"symdyn/CasADi {casadi:.2f} > {b.ratio:.2f}")
-        if b.pinocchio is not None and pinocchio is not None and pinocchio < b.pinocchio:
-            found.append(f"Pinocchio/symdyn {pinocchio:.1f} < {b.pinocchio:.1f}")
-        return found
+        return self.bound.missed(self.leanest, self.over("symdyn", "casadi runtime"), self.over("pinocchio", "symdyn"), 2)
 
 
 def fastest(system: System) -> Equations:

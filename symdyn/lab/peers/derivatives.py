@@ -19,6 +19,7 @@ from symdyn.functions.tapes import all_columns_of, columns_of, function_tape
 from symdyn.lab.peers.benchmark import fastest, random_state
 from symdyn.lab.peers.casadi_peer import CasadiPeer
 from symdyn.lab.peers.description import describe
+from symdyn.lab.peers.models import Bound, Case, Timed
 from symdyn.lab.peers.pinocchio_peer import PinocchioDerivativesPeer
 from symdyn.lab.peers.symdyn_peer import derivatives_program
 from symdyn.lab.peers.timing import agree, timed
@@ -37,28 +38,6 @@ _HEADING = ("model", "formulation", "ops", "4 lanes", "8 lanes", "ns", "CasADi o
             "symdyn/CasADi", "Pinocchio/symdyn")
 
 
-@dataclass(frozen=True)
-class Bound:
-    """What symdyn is held to; None: nothing.
-
-    operations   at most, executed in 8 lanes
-    ratio        at most, its time over CasADi's
-    pinocchio    at least, the time of Pinocchio's C++ over its own
-    """
-
-    operations: int | None = None
-    ratio: float | None = None
-    pinocchio: float | None = None
-
-
-@dataclass(frozen=True)
-class Case:
-    """A mechanism with its bounds."""
-
-    make: Callable[[], System]
-    bound: Bound = Bound()
-
-
 CASES = {
     "n_link_pendulum(5)": Case(partial(get, "n_link_pendulum", n=5), Bound(800, 0.25, 25.0)),
     "spatial_chain(7)": Case(partial(get, "spatial_chain", n=7), Bound(4_800, 0.25, 7.0)),
@@ -68,7 +47,7 @@ CASES = {
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(Timed):
     """What was measured of one mechanism.
 
     operations         of all columns one by one; executed: with 4 and 8 lanes, where lanes are used
@@ -86,23 +65,9 @@ class Row:
     difference: float
     bound: Bound = field(default=Bound())
 
-    def over(self, slower: str, faster: str) -> float | None:
-        """Ratio of two programs' times; None if one was not measured."""
-        if slower not in self.times or faster not in self.times:
-            return None
-        return self.times[slower] / self.times[faster]
-
     def misses(self) -> list[str]:
         """Bounds that are missed, in words; what was not measured misses nothing."""
-        casadi, pinocchio = self.over("symdyn", "casadi"), self.over("pinocchio", "symdyn")
-        b, found = self.bound, []
-        if b.operations is not None and self.executed[-1] > b.operations:
-            found.append(f"{self.executed[-1]} operations > {b.operations}")
-        if b.ratio is not None and casadi is not None and casadi > b.ratio:
-            found.append(f"symdyn/CasADi {casadi:.3f} > {b.ratio:.2f}")
-        if b.pinocchio is not None and pinocchio is not None and pinocchio < b.pinocchio:
-            found.append(f"Pinocchio/symdyn {pinocchio:.1f} < {b.pinocchio:.1f}")
-        return found
+        return self.bound.missed(self.executed[-1], self.over("symdyn", "casadi"), self.over("pinocchio", "symdyn"), 3)
 
 
 def cases(names: Sequence[str] | None) -> dict[str, Case]:

@@ -17,7 +17,7 @@ from symdyn.systems import get
 class Bound:
     """What symdyn is held to; None: nothing.
 
-    operations   at most, in one evaluation of the right-hand side after hoisting
+    operations   at most, in one evaluation after hoisting; of derivatives those executed in 8 lanes
     ratio        at most, its time over that of CasADi's code with run-time parameters
     pinocchio    at least, the time of Pinocchio's C++ over its own
     """
@@ -25,6 +25,29 @@ class Bound:
     operations: int | None = None
     ratio: float | None = None
     pinocchio: float | None = None
+
+    def missed(self, operations: int, ratio: float | None, pinocchio: float | None, digits: int) -> list[str]:
+        """What is missed, in words, ratios to CasADi with so many digits; what was not measured, None, misses nothing."""
+        found = []
+        if self.operations is not None and operations > self.operations:
+            found.append(f"{operations} operations > {self.operations}")
+        if self.ratio is not None and ratio is not None and ratio > self.ratio:
+            found.append(f"symdyn/CasADi {ratio:.{digits}f} > {self.ratio:.2f}")
+        if self.pinocchio is not None and pinocchio is not None and pinocchio < self.pinocchio:
+            found.append(f"Pinocchio/symdyn {pinocchio:.1f} < {self.pinocchio:.1f}")
+        return found
+
+
+class Timed:
+    """What has times of programs, program -> ns of one evaluation."""
+
+    times: dict[str, float]
+
+    def over(self, slower: str, faster: str) -> float | None:
+        """Ratio of two programs' times; None if one was not measured."""
+        if slower not in self.times or faster not in self.times:
+            return None
+        return self.times[slower] / self.times[faster]
 
 
 @dataclass(frozen=True)
