@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ import sympy as sp
 
 from symdyn.errors import ModelError
 from symdyn.model.bodies import Body
-from symdyn.model.symbols import as_expression
+from symdyn.model.symbols import as_expression, finite
 from symdyn.model.sympy_vectors import components, is_dyadic, is_frame, is_sympy_vector
-from symdyn.shown import shown
+from symdyn.shown import name_of, shown
 
 # Names stand in the comments and tables of generated code: what could end a comment or a text is left out.
 NAME = re.compile(r"[\w .,:+*/^'(){}\[\]%#-]*\w[\w .,:+*/^'(){}\[\]%#-]*")
@@ -76,6 +76,31 @@ class Faults(list[str]):
             self.append(f"{what} is not a 3 x 3 matrix; pass three rows of three, or the three diagonal entries")
             return sp.ImmutableMatrix(sp.zeros(3, 3))
         return sp.ImmutableMatrix(3, 3, lambda i, j: self.expression(entries[i][j], f"{what}[{i + 1}, {j + 1}]"))
+
+    def numbers(self, values: Any, known: Sequence[sp.Symbol], what: str, kind: str,
+                meant: Callable[[sp.Basic], sp.Basic]) -> dict[sp.Symbol, float]:
+        """Numbers for some of the known symbols, by symbol or name.
+
+        kind    what each of the known symbols is, in messages
+        meant   symbol that is given -> the one that it stands for
+        """
+        names = {s.name: s for s in known}
+        numbers: dict[sp.Symbol, float] = {}
+        if values is not None and not isinstance(values, Mapping):
+            self.append(f"{what} is {shown(values)}; pass a mapping from symbols or names to numbers")
+            return numbers
+        for key, value in (values or {}).items():
+            name = name_of(meant(key) if isinstance(key, sp.Basic) else key)
+            if name not in names:
+                self.append(f"{what} has a number for {shown(name)}, which is no {kind}; there are {', '.join(names) or 'none'}")
+                continue
+            number = finite(value)
+            if number is None:
+                self.append(f"{what}: the value of {name} is {shown(value)}; pass a finite number, real and within double "
+                            "precision")
+            else:
+                numbers[names[name]] = number
+        return numbers
 
     def square(self, value: Any, n: int, what: str) -> sp.ImmutableMatrix:
         """An n x n matrix; a list of n stands for its diagonal."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import keyword
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import sympy as sp
@@ -14,7 +14,7 @@ from sympy.core.function import AppliedUndef
 from symdyn.errors import ModelError
 from symdyn.formulation.equations import Symbols
 from symdyn.model.faults import NAME, Faults
-from symdyn.model.symbols import Coordinate, GivenMotion, Input, Speed, described, finite, parts_of, take_over, time, with_rates
+from symdyn.model.symbols import Coordinate, GivenMotion, Input, Speed, described, parts_of, take_over, time, with_rates
 from symdyn.shown import name_of, shown
 
 
@@ -110,8 +110,8 @@ class Taken:
                                    f"^ ' # % and brackets")
         state = [*self.coordinates, *self.speeds, *self.states]
         started = [*state, *[i for i in self.inputs if type(i) in (Input, GivenMotion)]]
-        numbers = self._numbers(defaults, list(self.parameters), "defaults", "parameter")
-        start = self._numbers(initial, started, "initial", "coordinate, speed, state or input")
+        numbers = self.faults.numbers(defaults, list(self.parameters), "defaults", "parameter", self._meant)
+        start = self.faults.numbers(initial, started, "initial", "coordinate, speed, state or input", self._meant)
         if duration is not None and not (isinstance(duration, (int, float)) and duration > 0):
             self.faults.append(f"duration is {shown(duration)} s; pass a positive number")
         named = {s.name: s for s in everything}
@@ -160,29 +160,13 @@ class Taken:
             self.same |= {f: motion, sp.Derivative(f, self.t): motion.dot, sp.Derivative(f, (self.t, 2)): motion.ddot}
             self.inputs = {motion: None, **{i: None for i in self.inputs if i.name != motion.name}}
 
+    def _meant(self, key: sp.Basic) -> sp.Basic:
+        """The symbol that stands for a function of time; any other symbol as it is."""
+        return self.same.get(key, key)
+
     def _motions(self) -> None:
         """Inputs in the order of their names, each motion once."""
         self.inputs = dict.fromkeys(sorted(self.inputs, key=lambda i: i.name))
-
-    def _numbers(self, values: Any, known: Sequence[sp.Symbol], what: str, kind: str) -> dict[sp.Symbol, float]:
-        if values is not None and not isinstance(values, Mapping):
-            self.faults.append(f"{what} is {shown(values)}; pass a mapping from symbols or names to numbers")
-            return {}
-        names = {s.name: s for s in known}
-        numbers: dict[sp.Symbol, float] = {}
-        for key, value in (values or {}).items():
-            name = name_of(self.same.get(key, key) if isinstance(key, sp.Basic) else key)
-            if name not in names:
-                self.faults.append(f"{what} has a number for {shown(name)}, which is no {kind}; there are "
-                                   f"{', '.join(names) or 'none'}")
-                continue
-            number = finite(value)
-            if number is None:
-                self.faults.append(f"{what}: the value of {name} is {shown(value)}; pass a finite number, real and within double "
-                                   "precision")
-            else:
-                numbers[names[name]] = number
-        return numbers
 
 
 def _time() -> Any:

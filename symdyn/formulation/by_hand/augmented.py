@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.formulation.accelerations import Motion
 from symdyn.formulation.by_hand.checks import ByHand, Part, recording
+from symdyn.formulation.by_hand.constrained import ConstrainedByHand
 from symdyn.formulation.constraints.motion import Constrained
 from symdyn.formulation.constraints.rows import Row, expression_row
 from symdyn.formulation.constraints.solver_choice import choose
@@ -28,6 +29,7 @@ from symdyn.formulation.probes.dependent_rows import Ranks, ranks
 from symdyn.model.closures import Constraint
 from symdyn.model.faults import NAME
 from symdyn.model.loop_check import constraint_faults
+from symdyn.model.symbols import take_over
 from symdyn.shown import name_of, shown
 from symdyn.spatial.vectors import inner, zeros
 
@@ -78,8 +80,8 @@ def augmented(coordinates: Sequence[sp.Symbol], mass: Matrix, force: Vector, con
     parts = [Part(c.name, [c.expression], speeds=True, inputs=True) for c in expressions]
     parameters, inputs = given.symbols([Part("mass", list(M), moving=False), Part("force", F, speeds=True, inputs=True), *parts])
     faults += constraint_faults(sound, [*q, *speeds], (), speeds)
-    numbers = given.numbers(defaults, parameters, "defaults", "parameter")
-    start = given.numbers(initial, [*q, *speeds], "initial", "coordinate or speed")
+    numbers = given.faults.numbers(defaults, parameters, "defaults", "parameter", take_over)
+    start = given.faults.numbers(initial, [*q, *speeds], "initial", "coordinate or speed", take_over)
     if faults:
         raise ModelError(faults, name)
     description = _Description(name, Symbols(tuple(q), tuple(speeds), (), tuple(inputs), tuple(parameters), numbers, start),
@@ -149,7 +151,7 @@ class _Recorded:
                 self.rows.append(expression_row(algebra, constraint, self.symbols.coordinates, self.rates, self.symbols.speeds))
 
 
-class _Coordinates(Constrained, Motion):
+class _Coordinates(ConstrainedByHand, Motion):
     """Coordinates whose mass matrix is constant; the speeds are their derivatives."""
 
     def __init__(self, recorded: _Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None,
@@ -158,17 +160,7 @@ class _Coordinates(Constrained, Motion):
         super().__init__(recorded.algebra, symbols.coordinates, symbols.speeds, recorded.rates, (), symbols.inputs,
                          symbols.parameters)
         self.recorded = recorded
-        self.rows = recorded.rows
-        self.kernel, self.independent, self.pivots = kernel, independent, pivots
-
-    @cached_property
-    def length(self) -> Any:
-        """1 m: which of the coordinates are lengths, and how long the mechanism is, is not known."""
-        return 1
-
-    @property
-    def angular(self) -> list[bool]:
-        return [False] * len(self.speeds)
+        self.constrain(recorded.rows, kernel, independent, pivots)
 
     def quantities(self) -> dict[str, Any]:
         own = {"k_tilde": self.k_tilde, "F_tilde": lambda: self.recorded.F, "kinetic_energy": self.kinetic_energy,

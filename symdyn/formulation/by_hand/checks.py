@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +24,11 @@ from symdyn.model.symbols import (
     Rate,
     as_coordinate,
     described,
-    finite,
     symbols_of,
-    take_over,
     time,
     with_rates,
 )
-from symdyn.shown import name_of, shown
+from symdyn.shown import shown
 from symdyn.tape import node as kinds
 from symdyn.tape.recorder import Recorder
 
@@ -113,29 +111,6 @@ class ByHand:
             if least < -1e-12 * max(abs(float(e)) for e in M):
                 faults.append(f"mass has the eigenvalue {least:.6g}; pass a matrix that gives no negative kinetic energy")
         return M
-
-    def numbers(self, values: Mapping[Any, Any] | None, known: Sequence[sp.Symbol], what: str,
-                kind: str) -> dict[sp.Symbol, float]:
-        """Numbers for some of the known symbols, by symbol or name; kind: what each of them is."""
-        names = {s.name: s for s in known}
-        numbers: dict[sp.Symbol, float] = {}
-        if values is not None and not isinstance(values, Mapping):
-            self.faults.append(f"{what} is {shown(values)}; pass a mapping from symbols or names to numbers")
-            return numbers
-        for key, value in (values or {}).items():
-            symbol = take_over(key) if isinstance(key, sp.Basic) else key
-            name = name_of(symbol)
-            if name not in names:
-                self.faults.append(f"{what} has a number for {shown(name)}, which is no {kind}; there are "
-                                   f"{', '.join(names) or 'none'}")
-                continue
-            found = finite(value)
-            if found is None:
-                self.faults.append(f"{what}: the value of {name} is {shown(value)}; pass a finite number, real and "
-                                   "within double precision")
-            else:
-                numbers[names[name]] = found
-        return numbers
 
     def symbols(self, parts: Sequence[Part]) -> tuple[list[sp.Symbol], list[sp.Symbol]]:
         """Parameters and inputs in the order of first use."""

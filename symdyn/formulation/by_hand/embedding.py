@@ -21,7 +21,7 @@ from symdyn.formulation.equations import Symbols
 from symdyn.formulation.printed.provenance import OfCoordinates
 from symdyn.formulation.probes.rank import first_dependent
 from symdyn.formulation.trees.embedding import EmbeddedEquations
-from symdyn.model.symbols import Coordinate, GivenMotion, time
+from symdyn.model.symbols import Coordinate, GivenMotion, take_over, time
 from symdyn.spatial.vectors import congruence, inner, vector
 from symdyn.tape.differentiate import jacobian
 
@@ -61,7 +61,7 @@ def embedding(coordinates: Sequence[sp.Symbol], position: Vector, mass: Matrix, 
         unused = [c for c in q if not any(e.has(c) for e in r)]
         if unused:
             faults.append(f"position does not depend on {', '.join(map(str, unused))}; the mass matrix would be singular")
-    numbers = given.numbers(defaults, parameters, "defaults", "parameter")
+    numbers = given.faults.numbers(defaults, parameters, "defaults", "parameter", take_over)
     if faults:
         raise ModelError(faults, name)
     symbols = Symbols(tuple(q), tuple(c.dot for c in q), (), tuple(inputs), tuple(parameters), numbers)

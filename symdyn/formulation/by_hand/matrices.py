@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from symdyn.formulation.accelerations import Motion
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.formulation.by_hand.augmented import search_near
 from symdyn.formulation.by_hand.checks import recording
+from symdyn.formulation.by_hand.constrained import ConstrainedByHand
 from symdyn.formulation.constraints.motion import Constrained
 from symdyn.formulation.constraints.rows import Row
 from symdyn.formulation.constraints.solver_choice import choose
@@ -237,23 +238,13 @@ class _Matrices(Motion):
             return SquareSystem(self.algebra, A, reason).solve(-zero)
 
 
-class _ConstrainedMatrices(Constrained, _Matrices):
+class _ConstrainedMatrices(ConstrainedByHand, _Matrices):
     """Quantities of equations with constraints."""
 
     def __init__(self, recorded: Recorded, kernel: bool = False, independent: tuple[int, ...] | None = None,
                  pivots: tuple[tuple[int, int], ...] | None = None) -> None:
         super().__init__(recorded)
-        self.rows = recorded.rows
-        self.kernel, self.independent, self.pivots = kernel, independent, pivots
-
-    @cached_property
-    def length(self) -> Any:
-        """1 m: how long the mechanism is, and which of the coordinates are lengths, the matrices do not hold."""
-        return 1
-
-    @property
-    def angular(self) -> list[bool]:
-        return [False] * len(self.speeds)
+        self.constrain(recorded.rows, kernel, independent, pivots)
 
     def quantities(self) -> dict[str, Any]:
         return {**super().quantities(), "constraint_force": self.constraint_force}
