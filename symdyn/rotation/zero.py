@@ -15,7 +15,7 @@ _ROUNDING = sp.Float("1e-14")
 
 def vanishes(expression: Any) -> bool:
     """Whether an expression is zero for all values of its symbols: to 25 digits at two points, to 14 with Floats."""
-    expression = sp.sympify(expression)
+    expression = sp.sympify(expression, strict=True)
     rounded = expression.has(sp.Float)
     if expression.is_number and not rounded and expression.is_zero is not None:
         return bool(expression.is_zero)

@@ -40,12 +40,16 @@ class Options:
 
     def rates(self, taken: Taken) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
         """The extra states with their rates."""
-        return tuple((taken.same[z], sp.sympify(rate)) for z, rate in self.states.items())
+        return tuple((taken.same[z], sp.sympify(rate, strict=True)) for z, rate in self.states.items())
 
     def outputs_of(self, taken: Taken) -> tuple[tuple[str, Any], ...]:
         """Outputs by name."""
-        return tuple((name, tuple(map(sp.sympify, _entries(value))) if hasattr(value, "__len__") else sp.sympify(value))
-                     for name, value in self.outputs.items())
+        def taken(value: Any) -> Any:
+            if isinstance(value, (list, tuple, sp.MatrixBase)):
+                return tuple(map(taken, value))
+            return sp.sympify(value, strict=True)
+
+        return tuple((name, taken(value)) for name, value in self.outputs.items())
 
 
 def _entries(value: Any) -> list[Any]:

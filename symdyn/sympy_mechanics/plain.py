@@ -82,4 +82,4 @@ def _column(values: Any, what: str, name: str) -> list[Any]:
     wrong = [e for e in entries if not isinstance(e, (sp.Expr, int, float))]
     if wrong:
         raise ModelError([f"{what} holds {wrong[0]!r:.60}; pass functions of time and expressions of SymPy's"], name)
-    return [sp.sympify(e) for e in entries]
+    return [sp.sympify(e, strict=True) for e in entries]

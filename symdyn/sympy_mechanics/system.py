@@ -95,7 +95,7 @@ class _Conversion:
     def _take(self, what: str, e: Any) -> Any:
         """An expression or matrix in symdyn's symbols; dynamic functions that are no coordinates become inputs."""
         self.taken.use(what, e, accelerations=True)
-        return sp.sympify(e).xreplace(self.taken.same)
+        return sp.sympify(e, strict=True).xreplace(self.taken.same)
 
     # -- bodies and joints
 
@@ -184,7 +184,7 @@ class _Conversion:
                   {q.dot for q in self.taken.coordinates}]
         if not chosen:
             return
-        rows = [sp.sympify(e) for e in source.kdes]
+        rows = [sp.sympify(e, strict=True) for e in source.kdes]
         A = sp.Matrix(rows).jacobian(list(source.u))
         if A.rows != A.cols or any(e.has(*source.u) for e in A):
             self.faults.append(f"the kinematic equations do not give each of the speeds {', '.join(map(str, source.u))} by the "
@@ -213,7 +213,7 @@ class _Conversion:
             body = next((b for b in source.bodies if isinstance(load, Force) and load.point == b.masscenter), None)
             if body is not None and body.mass != 0:
                 a = (load.force / body.mass).to_matrix(N).applyfunc(sp.cancel) if self._in(load.force, N) else None
-                if a is not None and not functions_of_time(a) and not a.free_symbols & sp.sympify(body.mass).free_symbols:
+                if a is not None and not functions_of_time(a) and not a.free_symbols & sp.sympify(body.mass, strict=True).free_symbols:
                     found.setdefault(sp.ImmutableMatrix(a), []).append((body, load))
         moving = [b for b in source.bodies if getattr(b, "frame", None) != N and b.mass != 0]
         for a, pairs in found.items():
