@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import re
+from html import unescape
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
 
+# The bold letters of Unicode: browsers take no `mathvariant` but "normal" (MathML Core).
+_ALPHABETS = (("A", 26, 0x1D400), ("a", 26, 0x1D41A), ("0", 10, 0x1D7CE), ("\u0391", 25, 0x1D6A8), ("\u03b1", 25, 0x1D6C2))
+_BOLD = {ord(first) + k: chr(bold + k) for first, count, bold in _ALPHABETS for k in range(count)}
+_VARIANT = re.compile(r'<(m[in]) mathvariant="bold(?:-italic)?">([^<]*)</')
+
+
+def mathml(formula: str, display: str = "inline") -> str:
+    """A formula of LaTeX as MathML."""
+    text = convert(formula, display=display).replace('mathvariant="sans-serif"', 'mathvariant="normal"')
+    return _VARIANT.sub(lambda m: f"<{m[1]}>{unescape(m[2]).translate(_BOLD)}</", text)
+
 
 def inline(writer: HTML5Translator, node: nodes.math) -> None:
-    writer.body.append(convert(node.astext()))
+    writer.body.append(mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def block(writer: HTML5Translator, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="formula">{convert(node.astext(), display="block")}</div>')
+    writer.body.append(f'<div class="formula">{mathml(node.astext(), "block")}</div>')
     raise nodes.SkipNode
 
 
