@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
+NAMES = {page: page.relative_to(ROOT / "docs").with_suffix("").as_posix() for page in PAGES}
 
 # They are texts of the project's folder on the site.
 OF_THE_PROJECT = "contributing", "changes"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=NAMES.get)
 def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     """All blocks of a page run one after the other; what they print is what the text blocks show, to the last character."""
     text = page.read_text(encoding="utf-8")
@@ -30,7 +31,7 @@ def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     assert run.stdout == "".join(shown)
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES], ids=lambda page: NAMES.get(page, page.stem))
 def test_links_lead_somewhere(page: Path) -> None:
     """To a file, and where a heading is named to a heading of that page."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
@@ -47,4 +48,4 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_the_index_lists_every_page() -> None:
     listed = set(re.findall(r"\]\(([\w/]+)\.(?:md|rst)\)", (ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
     reference = {f"reference/{page.stem}" for page in (ROOT / "docs" / "reference").glob("*.rst")}
-    assert listed == {page.stem for page in PAGES} - {"index", *OF_THE_PROJECT} | reference
+    assert listed == set(NAMES.values()) - {"index", *OF_THE_PROJECT} | reference

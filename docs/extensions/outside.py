@@ -17,11 +17,14 @@ OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((\.\./[^)\s]+)\)")
 PAGE = re.compile(r"\]\(((?:\.\./)?[\w/]+)\.(?:md|rst)\)")
 
 
-def linked(text: str) -> str:
-    """The text of a page with links that lead to pages of the site, or to files to download."""
+def linked(text: str, folder: Path) -> str:
+    """The text of a page in a folder with links that lead to pages of the site, or to files to download."""
     def target(link: re.Match[str]) -> str:
         label, path = link[1], link[2]
-        page = next((page for page, file in TEXTS.items() if path == f"../{file}"), None)
+        file = (folder / path.partition("#")[0]).resolve()
+        if file.is_relative_to(ROOT / "docs"):
+            return link[0]
+        page = next((page for page, name in TEXTS.items() if file == ROOT / name), None)
         return f"[{label}]({page}.md)" if page else f"{{download}}`{label} <{path}>`"
 
     return OUTSIDE.sub(target, text)
@@ -44,7 +47,7 @@ def replace(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] = (ROOT / TEXTS[page]).read_text(encoding="utf-8").replace("](docs/", "](")
     if page == "index":
         source[0] += "\n" + contents(source[0])
-    source[0] = linked(source[0])
+    source[0] = linked(source[0], (ROOT / "docs" / page).parent)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
