@@ -59,7 +59,8 @@ class Linearization:
     Z   (n_u, n_d): v = Z eta of what moves along all speeds
 
     coordinates   names of eta: of coordinates, of speeds that are no rates (turning about that axis)
-    states        names of x'; outputs: names of y', entries of vectors by number; held: names of what is held
+    states        names of x', each once: a displacement along a speed that is no rate is along_ and the speed's name;
+                  outputs: names of y', entries of vectors by number; held: names of what is held
     """
 
     def __init__(self, manifold: Manifold, equilibrium: Equilibrium | None) -> None:
@@ -73,7 +74,9 @@ class Linearization:
         self.M, self.C, self.K, self.G = manifold.M, manifold.C, manifold.K, manifold.G
         self.F_in, self.Z = manifold.F_in, manifold.Z_v
         self.coordinates = manifold.labels
-        self.states = (*manifold.labels, *manifold.speed_labels, *manifold.state_labels)
+        speeds = self.module.metadata.u
+        displaced = [f"along_{n}" if n == speeds[k] else n for n, k in zip(manifold.labels, manifold.displacements, strict=True)]
+        self.states = (*displaced, *manifold.speed_labels, *manifold.state_labels)
         self.held = manifold.selection.held
 
     @cached_property
@@ -117,8 +120,8 @@ class Linearization:
     def units(self) -> Mapping[str, str]:
         """Units of the states, inputs and outputs by name; an entry of A has that of its row, by its column and a second."""
         known = self.module.metadata.units
-        displaced = {label: known.get(label, known.get(self.module.metadata.u[k], "").removesuffix("/s") or "")
-                     for label, k in zip(self.coordinates, self._manifold.displacements, strict=True)}
+        displaced = {name: known.get(name, known.get(self.module.metadata.u[k], "").removesuffix("/s") or "")
+                     for name, k in zip(self.states, self._manifold.displacements, strict=False)}
         others = {n: known.get(n, "") for n in (*self.states[len(self.coordinates):], *self.module.metadata.inputs)}
         points = self.module.metadata.output_units
         return {**others, **displaced, **{n: points.get(n.partition("[")[0], "") for n in self.outputs}}
@@ -273,16 +276,8 @@ class Linearization:
         return of_eigenvalue(manifold, self._analysis.spectrum, self.modes()[mode], changes)
 
     def _labelled_states(self) -> tuple[str, ...]:
-        """Names of x' with units; a displacement along a speed that is no rate of a coordinate is marked."""
-        units = self.module.metadata.units
-        speeds = self.module.metadata.u
-        result = []
-        for label, k in zip(self.coordinates, self._manifold.displacements, strict=True):
-            if label == speeds[k]:
-                result.append(f"displacement along {label} [{units.get(label, '').removesuffix('/s') or '1'}]")
-            else:
-                result.append(f"{label} [{units.get(label) or '1'}]")
-        return (*result, *[f"{n} [{units.get(n) or '1'}]" for n in self.states[len(self.coordinates):]])
+        """Names of x' with units."""
+        return tuple(f"{name} [{self.units.get(name) or '1'}]" for name in self.states)
 
     def __repr__(self) -> str:
         about = "an equilibrium" if self.equilibrium is not None else "a state"

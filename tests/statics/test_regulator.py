@@ -78,6 +78,22 @@ def test_a_double_integrator_in_closed_form() -> None:
     assert np.isclose(found.S[0, 0], 0.25 * np.sqrt(12) * 2, rtol=1e-12)  # the least cost from x = 1
 
 
+def test_angles_and_angular_velocities_have_weights_of_their_own() -> None:
+    """A body turned by a moment, C omega_dot = T: weight a on the angle and R = 1 give K = [sqrt(a), sqrt(2 C sqrt(a))]."""
+    system = sd.System("satellite")
+    body = system.add_body("body", mass=1, inertia=[3, 3, 2])
+    joint = sd.Spherical("about_G", system.ground, body, orientation=sd.EulerAngles("ZYX", speeds="body"))
+    system.add_joint(joint)
+    system.add_torque(body, sd.inputs("T1:4"), frame=body)
+    linear = system.compile("numpy").linearize()
+    turned, omega = linear.states[:3], linear.states[3:]
+    assert omega == ("omega_x_about_G", "omega_y_about_G", "omega_z_about_G") and turned == tuple(f"along_{n}" for n in omega)
+    assert [linear.units[n] for n in linear.states] == ["rad"] * 3 + ["rad/s"] * 3
+    gain = linear.lqr(dict.fromkeys(turned, 4), {"T1": 1, "T2": 1, "T3": 1})
+    exact = np.hstack([2 * np.eye(3), np.diag(np.sqrt([12, 12, 8]))])
+    np.testing.assert_allclose(gain.K, exact, atol=1e-12)
+
+
 def test_a_regulator_prints_names_units_and_the_closed_loop() -> None:
     text = repr(cart().linearize().lqr([1, 1, 0, 0], [1]))
     assert "cart: linear-quadratic regulator" in text and "F [N]" in text
