@@ -183,15 +183,29 @@ def demand_definite(matrix: np.ndarray, names: Sequence[str], what: str, owner: 
 
 
 def _out_of_reach(A: np.ndarray, B: np.ndarray) -> list[tuple[complex, np.ndarray]]:
-    """Eigenvalues of the part of A that no column of B reaches, with the shares (n,) of the states in what is out of reach."""
+    """Eigenvalues of the part of A that no column of B reaches, with the shares (n,) of the states in what is out of reach.
+
+    In the units of the states or in those that balance A, whichever leaves less: units that are far apart hide what is reached
+    in the first, and errors of rounding that balancing takes for couplings in the second.
+    """
     n = len(A)
     if not n:
         return []
     balanced, (factors, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    columns = B / factors[:, None]
-    lengths = np.linalg.norm(columns, axis=0)
-    newest = columns[:, lengths > 0] / lengths[lengths > 0]
-    size = max(float(np.linalg.norm(balanced, 2)), 1e-300)
+    scaled = [(A, B, np.ones(n)), (balanced, B / factors[:, None], factors)]
+    matrix, rest, units = min(((a, _complement(a, b), f) for a, b, f in scaled), key=lambda found: found[1].shape[1])
+    if not rest.shape[1]:
+        return []
+    values, vectors = np.linalg.eig(rest.T @ matrix.T @ rest)
+    return [(complex(value), np.abs(rest @ vector) / units) for value, vector in zip(values, vectors.T, strict=True)]
+
+
+def _complement(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Orthonormal directions (n, k) that neither B nor any A^i B has a part along."""
+    n = len(A)
+    lengths = np.linalg.norm(B, axis=0)
+    newest = B[:, lengths > 0] / lengths[lengths > 0]
+    size = max(float(np.linalg.norm(A, 2)), 1e-300)
     basis = np.zeros((n, 0))
     while newest.shape[1] and basis.shape[1] < n:
         for _ in range(2):  # once more for what rounding left
@@ -199,12 +213,8 @@ def _out_of_reach(A: np.ndarray, B: np.ndarray) -> list[tuple[complex, np.ndarra
         U, values, _ = np.linalg.svd(newest, full_matrices=False)
         fresh = U[:, values > NOTHING]
         basis = np.hstack([basis, fresh])
-        newest = balanced @ fresh / size
-    rest = np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1]:] if basis.shape[1] else np.eye(n)
-    if not rest.shape[1]:
-        return []
-    values, vectors = np.linalg.eig(rest.T @ balanced.T @ rest)
-    return [(complex(value), np.abs(rest @ vector) / factors) for value, vector in zip(values, vectors.T, strict=True)]
+        newest = A @ fresh / size
+    return np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1]:] if basis.shape[1] else np.eye(n)
 
 
 def _root(Q: np.ndarray) -> np.ndarray:

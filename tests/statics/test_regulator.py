@@ -13,7 +13,7 @@ import scipy.linalg
 import sympy as sp
 
 import symdyn as sd
-from symdyn.statics.regulator import Regulator
+from symdyn.statics.regulator import Regulator, _out_of_reach
 
 
 @functools.cache
@@ -199,6 +199,20 @@ def test_what_no_input_reaches_is_named() -> None:
     pendulum = sd.systems.pendulum().embedding().compile(backend="numpy").linearize({"q1": 0.0})
     with pytest.raises(sd.ArgumentError, match="a regulator was requested, but the system has no inputs"):
         pendulum.lqr([1, 1], [])
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.3e-14])
+def test_rounding_hides_nothing_that_an_input_reaches(noise: float) -> None:
+    """A drone with a load and yaw: what cancels to 3e-14 in the equation of roll made balancing shrink all of yaw to nothing."""
+    A, B = np.zeros((8, 8)), np.zeros((8, 2))
+    A[:4, 4:] = np.eye(4)
+    A[4, 1:3], A[5, 2], A[6, 2] = (9.81, -2.45), noise, -12.26
+    B[5:7, 0], B[5:, 1] = (16.67, -16.67), (-16.67, 16.67, 0.727)
+    reached = np.hstack([np.linalg.matrix_power(A, k) @ B for k in range(8)])
+    assert np.linalg.matrix_rank(reached) == 8
+    assert _out_of_reach(A, B) == []
+    unheard = _out_of_reach(A, B * [1, 0])
+    assert len(unheard) == 2 and max(abs(value) for value, _ in unheard) < 1e-9
 
 
 def test_decaying_modes_need_no_input() -> None:
