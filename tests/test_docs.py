@@ -31,7 +31,8 @@ def test_blocks_run_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     assert run.stdout == "".join(shown)
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES], ids=lambda page: NAMES.get(page, page.stem))
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES],
+                         ids=lambda page: NAMES.get(page, page.stem))
 def test_links_lead_somewhere(page: Path) -> None:
     """To a file, and where a heading is named to a heading of that page."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):

@@ -653,8 +653,9 @@ class Module:
                     output times; default: from 0 over the system's duration
         q, u, z     start; in order, or by name or symbol; what is left out takes the system's initial value, else 0
         params      as everywhere in Module
-        inputs      numbers; a table: (times, values), or a symdyn.Table; a function of (t, x); sd.Sampled(function, period) for a
-                    controller whose value is held between its instants, at which steps end; or a mapping from names to these.
+        inputs      numbers; a table: (times, values), or a symdyn.Table; a spline of SciPy, of order three at most; a function of
+                    (t, x); sd.Sampled(function, period) for a controller whose value is held between its instants, at which steps
+                    end; or a mapping from names to these.
                     A motion (sd.motions): a function of t that returns value, rate and acceleration, a spline of SciPy, a
                     table, or a number
         interpolation, extend   of tables that are pairs: "linear" or "cubic", a smooth spline (steps end at the times of both);

@@ -213,7 +213,8 @@ class _Conversion:
             body = next((b for b in source.bodies if isinstance(load, Force) and load.point == b.masscenter), None)
             if body is not None and body.mass != 0:
                 a = (load.force / body.mass).to_matrix(N).applyfunc(sp.cancel) if self._in(load.force, N) else None
-                if a is not None and not functions_of_time(a) and not a.free_symbols & sp.sympify(body.mass, strict=True).free_symbols:
+                mass = sp.sympify(body.mass, strict=True)
+                if a is not None and not functions_of_time(a) and not a.free_symbols & mass.free_symbols:
                     found.setdefault(sp.ImmutableMatrix(a), []).append((body, load))
         moving = [b for b in source.bodies if getattr(b, "frame", None) != N and b.mass != 0]
         for a, pairs in found.items():

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import BSpline, CubicSpline, PPoly, UnivariateSpline, make_interp_spline
 
 import symdyn as sd
 from symdyn.errors import ArgumentError
@@ -42,6 +42,39 @@ def spline(interpolation: str, times: np.ndarray = TIMES, values: np.ndarray = F
 def moved(force: PPoly, t: np.ndarray = T) -> np.ndarray:
     """From rest at 0 at the first time of the table."""
     return np.asarray(force.antiderivative(2)(t))
+
+
+@pytest.mark.parametrize("backend", ["c", "numpy"])
+@pytest.mark.parametrize(("given", "most"), [
+    (CubicSpline(TIMES, FORCES), 1e-12), (make_interp_spline(TIMES, FORCES, k=3), 1e-12), (spline("linear"), 1e-12),
+    (PPoly([[1.0, -2.0]], [0.0, 1.7, 3.0]), 1e-8)], ids=["cubic", "in B-form", "straight", "jumps"])
+def test_splines_of_scipy_are_taken_as_they_are(given: Any, most: float, backend: str) -> None:
+    """B-splines too, and to the tolerance those that jump; called with a state, a spline would take it for an order."""
+    found = pushed(backend).simulate(T, inputs={"F": given}, rtol=1e-9)
+    whole = PPoly.from_spline(given) if isinstance(given, BSpline) else given
+    assert found.success
+    np.testing.assert_allclose(found.q[:, 0], moved(whole), rtol=0, atol=most)
+
+
+@pytest.mark.parametrize(("given", "message"), [
+    (CubicSpline([0, 1, 2, 3], [0, 1, 1, 0], bc_type="periodic"), "a periodic spline; pass one of order three at most that "
+     r"covers the run, or pass the function lambda t, x: float\(spline\(t\)\)"),
+    (make_interp_spline(TIMES, FORCES, k=5), "a spline of order 5; pass one of order three at most"),
+    (CubicSpline(TIMES[:4], FORCES[:4]), "holds from t = 0 s to 1.3 s, and the run goes from 0 s to 3 s; pass one of the whole"),
+    (CubicSpline(TIMES, np.column_stack([FORCES, FORCES])), r"is a spline with coefficients of shape \(4, 6, 2\); pass one of a "
+     "single real, finite value"),
+    (UnivariateSpline(TIMES, FORCES), "which is no piecewise polynomial; pass the function lambda t, x: float"),
+], ids=["periodic", "order 5", "short", "two values", "another kind"])
+def test_splines_that_do_not_fit(given: Any, message: str) -> None:
+    with pytest.raises(ArgumentError, match=f"^pushed: inputs: F .*{message}"):
+        pushed().simulate(T, inputs={"F": given})
+
+
+def test_a_spline_alone_is_that_of_the_only_input() -> None:
+    cart = sd.systems.cart_pole().compile(backend="numpy")
+    force = CubicSpline(TIMES, FORCES)
+    alone, named = cart.simulate(T, inputs=force), cart.simulate(T, inputs={"F": force})
+    assert (alone.x == named.x).all() and np.ptp(alone["F"]) > 1
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])

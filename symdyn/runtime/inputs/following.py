@@ -147,7 +147,30 @@ def _spline(given: Any, where: str) -> Any:
     return PPoly.from_spline(given) if isinstance(given, BSpline) else given if isinstance(given, PPoly) else None
 
 
-def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float, float] | None) -> Followed:
+def spline_pieces(given: Any, where: str, span: tuple[float, float] | None) -> Pieces | None:
+    """The pieces of one input that is a spline of SciPy, jumps included; None of what is none.
+
+    span   of the run, which it must cover; None: not requested
+    Raises ArgumentError for splines that are periodic or of an order above three, and for what is no piecewise polynomial.
+    """
+    if isinstance(given, (tuple, Table)) or not type(given).__module__.startswith("scipy.interpolate"):
+        return None
+    spline = _spline(given, where)
+    remedy = "pass the function lambda t, x: float(spline(t))"
+    if spline is None:
+        raise ArgumentError(f"{where} is {shown(given)}, which is no piecewise polynomial; {remedy}")
+    breaks, c = _sound(spline, where, span)
+    if len(c) > ORDER or spline.extrapolate == "periodic":
+        kind = "periodic spline" if spline.extrapolate == "periodic" else f"spline of order {len(c) - 1}"
+        raise ArgumentError(f"{where} is a {kind}; pass one of order three at most that covers the run, or {remedy}")
+    return Pieces(breaks, _powers(c).T[:, None, :])
+
+
+def _sound(spline: Any, where: str, span: tuple[float, float] | None) -> tuple[np.ndarray, np.ndarray]:
+    """Breaks (n + 1,) and coefficients (order, n) of a spline, the highest power first.
+
+    Raises ArgumentError for one of several values, or complex, and for one that does not cover the run.
+    """
     breaks = np.asarray(spline.x, dtype=float)
     kept = np.append(np.flatnonzero(np.diff(breaks) > 0), len(breaks) - 1)  # a spline in B-form repeats its end knots
     breaks, c = breaks[kept], np.asarray(spline.c)[:, kept[:-1]]
@@ -158,13 +181,23 @@ def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float
         if not breaks[0] - slack <= min(span) or not max(span) <= breaks[-1] + slack:
             raise ArgumentError(f"{where} holds from t = {breaks[0]:.9g} s to {breaks[-1]:.9g} s, and the run goes from "
                                 f"{min(span):.9g} s to {max(span):.9g} s; pass one of the whole run (its ends are not held)")
+    return breaks, c
+
+
+def _powers(c: np.ndarray) -> np.ndarray:
+    """Coefficients (4, n) of 1, d, d^2 and d^3, from those (order, n) with the highest power first."""
+    powers = np.zeros((ORDER, c.shape[1]))
+    powers[:len(c)] = c[::-1]
+    return powers
+
+
+def _of_spline(spline: Any, name: str, place: int, where: str, span: tuple[float, float] | None) -> Followed:
+    breaks, c = _sound(spline, where, span)
     _demand_continuous(breaks, c, where)
     if len(c) > ORDER or spline.extrapolate == "periodic":
         return Followed(name, place, None, _with_derivatives(deepcopy(spline)),
                         _repeated(breaks, span) if spline.extrapolate == "periodic" else tuple(breaks.tolist()))
-    powers = np.zeros((ORDER, c.shape[1]))
-    powers[:len(c)] = c[::-1]
-    c0, c1, c2, c3 = powers
+    c0, c1, c2, c3 = _powers(c)
     none = np.zeros_like(c0)
     rows = [np.stack(r, axis=-1) for r in ((c0, c1, c2, c3), (c1, 2 * c2, 3 * c3, none), (2 * c2, 6 * c3, none, none))]
     pieces = Pieces(breaks, np.stack(rows, axis=1))

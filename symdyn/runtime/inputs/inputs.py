@@ -13,9 +13,9 @@ import numpy as np
 from symdyn.arguments import take
 from symdyn.errors import ArgumentError
 from symdyn.real_numbers import NotReal, number, real
-from symdyn.runtime.inputs.following import RATES, Followed, Motions, take_motion
+from symdyn.runtime.inputs.following import RATES, Followed, Motions, spline_pieces, take_motion
 from symdyn.runtime.inputs.sampled import Record, Sampled, Sampler
-from symdyn.runtime.inputs.tables import Pieces, Table, joined
+from symdyn.runtime.inputs.tables import Pieces, Piecewise, Table, joined
 from symdyn.runtime.raised import InputRaised, called
 from symdyn.shown import name_of, shown
 
@@ -238,7 +238,8 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
 
     given   None (defaults, else zero); numbers in order; a function of (t, x) or a Sampled controller for all; a pair (times,
             values) or a Table; or a mapping from names or symbols to a number, a function of (t, x), a pair (times, values), a
-            Table, or a Sampled controller, which may also have several names as its key
+            Table, a spline of SciPy, or a Sampled controller, which may also have several names as its key; a spline alone is
+            that of the only input
     span    of the run, which tables must cover unless their ends are held; None: not asked
     interpolation, extend   of pairs, as of a Table
     motions   names of those that are motions: also functions of t that return value, rate and acceleration, splines of SciPy and
@@ -256,6 +257,8 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
         return Inputs(start)
     if not names:
         raise ArgumentError(f"{owner}: inputs were given, but the system has none")
+    if len(names) == 1 and not motions and type(given).__module__.startswith("scipy.interpolate"):
+        given = {names[0]: given}
     if motions and (isinstance(given, Sampled) or callable(given) or is_table(given)):
         raise ArgumentError(f"{owner}: the inputs {', '.join(motions)} are motions, which need rates and accelerations; give "
                             "inputs by name: inputs={...}")
@@ -275,6 +278,9 @@ def take_inputs(given: Any, names: Sequence[str], initial: Mapping[str, float], 
     samplers, given = _samplers(given, names, owner)
     sampled = {names[place]: start[place] for sampler in samplers for place in sampler.places}
     parts = {name_of(key): value for key, value in given.items()}
+    for n, value in parts.items():
+        pieces = None if n in motions else spline_pieces(value, f"{owner}: inputs: {n}", span)
+        parts[n] = value if pieces is None else Piecewise(pieces)
     places = {n: k for k, n in enumerate(names)}
     varying = {n: v for n, v in parts.items() if callable(v) or is_table(v) or isinstance(v, tuple)}
     moving = {n: varying.pop(n) for n in motions if n in varying}
