@@ -28,21 +28,22 @@ class _Taken:
     where: Mapping[str, sp.Expr]
 
 
-def judge(case: Case) -> tuple[FormulaResult, ...]:
-    """Compare all formulas of a case. Raises CaseError with every fault of its values."""
+def judge(case: Case, sent: bool = False) -> tuple[FormulaResult, ...]:
+    """Compare all formulas of a case; sent: the results go to another process, where their expressions are made again from their
+    parts. Raises CaseError with every fault of its values."""
     faults: list[str] = []
     taken = [t for t in (_take(f, faults) for f in case.taken()) if t is not None]
     if faults:
         raise CaseError(faults, case.name)
-    results = tuple(r for r in (_results(t, faults) for t in taken) if r is not None)
+    results = tuple(r for r in (_results(t, faults, sent) for t in taken) if r is not None)
     if faults:
         raise CaseError(faults, case.name)
     return results
 
 
-def _results(taken: _Taken, faults: list[str]) -> FormulaResult | None:
+def _results(taken: _Taken, faults: list[str], sent: bool) -> FormulaResult | None:
     try:
-        return _judged(taken, faults)
+        return _judged(taken, faults, sent)
     except CaseError as error:
         faults += [f"{taken.formula.name}: {fault}" for fault in error.faults]
         return None
@@ -71,7 +72,7 @@ def _shape(value: Value) -> str:
     return " x ".join(map(str, value.shape)) or "a scalar"
 
 
-def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
+def _judged(taken: _Taken, faults: list[str], sent: bool) -> FormulaResult:
     formula = taken.formula
     assert formula.slide is not None
     if taken.printed is None:
@@ -87,13 +88,13 @@ def _judged(taken: _Taken, faults: list[str]) -> FormulaResult:
     unreadable = formula.unreadable if isinstance(formula.unreadable, Mapping) else {}
     entries = []
     assert taken.shown is not None
-    shown, right = taken.shown.rebuilt(), derived.rebuilt()
-    known = {str(s) for e in derived.entries for s in symbols_of(e)}
+    shown, right = (taken.shown, derived) if sent else (taken.shown.rebuilt(), derived.rebuilt())
     for k, (place, decision) in enumerate(zip(_places(taken.printed, decisions), decisions)):
         a, b = (shown.entries[k], right.entries[k]) if decision.how != SHAPE else (None, None)
         entry = EntryResult(place, Verdict.EQUAL, decision.how, "", a, b, decision.point, decision.values, decision.proved)
         judged = _verdict(entry, decision, convention, errata, unreadable.get(place, ""))
         if judged.verdict is Verdict.DIFFERENT and not judged.note and decision.how != SHAPE:
+            known = {str(s) for e in derived.entries for s in symbols_of(e)}
             alone = sorted({str(s) for s in symbols_of(taken.printed.entries[k])} - known)
             judged = replace(judged, note=f"only the print holds {', '.join(alone)}" if alone else "")
         entries.append(judged)

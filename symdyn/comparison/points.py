@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import mpmath
@@ -47,7 +48,12 @@ class Expressions:
         memory: dict[sp.Basic, Any] = {}
         nodes = [record_expression(recorder, e, {s: leaves[s.name] for s in symbols_of(e)}, memory) for e in expressions]
         self.tape = Tape.of(recorder, values=nodes)
-        self.alone = [Tape.of(recorder, values=[node]) for node in nodes]
+        self._alone = [partial(Tape.of, recorder, values=[node]) for node in nodes]
+
+    @cached_property
+    def alone(self) -> list[Tape]:
+        """A tape for each expression."""
+        return [made() for made in self._alone]
 
     def at(self, point: Mapping[str, Any], digits: int = DIGITS) -> list[Any]:
         """Real values, None where an expression has none."""

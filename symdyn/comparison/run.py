@@ -98,7 +98,7 @@ def _shared(names: Sequence[str], jobs: int) -> list[Comparison]:
     start."""
     own: dict[int, Comparison] = {}
     with ProcessPoolExecutor(jobs - 1, mp_context=get_context("spawn"), initializer=gc.disable) as pool:
-        futures = [pool.submit(_named, name) for name in names]
+        futures = [pool.submit(_named, name, sent=True) for name in names]
         try:
             for k in reversed(range(len(names))):
                 if futures[k].cancel():
@@ -139,14 +139,14 @@ def _neither(found: Any) -> str:
     return f"compare takes a name, a Case or several of them, found {found!r:.80} of type {type(found).__name__}"
 
 
-def _named(name: str) -> Comparison:
-    return _compared(find([name])[0])
+def _named(name: str, sent: bool = False) -> Comparison:
+    return _compared(find([name])[0], sent)
 
 
-def _compared(case: Case) -> Comparison:
+def _compared(case: Case, sent: bool = False) -> Comparison:
     start = clock.monotonic()
     try:
-        formulas = judge(case)
+        formulas = judge(case, sent)
     except CaseError as error:
         if error.name:
             raise

@@ -30,10 +30,8 @@ def recorded(expressions: Iterable[Any], same: Mapping[Any, Any] | None = None) 
     """
     expressions = [_taken(e) for e in expressions]
     same = same or {}
-    found: set[Any] = set()
-    for e in expressions:
-        parts = parts_of(e)
-        found |= symbols_of(e) | {part for part in parts if isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral))}
+    found: set[Any] = {part for part in parts_of(*expressions) if isinstance(part, (AppliedUndef, sp.Derivative, sp.Integral))}
+    found = found.union(*map(symbols_of, expressions))
     recorder = Recorder()
     leaves: dict[sp.Basic, Any] = {}
     symbols: dict[Node, sp.Expr] = {}
@@ -62,8 +60,8 @@ def _taken(value: Any) -> Any:
 
 def in_range(e: Any) -> Any:
     """The expression itself. Raises ArgumentError if it holds a decimal number beyond the range of floats."""
-    for number in e.atoms(sp.Float):
-        if number.is_finite and not (LEAST <= abs(number) <= MOST or number.is_zero):
+    for number in parts_of(e) if isinstance(e, sp.Basic) else ():
+        if isinstance(number, sp.Float) and number.is_finite and not (LEAST <= abs(number) <= MOST or number.is_zero):
             raise ArgumentError(f"the number {number.n(6)} is beyond the range of floats, {LEAST:.1e} to {MOST:.1e}; pass it as "
                                 f"a fraction, sp.Rational('{number.n(6)}')")
     return e

@@ -17,7 +17,7 @@ import sympy as sp
 from symdyn.errors import ArgumentError
 from symdyn.frames.checks import FrameFaults
 from symdyn.frames.euler_parameters import spin_by_parameters
-from symdyn.frames.product import times
+from symdyn.frames.product import cross, times
 from symdyn.frames.rates import differentiated
 from symdyn.frames.tidy import tidy
 from symdyn.shown import shown
@@ -141,7 +141,7 @@ def spins(start: Axes, end: Axes, components: Axes,
             w = sign * along(child.omega_in_itself if inside else child.omega_in_parent, given_in, components)
             if order > 1:
                 w_rate = sign * along(child.alpha_in_itself if inside else child.alpha_in_parent, given_in, components)
-                alpha = alpha + w_rate + omega.cross(w)
+                alpha = alpha + w_rate + cross(omega, w)
             omega = omega + w
         yield reached, omega, alpha
 
@@ -183,8 +183,8 @@ def _derivatives(piece: sp.ImmutableMatrix, carrier: Axes, components: Axes, ome
     if order > 0:
         speed = sp.ImmutableMatrix(3, 1, differentiated(piece))
         rho_1 = along(speed, carrier, components)
-        result.append(rho_1 + omega.cross(rho))
+        result.append(rho_1 + cross(omega, rho))
     if order > 1:
         rho_2 = along(sp.ImmutableMatrix(3, 1, differentiated(speed)), carrier, components)
-        result.append(rho_2 + 2 * omega.cross(rho_1) + alpha.cross(rho) + omega.cross(omega.cross(rho)))
+        result.append(rho_2 + 2 * cross(omega, rho_1) + cross(alpha, rho) + cross(omega, cross(omega, rho)))
     return result

@@ -8,6 +8,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
+from symdyn.frames.product import times
 from symdyn.frames.rigid_body import (
     center_of_mass,
     equivalent_force_system,
@@ -83,8 +84,9 @@ def rate_of_angular_momentum() -> list[Formula]:
     derived = turned.R * moment_equation(b_I, turned.b_omega, turned.R.T * turned.alpha)
     w, wd = omega, dot(omega)
     letters = turned.letters
-    by_rates = sd.rate(R) * b_I * R.T * w + R * sp.zeros(3, 3) * R.T * w + R * b_I * sd.rate(R.T) * w + R * b_I * R.T * wd
-    by_omega = w.cross(R * b_I * R.T * w) + R * b_I * b_omega.cross(R.T * w) + R * b_I * R.T * wd
+    n_I, n_I_wd = times(R, b_I, R.T), times(R, b_I, R.T, wd)
+    by_rates = times(sd.rate(R), b_I, R.T, w) + times(R, sp.zeros(3, 3), R.T, w) + times(R, b_I, sd.rate(R.T), w) + n_I_wd
+    by_omega = w.cross(times(n_I, w)) + times(R, b_I, b_omega.cross(R.T * w)) + n_I_wd
     v, psi = constant("v"), sd.coordinates("psi")
     n = sd.Frame("n")
     b = n.frame("b", rotation=sd.rotation.about("Z", psi))
@@ -93,12 +95,12 @@ def rate_of_angular_momentum() -> list[Formula]:
     other_way = Erratum("Seen from the body, the n-frame turns with omega_n/b = -omega_b/n; the sum stays right, since "
                         "omega x omega = 0.", fixed)
     return [
-        Formula("with nRb", sd.rate(R * b_I * R.T * w), derived, line=2590, renamed=letters),
+        Formula("with nRb", sd.rate(times(n_I, w)), derived, line=2590, renamed=letters),
         Formula("product rule", by_rates, derived, line=2596, also=(2594,), renamed=letters),
         Formula("with omega", by_omega, derived, line=2598, renamed=letters),
         Formula("rate of bRn, on any vector", b_omega.cross(b_v), of_n.cross(b_v), line=2598, errata=[other_way],
                 renamed=stands_for(b_omega, b.angular_velocity(components=b)), latex=r"{}^b\dot{R}_n v"),
-        Formula("shorter", w.cross(R * b_I * R.T * w) + R * b_I * R.T * wd, derived, line=2608, renamed=letters),
+        Formula("shorter", w.cross(times(n_I, w)) + n_I_wd, derived, line=2608, renamed=letters),
     ]
 
 

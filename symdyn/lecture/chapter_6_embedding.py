@@ -6,6 +6,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, proofs
+from symdyn.frames.product import times
 from symdyn.lecture.chapter_6_platform import Body
 from symdyn.lecture.chapter_6_transformation import F, Platform, q, tau
 from symdyn.lecture.letters import constant, ddot, dot, moving
@@ -57,29 +58,31 @@ def embedding() -> list[Formula]:
     J_derived, Jd_qd, M_tilde, k_tilde, F_tilde = (
         p.derived(name).xreplace(ahead) for name in ("J", "Jd_qd", "M_tilde", "k_tilde", "F_tilde"))
     qd, qdd, forces = p.qd, ddot(q), sp.Matrix.vstack(F, tau)
-    equations = M_tilde * qdd + k_tilde - F_tilde
+    equations = times(M_tilde, qdd) + k_tilde - F_tilde
     delta_q = sp.Matrix([sp.Symbol(f"delta_{c}") for c in q])
     work = delta_q.dot(equations)
-    MJ, QJ = M * J, Q * J
-    inertia = M * (J * qdd + Jdot * qd) + Q * (J * qd) - forces
-    k_bar = J.T * M * Jdot * qd + J.T * QJ * qd
-    k_without_dot = J.T * MJ * qd + J.T * QJ * qd
+    MJ, QJ = times(M, J), times(Q, J)
+    inertia = times(M, times(J, qdd) + times(Jdot, qd)) + times(Q, times(J, qd)) - forces
+    gyroscopic = times(J.T, QJ, qd)
+    k_bar = times(J.T, M, Jdot, qd) + gyroscopic
+    k_without_dot = times(J.T, MJ, qd) + gyroscopic
     faster = proofs.Proof("dimensions", "Centrifugal forces are four times as large at twice the speed.",
                           lambda k: k.xreplace({s: 2 * s for s in symbols_of(k) if s.name.endswith("_dot")}) - 4 * k)
     lost_dot = Erratum("The dot over the second J is lost: M J_dot q_dot is a force, M J q_dot a momentum.", faster)
     upright = dict.fromkeys(q[4:], sp.S.Zero)
     again = Slide("6.3", f"{TITLE} Arbitrary Point O for Rigid Body", 12163)
-    M_qdd = J.T * MJ * qdd
+    M_bar = times(J.T, MJ)
+    M_qdd, F_bar = times(M_bar, qdd), times(J.T, forces)
     return [
-        Formula("s_ddot", J * qdd + Jdot * qd, J_derived * qdd + Jd_qd, line=11853, also=(12137,),
+        Formula("s_ddot", times(J, qdd) + times(Jdot, qd), times(J_derived, qdd) + Jd_qd, line=11853, also=(12137,),
                 latex=r"\ddot{s}"),
-        Formula("virtual work with J", (J * delta_q).dot(inertia), work, line=11857, also=(12141,)),
-        Formula("virtual work with the transpose", (delta_q.T * J.T * inertia)[0], work, line=11859, also=(12143,)),
-        Formula("multiplied out", (delta_q.T * (M_qdd + k_bar - J.T * forces))[0], work, line=11861, also=(12145,)),
-        Formula("M_bar", J.T * MJ, M_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{M}"),
+        Formula("virtual work with J", times(J, delta_q).dot(inertia), work, line=11857, also=(12141,)),
+        Formula("virtual work with the transpose", times(delta_q.T, J.T, inertia)[0], work, line=11859, also=(12143,)),
+        Formula("multiplied out", times(delta_q.T, M_qdd + k_bar - F_bar)[0], work, line=11861, also=(12145,)),
+        Formula("M_bar", M_bar, M_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{M}"),
         Formula("k_bar", k_bar, k_tilde, line=11865, also=(11881, 12149), latex=r"\bar{k}"),
-        Formula("F_bar", J.T * forces, F_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{F}"),
-        Formula("equations of motion", M_qdd + k_bar - J.T * forces, equations, line=11885, also=(11863, 11879, 12147, 12161,
+        Formula("F_bar", F_bar, F_tilde, line=11865, also=(11881, 12149, 12163, 12179), latex=r"\bar{F}"),
+        Formula("equations of motion", M_qdd + k_bar - F_bar, equations, line=11885, also=(11863, 11879, 12147, 12161,
                 12167, 12177)),
         Formula("k_bar of chapter 6.3, upright", k_without_dot.xreplace(upright), k_tilde.xreplace(upright), slide=again,
                 also=(12179,), errata=[lost_dot], latex=r"\bar{k}"),

@@ -8,6 +8,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Erratum, Formula, Slide, conventions, proofs
+from symdyn.frames.product import times
 from symdyn.lecture.letters import constant, skew, stands_for
 
 TITLE = "Inverse Dynamics of 2-Link Arm"
@@ -47,7 +48,7 @@ class Links:
     @property
     def moved(self) -> sp.Matrix:
         """(6, 1) X times the velocity of link 1."""
-        return self.X * sp.Matrix.vstack(w1, v1)
+        return sp.Matrix(times(self.X, sp.Matrix.vstack(w1, v1)))
 
 
 def revolute_links() -> Links:

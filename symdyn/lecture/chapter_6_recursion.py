@@ -9,6 +9,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.comparison import Case, Formula, Slide
+from symdyn.frames.product import times
 from symdyn.lecture.letters import skew
 from symdyn.lecture.propagation_letters import typeset
 
@@ -45,16 +46,16 @@ class Chain:
     def acceleration(self, link: int) -> sp.Matrix:
         """As printed: X a of the link before, plus S q_ddot + c."""
         before = self.a_0 if link == 1 else self.of("a", link - 1)
-        return self.of("X", link) * before + self.of("S", link) * self.qdd[link - 1] + self.of("c", link)
+        return times(self.of("X", link), before) + times(self.of("S", link), self.qdd[link - 1]) + self.of("c", link)
 
     def own_force(self, link: int) -> sp.Matrix:
         """I a + p."""
-        return self.of("I", link) * self.of("a", link) + self.of("p", link)
+        return times(self.of("I", link), self.of("a", link)) + self.of("p", link)
 
     def resultant(self, link: int, com: Any) -> sp.Matrix:
         """The force that accelerates a link, from its centre of mass to its origin."""
         at_G = self.of("f_G", link)
-        return sp.Matrix.vstack(at_G[:3, :] + skew(com) * at_G[3:, :], at_G[3:, :])
+        return sp.Matrix.vstack(at_G[:3, :] + times(skew(com), at_G[3:, :]), at_G[3:, :])
 
     def _split(self, column: Any) -> list[sp.Matrix]:
         entries, parts = list(column), []
@@ -102,7 +103,7 @@ def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] 
         line, also = lines[link], [(again[link] + 2 * step,) if again else () for step in range(4)]
         own = chain.resultant(link, chain.system.bodies[link - 1].com)
         # Nothing hangs on the last link: f_4 = 0.
-        beyond = chain.of("X_star", link + 1) * chain.of("f", link + 1) if link < 3 else sp.zeros(6, 1)
+        beyond = times(chain.of("X_star", link + 1), chain.of("f", link + 1)) if link < 3 else sp.zeros(6, 1)
         found += [
             Formula(f"a_{link}", chain.acceleration(link), chain.of("a", link), line=line, also=also[0],
                     latex=typeset(_acceleration(link))),
@@ -110,7 +111,7 @@ def inverse_dynamics(chain: Chain, lines: dict[int, int], again: dict[int, int] 
                     latex=typeset(f"f{link}B = I{link} a{link} + p{link}")),
             Formula(f"f_{link}", own + beyond, chain.of("f", link), line=line + 4, also=also[2],
                     latex=typeset(f"f{link} = f{link}B + {link}X{link + 1}* f{link + 1}")),
-            Formula(f"tau_{link}", chain.of("S", link).T * chain.of("f", link), chain.needed[link - 1], line=line + 6,
+            Formula(f"tau_{link}", times(chain.of("S", link).T, chain.of("f", link)), chain.needed[link - 1], line=line + 6,
                     also=also[3], latex=typeset(f"tau_{link} = S{link}^T f{link}")),
         ]
     return found
@@ -139,16 +140,16 @@ def forward_dynamics() -> list[Formula]:
         X, S, c, f = (of(name, link) for name in ("X", "S", "c", "f"))
         I_A, p_A = (of(name, link) for name in (("I", "p") if link == 3 else ("I_A", "p_A")))
         before = chain.a_0 if link == 1 else of("a", link - 1)
-        inertia = (S.T * I_A * S)[0]
+        inertia, moved = times(S.T, I_A, S)[0], times(X, before)
         I, p = ("I3", "p3") if link == 3 else (f"I{link}A", f"p{link}A")
         found += [
-            Formula(f"a_{link}", X * before + S * chain.qdd[link - 1] + c, of("a", link), line=line,
+            Formula(f"a_{link}", moved + times(S, chain.qdd[link - 1]) + c, of("a", link), line=line,
                     latex=typeset(_acceleration(link))),
-            Formula(f"f_{link}", I_A * of("a", link) + p_A, f, line=line + 2, where=given,
+            Formula(f"f_{link}", times(I_A, of("a", link)) + p_A, f, line=line + 2, where=given,
                     latex=typeset(f"f{link} = {I} a{link} + {p}")),
-            Formula(f"tau_{link}", S.T * f, chain.needed[link - 1], line=line + 4,
+            Formula(f"tau_{link}", times(S.T, f), chain.needed[link - 1], line=line + 4,
                     latex=typeset(f"tau_{link} = S{link}^T f{link}")),
-            Formula(f"qdd_{link}", (sp.Symbol(f"tau_{link}") - (S.T * (I_A * (X * before + c) + p_A))[0]) / inertia,
+            Formula(f"qdd_{link}", (sp.Symbol(f"tau_{link}") - times(S.T, times(I_A, moved + c) + p_A)[0]) / inertia,
                     chain.qdd[link - 1][0], line=line + 6, where=given,
                     latex=typeset(f"q{link}'' = (S{link}^T {I} S{link})^-1 "
                                   f"(tau_{link} - S{link}^T ({I} ({link}X{link - 1} a{link - 1} + c{link}) + {p}))")),
@@ -157,17 +158,19 @@ def forward_dynamics() -> list[Formula]:
         last = link == 2
         I_A, p_A = (of(name, link + 1) for name in (("I", "p") if last else ("I_A", "p_A")))
         X, X_star, S, c = (of(name, link + 1) for name in ("X", "X_star", "S", "c"))
-        inverse = sp.Matrix([1 / (S.T * I_A * S)[0]])
-        force = sp.Matrix([sp.Symbol(f"tau_{link + 1}")]) - S.T * (I_A * c + p_A)
+        inverse = sp.Matrix([1 / times(S.T, I_A, S)[0]])
+        back = times(X_star, I_A, S)
+        force = sp.Matrix([sp.Symbol(f"tau_{link + 1}")]) - times(S.T, times(I_A, c) + p_A)
         n, I, p = link + 1, *(("I3", "p3") if last else ("I2A", "p2A"))
-        back = f"{link}X{n}* {I} S{n} (S{n}^T {I} S{n})^-1"
+        printed = f"{link}X{n}* {I} S{n} (S{n}^T {I} S{n})^-1"
         found += [
-            Formula(f"I_{link}^A", of("I", link) + X_star * I_A * X - X_star * I_A * S * inverse * S.T * I_A * X, of("I_A", link),
-                    line=12344, latex=typeset(f"I{link}A = I{link} + {link}X{n}* {I} {n}X{link} - {back} S{n}^T {I} {n}X{link}")),
-            Formula(f"p_{link}^A", of("p", link) + X_star * p_A + X_star * I_A * c + X_star * I_A * S * inverse * force,
+            Formula(f"I_{link}^A", of("I", link) + times(X_star, I_A, X) - times(back, inverse, S.T, I_A, X), of("I_A", link),
+                    line=12344, latex=typeset(f"I{link}A = I{link} + {link}X{n}* {I} {n}X{link}"
+                                              f" - {printed} S{n}^T {I} {n}X{link}")),
+            Formula(f"p_{link}^A", of("p", link) + times(X_star, p_A) + times(X_star, I_A, c) + times(back, inverse, force),
                     of("p_A", link), line=12345,
                     latex=typeset(f"p{link}A = p{link} + {link}X{n}* {p} + {link}X{n}* {I} c{n}"
-                                  f" + {back} (tau_{n} - S{n}^T ({I} c{n} + {p}))")),
+                                  f" + {printed} (tau_{n} - S{n}^T ({I} c{n} + {p}))")),
         ]
     return found
 

@@ -83,7 +83,7 @@ class Arm:
 
     def put(self, value: sp.Matrix) -> sp.Matrix:
         """With the numbers, multiplied out."""
-        return sp.Matrix(value).xreplace(self.numbers).applyfunc(sp.expand)
+        return sp.Matrix(value).xreplace(self.numbers).applyfunc(multiplied_out)
 
     def parameter(self, name: str, link: int) -> Any:
         """A parameter of a link: its number, or its symbol; 0 if the arm has none of that name."""
@@ -107,7 +107,7 @@ class Arm:
         rows = self.inverse_dynamics.extract([k - 1 for k in joints], [0])
         matrix = rows.jacobian(unknown)
         solution = -matrix.LUsolve(rows.xreplace(dict.fromkeys(unknown, sp.S.Zero)))
-        return dict(zip(unknown, solution.applyfunc(sp.expand)))
+        return dict(zip(unknown, solution.applyfunc(multiplied_out)))
 
     # -- the frame at the centre of mass, which the slides call b_Gi
 
@@ -135,7 +135,7 @@ class Arm:
 
     def f_B(self, link: int) -> sp.Matrix:
         """(6, 1) resultant on the body alone, about O_i: symdyn's f_G carried there."""
-        return (self.X_G(link).T * getattr(self, f"f_G_{link}")).applyfunc(sp.expand)
+        return (self.X_G(link).T * getattr(self, f"f_G_{link}")).applyfunc(multiplied_out)
 
 
 @cache
@@ -160,6 +160,11 @@ def row(letter: Callable[[str], Any], name: str, line: int, text: str, derived: 
                    where=where or {}, latex=typeset(text))
 
 
+def multiplied_out(e: sp.Expr) -> sp.Expr:
+    """Products and powers of sums; exponents are integers here, so that SymPy's other rules have nothing to do."""
+    return e.expand(power_base=False, power_exp=False, log=False, basic=False)
+
+
 def expanded(value: Any) -> Any:
     """A matrix or a pair of sides, multiplied out."""
-    return tuple(expanded(side) for side in value) if isinstance(value, tuple) else sp.Matrix(value).applyfunc(sp.expand)
+    return tuple(expanded(side) for side in value) if isinstance(value, tuple) else sp.Matrix(value).applyfunc(multiplied_out)

@@ -11,7 +11,8 @@ from typing import Any
 import sympy as sp
 
 from symdyn.frames.product import times
-from symdyn.lecture.propagation_arms import Arm
+from symdyn.frames.rates import differentiated
+from symdyn.lecture.propagation_arms import Arm, multiplied_out
 
 _ABOUT: dict[str, Callable[[Any], sp.Matrix]] = {"x": sp.rot_axis1, "y": sp.rot_axis2, "z": sp.rot_axis3}
 _ALONG = sp.Matrix([1, 0, 0])
@@ -33,9 +34,7 @@ class Newton:
 
     def rate(self, value: sp.Matrix) -> sp.Matrix:
         """Derivative by time, by the chain rule."""
-        arm = self.arm
-        pairs = [*zip(arm.q, arm.q_dot), *zip(arm.q_dot, arm.q_ddot)]
-        return sum((value.diff(x) * x_dot for x, x_dot in pairs), sp.zeros(*value.shape))
+        return sp.Matrix(*value.shape, differentiated(value))
 
     def velocity(self, link: int) -> sp.Matrix:
         """(6, 1) angular velocity, and velocity of O_i, both in link axes."""
@@ -61,7 +60,7 @@ class Newton:
         wrench = self.at_center(link)
         force = sp.Matrix(wrench[3:])
         moment = sp.Matrix(wrench[:3]) + sp.Matrix(self.arm.r_G(link)).cross(force)
-        return sp.Matrix([*moment, *force]).applyfunc(sp.expand)
+        return sp.Matrix([*moment, *force]).applyfunc(multiplied_out)
 
     def through_joint(self, link: int) -> sp.Matrix:
         """(6, 1) moment about O_i and force through the joint, link axes: what moves the body and all outwards of it."""
@@ -73,4 +72,4 @@ class Newton:
             force = self.arm.put(turn) * sp.Matrix(wrench[3:])
             moment = self.arm.put(turn) * sp.Matrix(wrench[:3]) + arm.cross(force)
             total += sp.Matrix([*moment, *force])
-        return total.applyfunc(sp.expand)
+        return total.applyfunc(multiplied_out)
