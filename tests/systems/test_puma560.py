@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import symdyn as sd
 
@@ -115,3 +116,62 @@ def test_velocity_products_of_the_toolbox() -> None:
     robot = sd.systems.puma560().embedding().compile(backend="numpy")
     found = robot.inverse_dynamics(q, qd, np.zeros(6), {"g": 0.0})
     np.testing.assert_allclose(found, C @ qd, rtol=0, atol=PRINTED * np.abs(qd).sum())
+
+
+# Entries of the mass matrix without motors, in 23 constants: B. Armstrong, O. Khatib, J. Burdick, The explicit dynamic model and
+# inertial parameters of the PUMA 560 arm, IEEE Conf. Robotics and Automation, 1986, appendix.
+_A13 = ("I8*C23 + I13*S23 - I15*C23*S4*S5 + I19*S23*S4*C4 + I18*(S23*C4*S5 - C23*C5) + I22*S23*S4*S5"
+        " + I20*S4*(S23*C4*C5**2 + C23*S5*C5)")
+EXPLICIT = {
+    (0, 0): "I1 + I3*C2**2 + I7*S23**2 + I10*S23*C23 + I11*S2*C2 + I21*S23**2*C4**2 + I20*(S5**2*(S23**2*(1 + C4**2) - 1)"
+            " - 2*S23*C23*C4*S5*C5) + 2*(I5*C2*S23 + I12*C2*C23 + I15*(S23**2*C5 + S23*C23*C4*S5)"
+            " + I16*C2*(S23*C5 + C23*C4*S5) + I18*S4*S5 + I22*(S23*C23*C5 + C23**2*C4*S5))",
+    (0, 1): f"I4*S2 + I9*C2 + I16*S2*S4*S5 + {_A13}",
+    (0, 2): _A13,
+    (0, 3): "I14*C23 + I15*S23*C4*S5 + I16*C2*C4*S5 + I18*C23*S4*S5 - I20*(S23*C4*S5*C5 + C23*S5**2) + I22*C23*C4*S5",
+    (0, 4): "I15*S23*S4*C5 + I16*C2*S4*C5 + I17*S23*S4 + I18*(S23*S5 - C23*C4*C5) + I22*C23*S4*C5",
+    (0, 5): "I23*(C23*C5 - S23*C4*S5)",
+    (1, 1): "I2 + I6 + I20*S4**2*S5**2 + I21*S4**2 + 2*(I5*S3 + I12*C3 + I15*C5 + I16*(S3*C5 + C3*C4*S5) + I22*C4*S5)",
+    (1, 2): "I5*S3 + I6 + I12*C3 + I16*(S3*C5 + C3*C4*S5) + I20*S4**2*S5**2 + I21*S4**2 + 2*(I15*C5 + I22*C4*S5)",
+    (1, 3): "-I15*S4*S5 - I16*S3*S4*S5 + I20*S4*S5*C5",
+    (1, 4): "I15*C4*C5 + I16*(C3*S5 + S3*C4*C5) + I17*C4 + I22*S5",
+    (1, 5): "I23*S4*S5",
+    (2, 2): "I6 + I20*S4**2*S5**2 + I21*S4**2 + 2*(I15*C5 + I22*C4*S5)",
+    (2, 3): "-I15*S4*S5 + I20*S4*S5*C5",
+    (2, 4): "I15*C4*C5 + I17*C4 + I22*S5",
+    (2, 5): "I23*S4*S5",
+    (3, 3): "I14 - I20*S5**2",
+    (3, 4): "0",
+    (3, 5): "I23*C5",
+    (4, 4): "I17",
+    (4, 5): "0",
+    (5, 5): "I23",
+}
+# Constants and how far they are off at most, as printed there. 1.43 and 1.38 for I1 and I3 do not follow from the data of the
+# links, which give 1.55 and 1.60; I6 follows with 0.086 kg m^2 for I3_zz, as in the standard convention.
+CONSTANTS = {2: (1.75, 0.07), 4: (0.690, 0.020), 5: (0.372, 0.031), 6: (0.333, 0.016), 7: (0.298, 0.029), 8: (-0.134, 0.014),
+             9: (2.38e-2, 1.2e-2), 10: (-2.13e-2, 0.22e-2), 11: (-1.42e-2, 0.7e-2), 12: (-1.10e-2, 0.11e-2),
+             13: (-3.79e-3, 0.9e-3), 14: (1.64e-3, 0.07e-3), 15: (1.25e-3, 0.3e-3), 16: (1.24e-3, 0.3e-3),
+             17: (6.42e-4, 3e-4), 18: (4.31e-4, 1.3e-4), 19: (3.00e-4, 14e-4), 20: (-2.02e-4, 8e-4), 21: (-1.00e-4, 6e-4),
+             22: (-5.80e-5, 1.5e-5), 23: (4.00e-5, 2e-5)}
+
+
+def test_mass_matrix_is_the_explicit_model() -> None:
+    """All 21 entries are those of the explicit model, with one set of constants, which are the printed ones."""
+    system = sd.systems.puma560("modified")
+    matrix = system.embedding().lambdify("M_tilde")
+    params = {**{str(p): value for p, value in system.defaults.items()}, "I3_zz": 0.086}
+    constants = sp.symbols("I1:24")
+    entries = [sp.sympify(text, {str(c): c for c in constants}) for text in EXPLICIT.values()]
+    columns = sp.lambdify(sp.symbols("S2 C2 S3 C3 S4 C4 S5 C5 S23 C23"), [[e.diff(c) for c in constants] for e in entries])
+    rows, right = [], []
+    for q in np.random.default_rng(1).uniform(-3, 3, (30, 6)):
+        turned = np.array([[np.sin(angle), np.cos(angle)] for angle in (*q[1:5], q[1] + q[2])])
+        rows.append(np.array(columns(*turned.ravel()), dtype=float))
+        right.append([matrix(q, params=params)[entry] for entry in EXPLICIT])
+    found, _, rank, _ = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right))
+    assert rank == 23
+    np.testing.assert_allclose(np.concatenate(rows) @ found, np.concatenate(right), rtol=0, atol=1e-14)
+    for number, (printed, tolerance) in CONSTANTS.items():
+        assert found[number - 1] == pytest.approx(printed, abs=0.1 * tolerance), f"I{number}"
+    assert found[[0, 2]] == pytest.approx([1.553, 1.602], abs=5e-4)
