@@ -1,8 +1,10 @@
 """A five-link biped that walks: two tibias, two femurs and a torso, of one step that repeats itself, with the impact of the heel.
 
 Source: Kelly, An introduction to trajectory optimization, SIAM Review 59 (2017), section 6 (step of 0.5 m in 0.7 s, cost the
-integral of the squares of the torques); masses, lengths, inertias of RABBIT: Chevallereau and others, IEEE Control Systems
-Magazine 23 (2003), as listed there.
+integral of the squares of the torques); masses, lengths, inertias of RABBIT: Westervelt, Grizzle and Koditschek, IEEE Transactions
+on Automatic Control 48 (2003), as listed in the paper's program OptimTraj, demo/fiveLinkBiped/getPhysicalParameters.m. Its folder
+has a record of IPOPT, TrajOpt_GPOPSIPOPTinfo.txt, of a step of 0.4 m in 0.6 s without torque at the stance ankle, by Gauss-Radau
+collocation with 40 points (GPOPS-II): 263.69885 N^2 m^2 s after 143 iterations, with Hessians of limited memory.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ import symdyn as sd
 from symdyn.runtime.module import Module
 
 STEP, DURATION = 0.5, 0.7
+# The step that was published with its cost, N^2 m^2 s.
+PUBLISHED: dict[str, float] = {"length": 0.4, "duration": 0.6}
+PUBLISHED_COST = 263.69884582
 # Of the stance tibia, stance femur, torso, swing femur, swing tibia: kg, kg m^2, m, and m from the knee, or the hip, to the
 # centre.
 MASSES, INERTIAS = (3.2, 6.8, 20.0, 6.8, 3.2), (0.93, 1.08, 2.22, 1.08, 0.93)
@@ -65,7 +70,7 @@ def points(q: Any) -> tuple[list[Any], list[Any]]:
     return [foot, P1, P2, P3, P4, P5], G
 
 
-def boundary() -> list[sp.Basic]:
+def boundary(length: float = STEP) -> list[sp.Basic]:
     """One step: the legs change, the impact keeps the angular momentum of all about the foot that lands and of what hangs on each
     joint about it; the foot lands at the step's length, leaves the ground upward, lands downward."""
     q, rates = sp.symbols("q1:6"), sp.symbols(" ".join(f"q{k}_dot" for k in range(1, 6)))
@@ -87,15 +92,15 @@ def boundary() -> list[sp.Basic]:
     exchange = [sp.Eq(q0[k], q[4 - k]) for k in range(5)]
     start = dict(zip((*q, *rates), (*q0, *rates0), strict=True))
     lift = moving(P[5], rates)[1]
-    return [*exchange, *impact, sp.Eq(P[5][0], STEP), sp.Eq(P[5][1], 0), lift <= 0, lift.xreplace(start) >= 0]
+    return [*exchange, *impact, sp.Eq(P[5][0], length), sp.Eq(P[5][1], 0), lift <= 0, lift.xreplace(start) >= 0]
 
 
-def step(module: Module, **options: Any) -> sd.Optimum:
-    """The optimal step."""
+def step(module: Module, length: float = STEP, duration: float = DURATION, **options: Any) -> sd.Optimum:
+    """The optimal step: its length, m, its duration, s, options of optimize."""
     there = POSTURE[::-1]
     guess: dict[str, Any] = {f"q{k + 1}": [POSTURE[k], there[k]] for k in range(5)}
-    guess |= {f"q{k + 1}_dot": (there[k] - POSTURE[k]) / DURATION for k in range(5)}
+    guess |= {f"q{k + 1}_dot": (there[k] - POSTURE[k]) / duration for k in range(5)}
     u = sp.symbols("u1:6")
     bounds: dict[str, Any] = {f"q{k + 1}": (-np.pi / 2, np.pi / 2) for k in range(5)}
-    return sd.optimize(module, sd.Loss(integral=sum(e**2 for e in u)), DURATION, start="free", bounds=bounds, boundary=boundary(),
-                       guess=guess, **options)
+    return sd.optimize(module, sd.Loss(integral=sum(e**2 for e in u)), duration, start="free", bounds=bounds,
+                       boundary=boundary(length), guess=guess, **options)

@@ -206,6 +206,9 @@ def test_gait_of_a_biped() -> None:
     assert np.abs(first.x[0, :5] - first.x[-1, 4::-1]).max() < 1e-7
     before, after = (module.evaluate("energy", 0.0, x, first.params)[0] for x in (first.x[-1], first.x[0]))
     assert 0.2 * before < after < before
+    published = gait.step(module, intervals=10, transcription="radau", degree=4, tolerance=None, inputs={"u1": 0},
+                          **gait.PUBLISHED)
+    assert published.cost == pytest.approx(gait.PUBLISHED_COST, rel=2e-3) and published.iterations < 143
 
 
 def test_impact_of_the_biped_against_constraints_that_begin_to_hold() -> None:
