@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from symdyn.formulation.accelerations import Motion
 
 # The gradient's groups of arguments, in their order; along each of these the gradient has a derivative.
-GROUPS = ("q", "u", "z", "inputs", "p")
+GROUPS = ("q", "u", "z", "inputs", "p", "t")
 
 
 class Adjoint:
-    """Records the gradient of w^T x_dot by [x; inputs; parameters] and its derivatives along directions."""
+    """Records the gradient of w^T x_dot by [x; inputs; parameters; t] and its derivatives along directions."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -45,7 +45,7 @@ class Adjoint:
         return {"adjoint": self.gradient, **{f"adjoint_along_{group}": partial(self.along, group) for group in GROUPS}}
 
     def gradient(self) -> np.ndarray:
-        """Gradient of w^T x_dot by q, u, z, inputs and parameters, one after the other."""
+        """Gradient of w^T x_dot by q, u, z, inputs, parameters and t, one after the other."""
         by_arguments, by_unknowns, _, mu = self._gradients()
         at = self._values(by_unknowns, mu)
         return vector(*substitute(tuple(by_arguments), at, self.recorder))

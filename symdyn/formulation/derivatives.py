@@ -23,7 +23,7 @@ from symdyn.tape.tape import reachable, unsigned
 # By what functions are differentiated -> the groups of arguments that this is.
 BY = {"x": ("q", "u", "z"), "inputs": ("inputs",), "params": ("p",), "t": ("t",), "ud": ("ud",)}
 # By what a weighted sum of the rates is differentiated, once or twice.
-WEIGHTED = ("x", "inputs", "params")
+WEIGHTED = ("x", "inputs", "params", "t")
 # What else is weighted and differentiated twice.
 CURVED = ("constraints", "outputs")
 # The quantity whose entries the equations are solved for.
@@ -88,8 +88,8 @@ def derivative(equations: Equations, values: np.ndarray, by: str) -> np.ndarray:
 
 
 def gradient(equations: Equations, wrt: Sequence[str], along: str | None = None) -> list[Any]:
-    """The gradient of w^T x_dot by these of x, inputs and params, one after the other; along: its derivative along a direction in
-    a group of arguments."""
+    """The gradient of w^T x_dot by these of x, inputs, params and t, one after the other; along: its derivative along a direction
+    in a group of arguments."""
     whole = iter(equations.quantity("adjoint" if along is None else f"adjoint_along_{along}").tolist())
     pieces = {by: [next(whole) for group in BY[by] for _ in leaves_of(equations, group)] for by in WEIGHTED}
     return [entry for by in wrt for entry in pieces[by]]

@@ -1,9 +1,9 @@
 """A five-link biped that walks: two tibias, two femurs and a torso, of one step that repeats itself, with the impact of the heel.
 
 Source: Kelly, An introduction to trajectory optimization, SIAM Review 59 (2017), section 6 (step of 0.5 m in 0.7 s, cost the
-integral of the squares of the torques); masses, lengths, inertias of RABBIT: Westervelt, Grizzle and Koditschek, IEEE Transactions
-on Automatic Control 48 (2003), as listed in the paper's program OptimTraj, demo/fiveLinkBiped/getPhysicalParameters.m. Its folder
-has a record of IPOPT, TrajOpt_GPOPSIPOPTinfo.txt, of a step of 0.4 m in 0.6 s without torque at the stance ankle, by Gauss-Radau
+integral of the squares of the torques); masses, lengths, inertias of RABBIT: Westervelt, Grizzle and Koditschek, IEEE
+Transactions on Automatic Control 48 (2003), as listed in the paper's program OptimTraj,
+demo/fiveLinkBiped/getPhysicalParameters.m. Its folder has a record of IPOPT, TrajOpt_GPOPSIPOPTinfo.txt, of a step of 0.4 m in 0.6 s without torque at the stance ankle, by Gauss-Radau
 collocation with 40 points (GPOPS-II): 263.69885 N^2 m^2 s after 143 iterations, with Hessians of limited memory.
 """
 

@@ -60,7 +60,7 @@ class Discretized:
 
     def __post_init__(self) -> None:
         problem, mesh = self.problem, self.mesh
-        self.dynamics = Dynamics(problem.module, problem.of, self.guess.p)
+        self.dynamics = Dynamics(problem.module, problem.of, self.guess.p, "rhs" in problem.timed)
         self.held = mesh.kind == "shooting" and mesh.at_inputs.shape[1] == 1
         X, t = self.guess.X[mesh.ends], problem.t0 + mesh.breaks * self.guess.T
         self.rows_of_loops = independent_rows(problem.module, float(t[0]), X[0], self.guess.p)
@@ -306,11 +306,10 @@ class Discretized:
         if not len(rows):
             return []
         N, names = len(mesh.ends), problem.module.metadata.constraints
-        t = problem.t0 + mesh.breaks * self.guess.T
-        loops = Loops(problem.module, problem.of, self.guess.p, t, rows)
+        loops = Loops(problem.module, problem.of, self.guess.p, rows, "C" in problem.timed)
         columns = np.hstack([at.X[mesh.ends], np.broadcast_to(at.params, (N, len(at.params)))])
         m = N * len(rows)
-        block = Block(loops, columns, np.zeros(columns.shape), np.ones(columns.shape), sp.identity(m, format="csr"), np.zeros(m))
+        block = self._pointwise(loops, columns, mesh.breaks, sp.identity(m, format="csr"), np.zeros(m))
         texts = tuple(names[k] if k < len(names) else f"the rate of {names[k - len(names)]}" for k in rows)
         return [_Part(m, None, block, np.zeros(m), np.zeros(m), [Label("the constraint ", 0, mesh.breaks, texts)])]
 

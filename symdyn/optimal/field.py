@@ -6,6 +6,7 @@ points; their derivatives are exact.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -65,29 +66,48 @@ class Arguments:
         return self.duration + 1
 
 
-class Dynamics:
-    """x_dot of a module by [x; inputs; free parameters], in one compiled call for all points.
+class Groups:
+    """Derivatives of a module's functions by groups of arguments, as those by [x; inputs; free parameters; t].
 
-    p     (n_p,) values of all parameters
+    sizes   by group that is there: its entries; whole: of all; name: of the groups in functions' names
+    kept    which of them are arguments; corner: indices of these in a matrix (n, n)
+    """
+
+    def __init__(self, of: Arguments, n_p: int, groups: Sequence[str], n: int | None = None) -> None:
+        every = {"x": of.n_x, "inputs": of.n_in, "params": n_p if of.free else 0, "t": 1}
+        self.sizes = {by: every[by] for by in groups if every[by]}
+        self.whole, self.name, self.n = sum(self.sizes.values()), "_".join(self.sizes), of.n if n is None else n
+        before = sum(self.sizes.get(by, 0) for by in ("x", "inputs"))
+        last = (self.whole - 1,) if "t" in self.sizes else ()
+        self.kept = np.array([*range(before), *(before + k for k in of.free), *last], dtype=int)
+        self._at = np.array([*range(before + len(of.free)), *((self.n - 1,) if last else ())], dtype=int)
+        self.corner = (self._at[:, None], self._at)
+
+    def columns(self, found: np.ndarray) -> np.ndarray:
+        """Of derivatives (..., whole) those by the arguments, (..., n)."""
+        made = np.zeros((*found.shape[:-1], self.n), dtype=found.dtype)
+        made[..., self._at] = found[..., self.kept]
+        return made
+
+
+class Dynamics:
+    """x_dot of a module by [x; inputs; free parameters; t], in one compiled call for all points.
+
+    p     (n_p,) values of all parameters; timed: whether x_dot depends on t, and the duration is free
     calls   how many compiled calls were made
     """
 
-    def __init__(self, module: Module, arguments: Arguments, p: np.ndarray) -> None:
+    def __init__(self, module: Module, arguments: Arguments, p: np.ndarray, timed: bool = False) -> None:
         self.module, self.of, self.p = module, arguments, p.copy()
-        self.n = arguments.duration
         self.calls = 0
-        wrt = ("x", *(("inputs",) if arguments.n_in else ()), *(("params",) if arguments.free else ()))
-        self._first = {by: f"jacobian_{by}" for by in wrt}
-        self._second = f"hessian_{'_'.join(wrt)}"
-        n_p = len(p)
-        kept = [*range(arguments.n_x + arguments.n_in), *(arguments.n_x + arguments.n_in + k for k in arguments.free)]
-        self._kept = np.array(kept, dtype=int)
-        blocks = [structure_of(module, name, (arguments.n_x, size)) for name, size in
-                  zip(self._first.values(), (arguments.n_x, arguments.n_in, n_p) if arguments.n_in else (arguments.n_x, n_p),
-                      strict=False)]
-        self.slopes = np.hstack(blocks)[:, self._kept]
-        n_all = arguments.n_x + arguments.n_in * ("inputs" in wrt) + n_p * ("params" in wrt)
-        self.curvature = structure_of(module, self._second, (n_all, n_all))[np.ix_(self._kept, self._kept)]
+        self._by = Groups(arguments, len(p), ("x", "inputs", "params", *(("t",) if timed else ())))
+        self._first = {by: "rhs_by_t" if by == "t" else f"jacobian_{by}" for by in self._by.sizes}
+        self._second = f"hessian_{self._by.name}"
+        n, whole = arguments.n, self._by.whole
+        blocks = [structure_of(module, name, (arguments.n_x, self._by.sizes[by])) for by, name in self._first.items()]
+        self.slopes = self._by.columns(np.hstack(blocks))
+        self.curvature = np.zeros((n, n), dtype=bool)
+        self.curvature[self._by.corner] = structure_of(module, self._second, (whole, whole))[np.ix_(self._by.kept, self._by.kept)]
         self.curvature |= self.curvature.T
 
     def values(self, t: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -96,17 +116,16 @@ class Dynamics:
 
     def jacobian(self, t: np.ndarray, at: np.ndarray) -> np.ndarray:
         """(N, n_x, n)."""
-        sizes = {"x": self.of.n_x, "inputs": self.of.n_in, "params": len(self.p)}
-        found = [self._call(name, t, at, (self.of.n_x, sizes[by])) for by, name in self._first.items()]
-        return np.concatenate(found, axis=2)[:, :, self._kept]
+        found = [self._call(name, t, at, (self.of.n_x, self._by.sizes[by])) for by, name in self._first.items()]
+        return self._by.columns(np.concatenate(found, axis=2))
 
     def hessian(self, t: np.ndarray, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """(N, n, n), of the sums with weights (N, n_x)."""
-        sizes = {"x": self.of.n_x, "inputs": self.of.n_in, "params": len(self.p)}
-        n = sum(sizes[by] for by in self._first)
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), weights])
-        found = self._call(self._second, t, at, (n, n), given)
-        return found[:, self._kept[:, None], self._kept]
+        whole = self._call(self._second, t, at, (self._by.whole, self._by.whole), given)
+        found = np.zeros((len(at), self.of.n, self.of.n))
+        found[:, *self._by.corner] = whole[:, self._by.kept[:, None], self._by.kept]
+        return found
 
     def _call(self, name: str, t: np.ndarray, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
         """A compiled function at all points; NaN at all of them where it cannot be evaluated at one: such a step is not taken."""
@@ -133,11 +152,11 @@ class Field:
         self.dynamics, self.integrand, self.t0, self.shares = dynamics, integrand, t0, shares
         n_x, n = dynamics.of.n_x, dynamics.of.n
         self.slopes, self.curvature = np.zeros((n_x + 1, n), dtype=bool), np.zeros((n, n), dtype=bool)
-        self.slopes[:n_x, :-1], self.slopes[n_x, :-1] = dynamics.slopes, integrand.slopes[0, :-1]
-        self.slopes[:, -1] = True
-        self.curvature[:-1, :-1] = dynamics.curvature | integrand.curvature[:-1, :-1]
-        self.curvature[-1, :-1] = self.curvature[:-1, -1] = self.slopes[:, :-1].any(axis=0) | integrand.curvature[:-1, -1]
-        self.curvature[-1, -1] = bool(integrand.slopes[0, -1])
+        slopes, curvature = np.vstack([dynamics.slopes, integrand.slopes]), dynamics.curvature | integrand.curvature
+        self.slopes[:, :-1], self.slopes[:, -1] = slopes[:, :-1], True
+        self.curvature[:-1, :-1] = curvature[:-1, :-1]
+        self.curvature[-1, :-1] = self.curvature[:-1, -1] = slopes[:, :-1].any(axis=0) | curvature[:-1, -1]
+        self.curvature[-1, -1] = bool(slopes[:, -1].any())
 
     def at_shares(self, shares: np.ndarray) -> Field:
         """The same at other points."""
@@ -145,37 +164,35 @@ class Field:
         found.__dict__ = {**self.__dict__, "shares": shares}
         return found
 
-    def _parts(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Durations (N,), times (N,), arguments of the integrand (N, n)."""
+    def _times(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Durations (N,), times (N,), arguments with the time in place of the duration (N, n)."""
         T = at[:, -1]
         t = self.t0 + self.shares * T
         return T, t, np.column_stack([at[:, :-1], t])
 
+    def _values(self, t: np.ndarray, at: np.ndarray) -> np.ndarray:
+        return np.hstack([self.dynamics.values(t, at), self.integrand.values(at)])
+
+    def _slopes(self, t: np.ndarray, at: np.ndarray) -> np.ndarray:
+        return np.concatenate([self.dynamics.jacobian(t, at), self.integrand.jacobian(at)], axis=1)
+
     def values(self, at: np.ndarray) -> np.ndarray:
-        T, t, of_cost = self._parts(at)
-        return T[:, None] * np.hstack([self.dynamics.values(t, at), self.integrand.values(of_cost)])
+        T, t, timed = self._times(at)
+        return T[:, None] * self._values(t, timed)
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        T, t, of_cost = self._parts(at)
-        rates = np.hstack([self.dynamics.values(t, at), self.integrand.values(of_cost)])
-        cost = self.integrand.jacobian(of_cost)
-        found = np.zeros((len(at), *self.slopes.shape))
-        found[:, :-1, :-1] = T[:, None, None] * self.dynamics.jacobian(t, at)
-        found[:, -1:, :-1] = T[:, None, None] * cost[:, :, :-1]
-        found[:, :, -1] = rates
-        found[:, -1, -1] += T * self.shares * cost[:, 0, -1]
+        T, t, timed = self._times(at)
+        found = T[:, None, None] * self._slopes(t, timed)
+        found[:, :, -1] = self._values(t, timed) + self.shares[:, None] * found[:, :, -1]
         return found
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        T, t, of_cost = self._parts(at)
-        of_x, of_integrand = weights[:, :-1], weights[:, -1:]
-        cost, second = self.integrand.jacobian(of_cost)[:, 0], self.integrand.hessian(of_cost, of_integrand)
-        found = np.zeros((len(at), *self.curvature.shape))
-        found[:, :-1, :-1] = T[:, None, None] * (self.dynamics.hessian(t, at, of_x) + second[:, :-1, :-1])
-        cross = np.einsum("ni,nij->nj", of_x, self.dynamics.jacobian(t, at)) + of_integrand * cost[:, :-1]
-        cross += (T * self.shares)[:, None] * second[:, :-1, -1]
-        found[:, -1, :-1] = found[:, :-1, -1] = cross
-        found[:, -1, -1] = self.shares * (2 * of_integrand[:, 0] * cost[:, -1] + T * self.shares * second[:, -1, -1])
+        T, t, timed = self._times(at)
+        slopes = np.einsum("ni,nij->nj", weights, self._slopes(t, timed))
+        found = T[:, None, None] * (self.dynamics.hessian(t, timed, weights[:, :-1])
+                                    + self.integrand.hessian(timed, weights[:, -1:]))
+        found[:, -1, :-1] = found[:, :-1, -1] = slopes[:, :-1] + self.shares[:, None] * found[:, :-1, -1]
+        found[:, -1, -1] = self.shares * (2 * slopes[:, -1] + self.shares * found[:, -1, -1])
         return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from symdyn.errors import EvaluationError, SymdynError
-from symdyn.optimal.field import Arguments
+from symdyn.optimal.field import Arguments, Groups
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -27,44 +27,43 @@ MOVED = 21
 
 
 class Loops:
-    """[C; C_dot] of independent constraints at points of a motion, as Rows of [x; free parameters].
+    """[C; C_dot] of independent constraints at points of a motion, as Rows of [x; free parameters; t].
 
-    p     (n_p,) values of all parameters; t: times of the points, (N,); rows: of [C; C_dot], that are kept
+    p     (n_p,) values of all parameters; rows: of [C; C_dot], that are kept
+    timed   whether they depend on t, and the duration is free
     """
 
-    def __init__(self, module: Module, of: Arguments, p: np.ndarray, t: np.ndarray, rows: np.ndarray) -> None:
-        self.module, self.of, self.p, self.t, self.rows = module, of, p.copy(), t, rows
-        n_x, n_p = of.n_x, len(p)
-        self.n_c = len(module.metadata.constraints)
-        self._wrt = ("x", "params") if of.free else ("x",)
-        self._kept = np.array([*range(n_x), *(n_x + k for k in of.free)], dtype=int)
-        self._sizes = {"x": n_x, "params": n_p}
-        n = n_x + len(of.free)
-        self.slopes, self.curvature = np.ones((len(rows), n), dtype=bool), np.ones((n, n), dtype=bool)
+    def __init__(self, module: Module, of: Arguments, p: np.ndarray, rows: np.ndarray, timed: bool = False) -> None:
+        self.module, self.of, self.p, self.rows = module, of, p.copy(), rows
+        self.n_c, n = len(module.metadata.constraints), of.n_x + len(of.free) + 1
+        self._by = Groups(of, len(p), ("x", "params", *(("t",) if timed else ())), n)
+        there = self._by.columns(np.ones((1, self._by.whole), dtype=bool))[0]
+        self.slopes, self.curvature = np.tile(there, (len(rows), 1)), np.outer(there, there)
 
     def values(self, at: np.ndarray) -> np.ndarray:
         return np.hstack([self._call(name, at, (self.n_c,)) for name in ("C", "C_dot")])[:, self.rows]
 
     def jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, self._sizes[by])) for by in self._wrt], axis=2)
-                 for name in ("C", "C_dot")]
-        return np.concatenate(found, axis=1)[:, self.rows][:, :, self._kept]
+        found = [np.concatenate([self._call(f"{name}_by_{by}", at, (self.n_c, size)) for by, size in self._by.sizes.items()],
+                                axis=2) for name in ("C", "C_dot")]
+        return self._by.columns(np.concatenate(found, axis=1)[:, self.rows])
 
     def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        n = sum(self._sizes[by] for by in self._wrt)
         whole = np.zeros((len(at), 2 * self.n_c))
         whole[:, self.rows] = weights
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), whole])
-        found = self._call(f"constraints_hessian_{'_'.join(self._wrt)}", at, (n, n), given)
-        return found[:, self._kept[:, None], self._kept]
+        second = self._call(f"constraints_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
+        found = np.zeros((len(at), self._by.n, self._by.n))
+        found[:, *self._by.corner] = second[:, self._by.kept[:, None], self._by.kept]
+        return found
 
     def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:
         n_x = self.of.n_x
         if self.of.free:
             self.p = self.p.copy()
-            self.p[list(self.of.free)] = at[0, n_x:]
+            self.p[list(self.of.free)] = at[0, n_x:-1]
         try:
-            return self.module.evaluate(name, self.t, at[:, :n_x], self.p, (), given)
+            return self.module.evaluate(name, at[:, -1], at[:, :n_x], self.p, (), given)
         except EvaluationError:
             return np.full((len(at), *shape), np.nan)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from symdyn.errors import EvaluationError
 from symdyn.optimal.expressions import Expressions
-from symdyn.optimal.field import Arguments
+from symdyn.optimal.field import Arguments, Groups
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -26,22 +26,21 @@ class WithOutputs:
 
     expressions   of the arguments and then the outputs, all of them
     first         where [x; inputs; free parameters; t] begin among the arguments; p (n_p,): values of all parameters
+    timed         whether outputs depend on t, and the duration is free
     """
 
-    def __init__(self, expressions: Expressions, module: Module, of: Arguments, p: np.ndarray, first: int) -> None:
+    def __init__(self, expressions: Expressions, module: Module, of: Arguments, p: np.ndarray, first: int,
+                 timed: bool = False) -> None:
         self.expressions, self.module, self.of, self.p, self.first = expressions, module, of, p.copy(), first
         self.n_y = len(output_names(module))
         self.n = len(expressions.names) - self.n_y
-        self._wrt = ("x", *(("inputs",) if of.n_in else ()), *(("params",) if of.free else ()))
-        self._sizes = {"x": of.n_x, "inputs": of.n_in, "params": len(p)}
-        whole = of.n_x + of.n_in
-        self._kept = np.array([*range(whole), *(whole + k for k in of.free)], dtype=int)
-        self._at = slice(first, first + len(self._kept))
+        self._by = Groups(of, len(p), ("x", "inputs", "params", *(("t",) if timed else ())))
+        self._at = slice(first, first + of.n)
         by_outputs = expressions.slopes[:, self.n:].any(axis=1)
         self.m, self.slopes = expressions.m, expressions.slopes[:, :self.n].copy()
         self.curvature = expressions.curvature[:self.n, :self.n].copy()
         used = np.zeros(self.n, dtype=bool)
-        used[self._at] = True
+        used[self._at] = self._by.columns(np.ones((1, self._by.whole), dtype=bool))[0]
         self.slopes[np.ix_(by_outputs, used)] = True
         mixed = used | expressions.curvature[:self.n, self.n:].any(axis=1)
         self.curvature |= np.outer(mixed, used) | np.outer(used, mixed)
@@ -59,20 +58,19 @@ class WithOutputs:
         on_outputs = np.einsum("ni,nij->nj", weights, self.expressions.jacobian(whole)[:, :, self.n:])
         cross = H[:, :self.n, self.n:] @ Y
         found = H[:, :self.n, :self.n] + cross + cross.transpose(0, 2, 1) + Y.transpose(0, 2, 1) @ H[:, self.n:, self.n:] @ Y
-        n = sum(self._sizes[by] for by in self._wrt)
         given = np.hstack([np.zeros((len(at), self.module.metadata.sizes.u)), on_outputs])
-        second = self._call(f"outputs_hessian_{'_'.join(self._wrt)}", at, (n, n), given)
-        found[:, self._at, self._at] += second[:, self._kept[:, None], self._kept]
+        second = self._call(f"outputs_hessian_{self._by.name}", at, (self._by.whole, self._by.whole), given)
+        found[:, self._at, self._at][:, *self._by.corner] += second[:, self._by.kept[:, None], self._by.kept]
         return np.asarray(found)
 
     def _whole(self, at: np.ndarray) -> np.ndarray:
         return np.hstack([at, self._call("outputs", at, (self.n_y,))])
 
     def _slopes(self, at: np.ndarray) -> np.ndarray:
-        """Derivatives of the outputs by the arguments, (N, n_y, n); by the time they are not needed: it is prescribed."""
+        """Derivatives of the outputs by the arguments, (N, n_y, n); by the time where it is not prescribed."""
         found = np.zeros((len(at), self.n_y, self.n))
-        parts = [self._call(f"outputs_by_{by}", at, (self.n_y, self._sizes[by])) for by in self._wrt]
-        found[:, :, self._at] = np.concatenate(parts, axis=2)[:, :, self._kept]
+        parts = [self._call(f"outputs_by_{by}", at, (self.n_y, size)) for by, size in self._by.sizes.items()]
+        found[:, :, self._at] = self._by.columns(np.concatenate(parts, axis=2))
         return found
 
     def _call(self, name: str, at: np.ndarray, shape: tuple[int, ...], given: Any = ()) -> np.ndarray:

@@ -47,6 +47,7 @@ class Problem:
     start, end, states, inputs, rates, params   bounds, (2, n); params: of the free ones
     integrand  by [x; inputs; free parameters; t]; path: at all times, by the same
     end_cost, boundary   by [x at the start; x; inputs; free parameters; t], at the end
+    timed      which of the rates "rhs", "outputs" and constraints "C" depend on t where the duration is free
     """
 
     module: Module
@@ -64,6 +65,7 @@ class Problem:
     end_cost: Expressions | WithOutputs
     path: Conditions
     boundary: Conditions
+    timed: frozenset[str]
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -133,26 +135,20 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     point = (*metadata.x, *metadata.inputs, *names, "t")
     both = (*[f"{n}(0)" for n in metadata.x], *point)
     constants = {n: float(v) for n, v in zip(metadata.parameters, p, strict=True) if n not in names}
-    along_it = _Read(module, of, p, point, 0, constants, faults)
-    at_both = _Read(module, of, p, both, of.n_x, constants, faults)
+    timed = _timed(module, p) if T[0] < T[1] else frozenset[str]()
+    along_it = _Read(module, of, p, point, 0, constants, "outputs" in timed, faults)
+    at_both = _Read(module, of, p, both, of.n_x, constants, "outputs" in timed, faults)
     if not isinstance(cost, Loss):
         faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...) with expressions")
         cost = Loss(integral=0)
     integrand = along_it.rows([along_it.one(cost.integral, "the integral of the cost")], "the integral of the cost")
     end_cost = at_both.rows([at_both.one(cost.end, "the end of the cost")], "the end of the cost")
     along, at_ends = _conditions(path, "path", along_it), _conditions(boundary, "boundary", at_both)
-    if not faults.found and T[0] < T[1]:
-        with_outputs = any(isinstance(rows, WithOutputs) for rows in (integrand, end_cost, along and along.expressions,
-                                                                      at_ends and at_ends.expressions))
-        for what, name in (("equations of motion", "rhs"), ("outputs", "outputs")):
-            if (name == "rhs" or with_outputs) and _depends_on_time(module, name, p):
-                faults.add(f"the duration is free, and the {what} depend on t, by which there are no second derivatives; give "
-                           "the duration as a number")
     faults.demand_none()
     assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
     params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
     return Problem(module, of, p, t0, T, begin, stop, states, of_inputs, of_rates, params_bounds, integrand, end_cost, along,
-                   at_ends)
+                   at_ends, timed)
 
 
 def _free_parameters(metadata: Any, given: Any, faults: Faults) -> dict[str, tuple[float, float]]:
@@ -259,6 +255,7 @@ class _Read:
     names: tuple[str, ...]
     first: int
     constants: Mapping[str, float]
+    timed: bool
     faults: Faults
 
     def one(self, given: Any, what: str) -> sp.Expr:
@@ -289,7 +286,7 @@ class _Read:
         except UnsupportedExpression as error:
             self.faults.add(f"{what}: {error}")
             return None
-        return WithOutputs(made, self.module, self.of, self.p, self.first) if used else made
+        return WithOutputs(made, self.module, self.of, self.p, self.first, self.timed) if used else made
 
 
 def _conditions(given: Any, what: str, read: _Read) -> Conditions | None:
@@ -309,6 +306,13 @@ def _conditions(given: Any, what: str, read: _Read) -> Conditions | None:
         texts.append(text if len(text) <= LONGEST else f"{text[:LONGEST]} ... ({len(texts) + 1})")
     made = read.rows(expressions, what)
     return None if made is None else Conditions(made, np.array(least), np.array(most), tuple(texts))
+
+
+def _timed(module: Module, p: np.ndarray) -> frozenset[str]:
+    """Which of rates, outputs and constraints depend on t."""
+    groups = {"rhs": ("rhs",), "outputs": ("outputs",) if module.metadata.outputs else (),
+              "C": ("C", "C_dot") if module.metadata.constraints else ()}
+    return frozenset(what for what, names in groups.items() if any(_depends_on_time(module, name, p) for name in names))
 
 
 def _depends_on_time(module: Module, name: str, p: np.ndarray) -> bool:

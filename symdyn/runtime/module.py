@@ -83,6 +83,8 @@ class FurtherDerivatives(NamedTuple):
 
 
 _BY = "x, inputs, params, t and ud"
+# By what weighted sums of rates are differentiated, once or twice.
+_WEIGHTED = ("x", "inputs", "params", "t")
 
 
 class Module:
@@ -443,12 +445,12 @@ class Module:
                                   "change")
 
     def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
-                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian:
-        """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs and parameters, at the cost of about two
+                wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian | FurtherDerivatives:
+        """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs, parameters and time, at the cost of about two
         evaluations of x_dot.
 
         weights   (n_x,), in the order of the state, or rows of them
-        wrt       by what: of "x", "inputs", "params"
+        wrt       by what: of "x", "inputs", "params", "t"
         The others as for `jacobian`. Raises ArgumentError for weights and names that do not fit, SymdynError where rates of
         states depend on multipliers.
 
@@ -458,14 +460,15 @@ class Module:
         """
         self._weighted(wrt, "adjoint")
         given = self._with_weights(weights, (), 0)
-        return Jacobian(**{w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt})
+        found = {w: self.evaluate(f"adjoint_{w}", t, x, params, inputs, given) for w in wrt}
+        return FurtherDerivatives(**found) if "t" in wrt else Jacobian(**found)
 
     def hessian(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
                 wrt: Sequence[str] = ("x",), along: States | None = None) -> np.ndarray:
         """Exact second derivatives of a weighted sum of the rates, weights^T x_dot: (n, n), symmetric.
 
         weights   (n_x,), in the order of the state, or rows of them
-        wrt       by what: of "x", "inputs", "params", in this order; n is the number of all of them
+        wrt       by what: of "x", "inputs", "params", "t", in this order; n is the number of all of them
         along     (n,) a direction: the product of the matrix and it, (n,), without the matrix
         The others as for `jacobian`. With Euler parameters the second derivatives hold along changes that keep their norm. Raises
         ArgumentError for weights, directions and names that do not fit, SymdynError where rates of states depend on multipliers.
@@ -478,9 +481,9 @@ class Module:
         array([19.62,  0.  ])
         """
         self._weighted(wrt, "hessian")
-        chosen = [by for by in Jacobian._fields if by in wrt]
+        chosen = [by for by in _WEIGHTED if by in wrt]
         sizes = self.metadata.sizes
-        n = sum({"x": sizes.x, "inputs": sizes.inputs, "params": sizes.p}[by] for by in chosen)
+        n = sum({"x": sizes.x, "inputs": sizes.inputs, "params": sizes.p, "t": 1}[by] for by in chosen)
         kind = "hessian" if along is None else "hessian_product"
         given = self._with_weights(weights, () if along is None else along, 0 if along is None else n)
         return self.evaluate(f"{kind}_{'_'.join(chosen)}", t, x, params, inputs, given)
@@ -488,11 +491,11 @@ class Module:
     def _weighted(self, wrt: Any, what: str) -> None:
         """Raise ArgumentError for what the weighted rates are not differentiated by."""
         if not isinstance(wrt, (list, tuple)) or not wrt:
-            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of x, inputs and params")
-        unknown = [w for w in wrt if not isinstance(w, str) or w not in Jacobian._fields]
+            raise ArgumentError(f"{self.name}: wrt is {shown(wrt)}; pass a list of {', '.join(_WEIGHTED)}")
+        unknown = [w for w in wrt if not isinstance(w, str) or w not in _WEIGHTED]
         if unknown:
-            raise ArgumentError(f"{self.name}: {what} by {', '.join(map(name_of, unknown))} asked for; there are x, inputs and "
-                                "params")
+            raise ArgumentError(f"{self.name}: {what} by {', '.join(map(name_of, unknown))} asked for; there are "
+                                f"{', '.join(_WEIGHTED)}")
 
     def _with_weights(self, weights: Any, along: Any, n: int) -> np.ndarray:
         """What weighted functions take in place of accelerations: zeros for these, weights, a direction."""

@@ -39,8 +39,9 @@ def point(module: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 def test_gradients_are_weighted_rows_of_the_jacobian(name: str, formulation: str, backend: str) -> None:
     module = derived(name, formulation).compile(backend=backend)
     x, inputs, weights, _ = point(module)
-    rows, found = module.jacobian(0.4, x, None, inputs), module.adjoint(0.4, x, weights, None, inputs)
-    for by in ("x", "inputs", "params"):
+    wrt = ["x", "inputs", "params", "t"]
+    rows, found = module.jacobian(0.4, x, None, inputs, wrt), module.adjoint(0.4, x, weights, None, inputs, wrt)
+    for by in wrt:
         expected = weights @ getattr(rows, by)
         np.testing.assert_allclose(getattr(found, by), expected, rtol=0, atol=2e-13 * np.abs([*expected, 1]).max(), err_msg=by)
 
@@ -50,7 +51,8 @@ def test_second_derivatives(name: str, formulation: str) -> None:
     equations = derived(name, formulation)
     modules = [equations.compile(backend=backend) for backend in BACKENDS]
     x, inputs, weights, direction = point(modules[0])
-    wrt = ("x", "inputs", "params")
+    wrt = ("x", "inputs", "params", "t")
+    direction = np.append(direction, 0.7)
     whole = modules[0].hessian(0.4, x, weights, None, inputs, wrt)
     size = np.abs(whole).max()
     np.testing.assert_allclose(whole, whole.T, rtol=0, atol=1e-13 * size)
@@ -61,13 +63,13 @@ def test_second_derivatives(name: str, formulation: str) -> None:
         np.testing.assert_allclose(by_state, whole[:len(x), :len(x)], rtol=0, atol=1e-13 * size)
     # The derivative along the direction of the gradient's tape, with many digits.
     s, tape = equations.symbols, function_tape(equations, "adjoint_x")
-    moved = [a.name for a in (*s.coordinates, *s.speeds, *s.states, *s.inputs, *s.parameters)]
-    held = dict(zip(moved, [*x, *inputs, *modules[0].default_parameters], strict=True))
+    moved = [*[a.name for a in (*s.coordinates, *s.speeds, *s.states, *s.inputs, *s.parameters)], "t"]
+    held = dict(zip(moved, [*x, *inputs, *modules[0].default_parameters, 0.4], strict=True))
     with mpmath.workdps(60):
         step, sides = mpmath.mpf(10) ** -20, []
         for sign in (1, -1):
             at = {n: mpmath.mpf(v) + sign * step * mpmath.mpf(d) for (n, v), d in zip(held.items(), direction, strict=True)}
-            given = {**at, "t": 0.4, **{f"(weight {k + 1})": w for k, w in enumerate(weights)}}
+            given = {**at, **{f"(weight {k + 1})": w for k, w in enumerate(weights)}}
             sides.append(evaluate(tape, given, 60)["adjoint_x"])
         exact = ((sides[0] - sides[1]) / (2 * step)).astype(float)
     np.testing.assert_allclose((whole @ direction)[:len(x)], exact, rtol=0, atol=1e-12 * size)
@@ -109,8 +111,8 @@ def test_faults() -> None:
         module.hessian(0, [0, 0], [1, np.nan])
     with pytest.raises(ArgumentError, match=r"along has the shape \(1,\); pass 2 finite numbers"):
         module.hessian(0, [0, 0], [1, 2], along=[1])
-    with pytest.raises(ArgumentError, match="adjoint by t asked for; there are x, inputs and params"):
-        module.adjoint(0, [0, 0], [1, 2], wrt=["t"])
+    with pytest.raises(ArgumentError, match="adjoint by ud asked for; there are x, inputs, params, t"):
+        module.adjoint(0, [0, 0], [1, 2], wrt=["ud"])
     with pytest.raises(ArgumentError, match="wrt is 'x'; pass a list"):
         module.hessian(0, [0, 0], [1, 2], wrt="x")
 

@@ -136,6 +136,36 @@ def test_programs_against_differences(mesh: Any, loops: bool) -> None:
         z, np.ones(Discretized(problem, made, 2, on.guess, elastic=True).program.n - len(z))))
 
 
+def timed_point() -> sd.System:
+    """A point on a parabola that moves, pushed by a force and by one that depends on the time."""
+    x, y, phi = sd.coordinates("x y phi")
+    F, a = sd.inputs("F"), sd.parameters("a")
+    system = sd.System("timed", gravity=[0, -9.81])
+    body = system.add_body("body", mass=1, inertia=1)
+    system.add_joint(sd.Planar("plane", system.ground, body, [x, y, phi]))
+    system.add_force(body, [F + a * sd.t**2, sp.sin(sd.t), 0])
+    system.add_constraint(y - x**2 - a * sp.sin(2 * sd.t), name="parabola")
+    system.add_output("late", x * sp.cos(sd.t) + a * sd.t)
+    system.defaults, system.initial = {a: 0.3}, {x: 0.2, y: 0.04}
+    return system
+
+
+@pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(radau, degree=3), functools.partial(shooting, hold=False)],
+                         ids=["hermite-simpson", "radau", "shooting"])
+def test_programs_of_equations_that_depend_on_the_time(mesh: Any) -> None:
+    """With a free duration, by which rates, outputs and constraints are differentiated, too."""
+    module = timed_point().compile(backend="c")
+    late, x, F = sp.symbols("late x F")
+    problem = problem_of(module, sd.Loss(integral=F**2 * late, end=late**2), (1.0, 3.0), "free", None, None, None,
+                         [late * F <= 3], [sp.Eq(sp.Symbol("x(0)") * late, x)], {"a": (0.1, 1)}, None, None, 0.3)
+    assert problem.timed == {"rhs", "outputs", "C"}
+    made = mesh(np.array([0.0, 0.2, 0.5, 1.0]))
+    rng = np.random.default_rng(1)
+    on = Discretized(problem, made, 2, Motion(0.3 * rng.normal(size=(len(made.nodes), 6)), rng.normal(size=(len(made.samples), 1)),
+                                              problem.p, 1.7))
+    _derivatives_agree(on.program, on.z + 0.05 * rng.normal(size=len(on.z)))
+
+
 @pytest.mark.parametrize("mesh", [hermite_simpson, functools.partial(shooting, hold=False)], ids=["collocation", "shooting"])
 def test_programs_with_outputs_against_differences(mesh: Any) -> None:
     module = sd.systems.two_link_arm().compile(backend="c")
@@ -152,9 +182,9 @@ def test_programs_with_outputs_against_differences(mesh: Any) -> None:
 
 def test_constraints_of_loops_against_differences() -> None:
     module = sd.systems.four_bar().compile(backend="c")
-    x = np.array([[0.5, 0.13, -2.4, 0.3, -0.2, 0.9], [1.0, -0.5, -2.1, 1.0, 0.4, -0.7]])
-    loops = Loops(module, Arguments(6, 0, ()), module.parameters(), np.zeros(2), np.arange(4))
-    w, d, h = np.array([[0.3, -1.0, 0.7, 2.0], [1.0, 0.4, -0.5, 0.1]]), np.random.default_rng(0).normal(size=(2, 6)), 1e-4
+    x = np.array([[0.5, 0.13, -2.4, 0.3, -0.2, 0.9, 0.0], [1.0, -0.5, -2.1, 1.0, 0.4, -0.7, 0.0]])  # and the time
+    loops = Loops(module, Arguments(6, 0, ()), module.parameters(), np.arange(4))
+    w, d, h = np.array([[0.3, -1.0, 0.7, 2.0], [1.0, 0.4, -0.5, 0.1]]), np.random.default_rng(0).normal(size=(2, 7)), 1e-4
     gradient = lambda at: np.einsum("ni,nij->nj", w, loops.jacobian(at))
     found = (8 * (gradient(x + h * d) - gradient(x - h * d)) - (gradient(x + 2 * h * d) - gradient(x - 2 * h * d))) / (12 * h)
     assert np.abs(np.einsum("nij,nj->ni", loops.hessian(x, w), d) - found).max() < 1e-10

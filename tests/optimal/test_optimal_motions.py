@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 import sympy as sp
 
 import symdyn as sd
@@ -134,6 +135,25 @@ def test_free_parameter() -> None:
         assert found.values["m"] == pytest.approx((8 / 12) ** 0.25, rel=1e-5 if "method" in options else 1e-7)
         assert found.cost == pytest.approx(2 * np.sqrt(1.5), rel=1e-7)
         assert found.params[slider().metadata.parameters.index("m")] == found.values["m"]
+
+
+@pytest.mark.parametrize("transcription", ["hermite-simpson", "radau", "shooting"])
+def test_free_duration_of_equations_that_depend_on_the_time(transcription: str) -> None:
+    """m x'' = F + t from rest to rest over d = 1, cost of F^2 and of the time. By F = a + b t the momentum is a T + (b + 1) T^2/2 = 0
+    and the way a T^2/2 + (b + 1) T^3/6 = 1, so that the cost is a^2 T + a b T^2 + b^2 T^3/3 + 4 T, least in T."""
+    x, force = sd.coordinates("x"), sd.inputs("F")
+    system = sd.System("pushed")
+    body = system.add_body("body", mass=1)
+    slide = system.add_joint(sd.Prismatic("slide", system.ground, body, axis=[1, 0], coordinate=x))
+    system.add_joint_force(slide, force + sd.t)
+    found = sd.optimize(system.compile(backend="c"), sd.Loss(integral=F**2 + 4), (0.2, 5), end={"x": 1, "x_dot": 0},
+                        tolerance=None, transcription=transcription)
+    T = sp.Symbol("T", positive=True)
+    b = -12 / T**3 - 1
+    cost = sp.lambdify(T, (lambda a: a**2 * T + a * b * T**2 + b**2 * T**3 / 3 + 4 * T)(-(b + 1) * T / 2))
+    exact = scipy.optimize.minimize_scalar(cost, bounds=(0.2, 5), method="bounded", options={"xatol": 1e-10})
+    assert found.duration == pytest.approx(exact.x, rel=1e-6) and found.cost == pytest.approx(exact.fun, rel=1e-9)
+    assert max(found.difference.values()) < 1e-6
 
 
 def test_path_and_boundary_conditions() -> None:
