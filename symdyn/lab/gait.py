@@ -3,8 +3,9 @@
 Source: Kelly, An introduction to trajectory optimization, SIAM Review 59 (2017), section 6 (step of 0.5 m in 0.7 s, cost the
 integral of the squares of the torques); masses, lengths, inertias of RABBIT: Westervelt, Grizzle and Koditschek, IEEE
 Transactions on Automatic Control 48 (2003), as listed in the paper's program OptimTraj,
-demo/fiveLinkBiped/getPhysicalParameters.m. Its folder has a record of IPOPT, TrajOpt_GPOPSIPOPTinfo.txt, of a step of 0.4 m in 0.6 s without torque at the stance ankle, by Gauss-Radau
-collocation with 40 points (GPOPS-II): 263.69885 N^2 m^2 s after 143 iterations, with Hessians of limited memory.
+demo/fiveLinkBiped/getPhysicalParameters.m. Its folder has a record of IPOPT, TrajOpt_GPOPSIPOPTinfo.txt, of a step of 0.4 m in
+0.6 s without torque at the stance ankle, by Gauss-Radau collocation with 40 points (GPOPS-II): 263.69885 N^2 m^2 s after 143
+iterations, with Hessians of limited memory.
 """
 
 from __future__ import annotations

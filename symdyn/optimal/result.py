@@ -10,14 +10,14 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from symdyn.errors import ArgumentError
-from symdyn.real_numbers import real_of
+from symdyn.optimal.course import OverTime
 from symdyn.runtime.inputs.tables import ORDER, Pieces, Piecewise
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from symdyn.given import Key, PathName, Row, Times
+    from symdyn.given import Key, PathName, Row
     from symdyn.optimal.tracking import Tracking
     from symdyn.runtime.module import Module
     from symdyn.runtime.solutions.solution import Solution
@@ -37,7 +37,7 @@ class MeshRecord:
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
+class Optimum(OverTime):
     """An optimal motion of a module.
 
     t, x, inputs   times of the nodes (n_t,), s, states (n_t, n_x) and inputs (n_t, n_in) there; a name or symbol as an index
@@ -97,24 +97,6 @@ class Optimum:
             return self.inputs[:, metadata.inputs.index(requested)]
         raise ArgumentError(f"{self.module.name}: the optimal motion has no {shown(requested)}; it has "
                             f"{', '.join((*metadata.x, *metadata.inputs))}")
-
-    def at(self, t: Times) -> np.ndarray:
-        """The state at a time, (n_x,), or at times, (n, n_x), by the polynomials of the transcription. Raises ArgumentError
-        beyond the motion."""
-        return np.asarray(self.states_over_time(self.within(t)))
-
-    def inputs_at(self, t: Times) -> np.ndarray:
-        """The inputs at a time, (n_in,), or at times, (n, n_in); where they jump, those after it. Raises ArgumentError beyond the
-        motion."""
-        return np.asarray(self.inputs_over_time(self.within(t)))
-
-    def within(self, t: Times) -> np.ndarray:
-        """Times, those beyond the motion by rounding at its ends. Raises ArgumentError for others."""
-        times, slack = real_of(t, self.module.name, "t must be numbers"), 1e-9 * (1 + abs(self.t[-1]))
-        if not np.isfinite(times).all() or (times < self.t[0] - slack).any() or (times > self.t[-1] + slack).any():
-            raise ArgumentError(f"{self.module.name}: the optimal motion goes from t = {self.t[0]:g} to {self.t[-1]:g} s; found "
-                                f"{shown(t)}")
-        return np.clip(times, self.t[0], self.t[-1])
 
     @property
     def table(self) -> Piecewise:

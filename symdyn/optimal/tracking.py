@@ -24,6 +24,7 @@ from symdyn.shown import name_of
 from symdyn.statics.regulator import demand_definite, weights_of
 
 if TYPE_CHECKING:
+    from symdyn.optimal.course import Course
     from symdyn.optimal.result import Optimum
 
 # Relative error of a step of S; points of a polynomial of the gain; breaks of these that are nearer are one, as a part of the
@@ -33,7 +34,7 @@ RTOL, POINTS, CLOSE = 1e-8, 6, 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Tracking:
-    """Inputs that keep a mechanism near an optimal motion: din = -K(t) dx.
+    """Inputs that keep a mechanism near a motion: din = -K(t) dx.
 
     Q, Qf   weights of the states (n_x, n_x) over time and at the end; R: of the driven inputs (k, k)
     driven  names of the inputs that have weights; all others are those of the motion
@@ -48,7 +49,7 @@ class Tracking:
     (True, (1, 4))
     """
 
-    optimum: Optimum
+    motion: Optimum | Course
     Q: np.ndarray
     R: np.ndarray
     Qf: np.ndarray
@@ -58,45 +59,45 @@ class Tracking:
 
     def __call__(self, t: float, x: Sequence[float] | np.ndarray) -> np.ndarray:
         """Raises ArgumentError beyond the motion."""
-        optimum = self.optimum
+        motion = self.motion
         if not self._begin <= t <= self._end:
-            t = float(optimum.within(t))
-        found: np.ndarray = optimum.inputs_over_time(t)
-        found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - optimum.states_over_time(t))
+            t = float(motion.within(t))
+        found: np.ndarray = motion.inputs_over_time(t)
+        found[self._driven_indices] -= self._K(t) @ (np.asarray(x, dtype=float) - motion.states_over_time(t))
         return found
 
     @cached_property
     def _driven_indices(self) -> list[int]:
-        names = self.optimum.module.metadata.inputs
+        names = self.motion.module.metadata.inputs
         return [names.index(n) for n in self.driven]
 
     @cached_property
     def _begin(self) -> float:
-        return float(self.optimum.t[0])
+        return float(self.motion.t[0])
 
     @cached_property
     def _end(self) -> float:
-        return float(self.optimum.t[-1])
+        return float(self.motion.t[-1])
 
     def S(self, t: float) -> np.ndarray:
         """(n_x, n_x): what is left to pay for a deviation dx at a time is dx^T S dx."""
         n = len(self.Q)
-        found = np.asarray(self._S(float(self.optimum.within(t)))).reshape(n, n)
+        found = np.asarray(self._S(float(self.motion.within(t)))).reshape(n, n)
         return np.asarray((found + found.T) / 2)
 
     def K(self, t: float) -> np.ndarray:
         """The gain at a time, (k, n_x), rows as driven, columns as the state; by polynomials through exact values. Raises
         ArgumentError beyond the motion."""
-        return np.asarray(self._K(float(self.optimum.within(t))))
+        return np.asarray(self._K(float(self.motion.within(t))))
 
     def __repr__(self) -> str:
-        first, last = self.optimum.t[0], self.optimum.t[-1]
-        return f"<Tracking of {self.optimum.module.name} from {first:g} to {last:g} s by {', '.join(self.driven)}>"
+        first, last = self.motion.t[0], self.motion.t[-1]
+        return f"<Tracking of {self.motion.module.name} from {first:g} to {last:g} s by {', '.join(self.driven)}>"
 
 
-def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
-    """See Optimum.lqr."""
-    module = optimum.module
+def tracking(motion: Optimum | Course, Q: Any, R: Any, Qf: Any = None) -> Tracking:
+    """See Optimum.lqr and Solution.lqr."""
+    module = motion.module
     owner, states, inputs = module.name, module.metadata.x, module.metadata.inputs
     if not inputs:
         raise ArgumentError(f"{owner}: a regulator was requested, but the system has no inputs; add loads with sd.inputs(...)")
@@ -120,31 +121,31 @@ def tracking(optimum: Optimum, Q: Any, R: Any, Qf: Any = None) -> Tracking:
         S = flat.reshape(n, n)
         if not np.isfinite(flat).all() or not np.isfinite(t):
             raise EvaluationError(without)
-        found = module.jacobian(t, optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["x", "inputs"])
+        found = module.jacobian(t, motion.at(t), motion.params, motion.inputs_at(t), wrt=["x", "inputs"])
         assert found.x is not None and found.inputs is not None
         A, SB = found.x, S @ found.inputs[:, indices]
         return np.asarray(-(A.T @ S + S @ A - SB @ inverse @ SB.T + of_states)).ravel()
 
-    first, last = float(optimum.t[0]), float(optimum.t[-1])
+    first, last = float(motion.t[0]), float(motion.t[-1])
     size = max(np.abs(of_states).max(), np.abs(at_end).max(), 1e-300)
     with np.errstate(all="ignore"):
         found = solve_ivp(rate, (last, first), at_end.ravel(), method="DOP853", rtol=RTOL, atol=RTOL * size, dense_output=True)
     if not found.success:
         raise EvaluationError(without)
-    return Tracking(optimum, of_states, of_inputs, at_end, driven, found.sol, _gain(optimum, found, indices, inverse))
+    return Tracking(motion, of_states, of_inputs, at_end, driven, found.sol, _gain(motion, found, indices, inverse))
 
 
-def _gain(optimum: Optimum, found: Any, indices: Sequence[int], inverse: np.ndarray) -> PPoly:
+def _gain(motion: Optimum | Course, found: Any, indices: Sequence[int], inverse: np.ndarray) -> PPoly:
     """R^-1 B^T S as polynomials through its values in every interval of the mesh and step of Riccati's equation."""
-    breaks = np.unique(np.concatenate([optimum.breaks, found.t[(found.t > optimum.t[0]) & (found.t < optimum.t[-1])]]))
+    breaks = np.unique(np.concatenate([motion.breaks, found.t[(found.t > motion.t[0]) & (found.t < motion.t[-1])]]))
     apart = np.append(np.diff(breaks) > CLOSE * (breaks[-1] - breaks[0]), True)
     apart[0] = True
     breaks, h = breaks[apart], np.diff(breaks[apart])
     inner = (1 - np.cos(np.pi * (2 * np.arange(POINTS) + 1) / (2 * POINTS))) / 2
     t = (breaks[:-1, None] + h[:, None] * inner).ravel()
-    B = optimum.module.jacobian(t, optimum.at(t), optimum.params, optimum.inputs_at(t), wrt=["inputs"]).inputs
+    B = motion.module.jacobian(t, motion.at(t), motion.params, motion.inputs_at(t), wrt=["inputs"]).inputs
     assert B is not None
-    n = optimum.x.shape[1]
+    n = motion.module.metadata.sizes.x
     S = np.asarray(found.sol(t)).T.reshape(-1, n, n)
     K = np.einsum("ij,tkj,tkl->til", inverse, B[:, :, indices], (S + S.transpose(0, 2, 1)) / 2)
     c = through(inner, K.reshape(len(h), POINTS, -1), h)

@@ -446,8 +446,8 @@ class Module:
 
     def adjoint(self, t: Times, x: States, weights: States, params: States | None = None, inputs: States | None = (),
                 wrt: Sequence[str] = ("x", "inputs", "params")) -> Jacobian | FurtherDerivatives:
-        """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs, parameters and time, at the cost of about two
-        evaluations of x_dot.
+        """Gradient of a weighted sum of the rates, weights^T x_dot, by state, inputs, parameters and time, at the cost of about
+        two evaluations of x_dot.
 
         weights   (n_x,), in the order of the state, or rows of them
         wrt       by what: of "x", "inputs", "params", "t"

@@ -161,8 +161,8 @@ def test_programs_of_equations_that_depend_on_the_time(mesh: Any) -> None:
     assert problem.timed == {"rhs", "outputs", "C"}
     made = mesh(np.array([0.0, 0.2, 0.5, 1.0]))
     rng = np.random.default_rng(1)
-    on = Discretized(problem, made, 2, Motion(0.3 * rng.normal(size=(len(made.nodes), 6)), rng.normal(size=(len(made.samples), 1)),
-                                              problem.p, 1.7))
+    X, U = 0.3 * rng.normal(size=(len(made.nodes), 6)), rng.normal(size=(len(made.samples), 1))
+    on = Discretized(problem, made, 2, Motion(X, U, problem.p, 1.7))
     _derivatives_agree(on.program, on.z + 0.05 * rng.normal(size=len(on.z)))
 
 

@@ -139,7 +139,7 @@ def test_free_parameter() -> None:
 
 @pytest.mark.parametrize("transcription", ["hermite-simpson", "radau", "shooting"])
 def test_free_duration_of_equations_that_depend_on_the_time(transcription: str) -> None:
-    """m x'' = F + t from rest to rest over d = 1, cost of F^2 and of the time. By F = a + b t the momentum is a T + (b + 1) T^2/2 = 0
+    """x'' = F + t from rest to rest over 1 m, cost of F^2 and of the time. By F = a + b t the momentum is a T + (b + 1) T^2/2 = 0
     and the way a T^2/2 + (b + 1) T^3/6 = 1, so that the cost is a^2 T + a b T^2 + b^2 T^3/3 + 4 T, least in T."""
     x, force = sd.coordinates("x"), sd.inputs("F")
     system = sd.System("pushed")

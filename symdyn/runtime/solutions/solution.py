@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from symdyn.given import BodyOrName, JointOrName, PathName, Times
+    from symdyn.optimal import Tracking
     from symdyn.runtime.integrating.sensitivities import Asked
     from symdyn.runtime.module import Module
+    from symdyn.statics.regulator import Weights
 
 # With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
 REST = 1e-10
@@ -303,6 +305,58 @@ class Solution:
         """States at any times of the motion, as by a call, (..., n_x), with the sensitivities, (..., n_columns, n_x)."""
         found = self._at(t)
         return found[..., :self._sizes.x], found[..., self._sizes.x:].reshape(*found.shape[:-1], -1, self._sizes.x)
+
+    def states_and_inputs(self, t: Times) -> tuple[np.ndarray, np.ndarray]:
+        """States at any times of the motion, as by a call, (..., n_x), with the inputs there, (..., n_in)."""
+        x, times = self(t), np.asarray(t, dtype=float)
+        rows = self._inputs.rows(times.ravel(), x.reshape(-1, x.shape[-1]))
+        return x, np.broadcast_to(rows, (times.size, rows.shape[1])).reshape(*times.shape, rows.shape[1])
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times between which the motion is smooth, (n,), start and end among them: events, kinks of inputs given as tables,
+        instants of sampled controllers.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").simulate((0, 1)).breaks
+        array([0., 1.])
+        """
+        held = () if self._inputs.record is None else self._inputs.record.times
+        inside = np.concatenate([[one.t for one in self._happened], self._inputs.stops((self.t[0], self.t[-1])), held])
+        first, last = sorted((self.t[0], self.t[-1]))
+        found = np.unique(np.append(inside[(inside > first) & (inside < last)], [first, last]))
+        return found if self.t[0] <= self.t[-1] else found[::-1]
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """Times at which the state jumps, (n,): events that reset it, impacts.
+
+        >>> sd.systems.pendulum().compile(backend="numpy").simulate((0, 1)).jumps.shape
+        (0,)
+        """
+        found = [one.t for one in self._happened if not np.array_equal(one.before, one.after)]
+        return np.unique(np.array([*found, *[one.t for one in self._impacts]], dtype=float))
+
+    def lqr(self, Q: Weights, R: Weights, Qf: Weights | None = None) -> Tracking:
+        """The time-varying linear-quadratic regulator about the motion: inputs of least integral of dx^T Q dx + din^T R din and
+        dx^T Qf dx at the end.
+
+        Q, R, Qf   matrices, their diagonals, or weights by name or symbol: of the states (n_x,), of inputs, of the states at the
+                   end (default: the numbers of Q)
+        Returns a function of (t, x) for simulate(inputs=...). Raises ArgumentError for weights that do not fit, and for motions
+        whose state jumps or that ended early.
+
+        >>> cart = sd.systems.cart_pole().compile(backend="numpy")
+        >>> motion = cart.simulate((0, 0.5), q=[0, 0.1], inputs={"F": ([0, 0.5], [1, -1])})
+        >>> motion.lqr(Q=[1, 1, 0, 0], R=[0.01])
+        <Tracking of cart_pole from 0 to 0.5 s by F>
+        """
+        from symdyn.optimal.course import Course
+        from symdyn.optimal.tracking import tracking
+
+        if self._phases:
+            raise ArgumentError(f"{self.module.name}: a regulator was requested along a motion with rigid contacts, which open "
+                                "and close; compliant ones have derivatives")
+        return tracking(Course.of(self), Q, R, Qf)
 
     @property
     def has_work(self) -> bool:
