@@ -85,11 +85,13 @@ class Along:
 
     first, n    the columns of the Jacobian; n is the number of entries of a direction, too
     function    takes numbers, and the direction in the group `change`
+    inline      whether it is so short that its call would take a share of it to speak of
     """
 
     first: int
     n: int
     function: Function
+    inline: bool
 
 
 @dataclass(frozen=True)
