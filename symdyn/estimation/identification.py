@@ -33,7 +33,8 @@ class Identification(Estimate):
     condition    of the regressor with columns of length 1: how many times noise is amplified in the worst combination
     undetermined   combinations, each unknown counted in what changes the forces as much (with nominal values: relative to these),
                  that the data do not determine: text, from the singular vectors
-    residuals    of every motion: measured less computed forces along the speeds, (n_t, n_u), as filtered and kept
+    residuals    of every motion: measured less computed forces along the speeds, (n_t, n_u), as filtered and kept; with
+                 constraints along the motions that these allow, (n_t, r), by orthonormal directions
     consistent   whether the values are those of bodies that can exist; degrees: of freedom; known_noise: whether it was given
 
     >>> module = sd.systems.pendulum().compile(backend="numpy")

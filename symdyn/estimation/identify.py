@@ -2,7 +2,9 @@
 
 The forces along the speeds, less those of known loads, are linear in the base parameters, tau = Y_b pi_b, and in the ten inertial
 parameters of every body, tau = Y pi, of which they determine fewer. Rows are weighted by the noise of the forces, estimated speed
-by speed if it is not known, and by what the noise of the motion makes of it. Source: M. Gautier, Dynamic identification of robots
+by speed if it is not known, and by what the noise of the motion makes of it. Where loops are closed, or speeds constrained, the
+forces of the constraints do no work along the motions that these allow: with columns Z that span these, Z^T tau = Z^T Y pi. Z
+turns as little as can be from row to row, so that a filter may follow. Source: M. Gautier, Dynamic identification of robots
 with power model, ICRA 1997; Khalil and Dombre, Modeling, Identification and Control of Robots, chapter 12.
 """
 
@@ -16,6 +18,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from symdyn.errors import ArgumentError
+from symdyn.estimation.allowed import allowed
 from symdyn.estimation.estimate import combination
 from symdyn.estimation.identification import Identification
 from symdyn.estimation.measured_motion import MeasuredMotion, Rows, rows_of
@@ -43,7 +46,7 @@ FRICTION = ("viscous", "coulomb")
 def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *, noise: float | Named[float] | None = None,
              motion_noise: tuple[float | Row, float | Row, float | Row] | None = None, friction: Sequence[str] = (),
              consistent: bool = False, nominal: Mapping[str, Row] | None = None, spread: float = 30.0) -> Identification:
-    """Inertial parameters from measured forces and motions of a tree of rigid bodies.
+    """Inertial parameters from measured forces and motions of rigid bodies.
 
     data          an sd.MeasuredMotion, or several
     noise         standard deviation of the measured forces, N or N m, for all or by speed; None: estimated for each speed from
@@ -59,8 +62,9 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
                   pseudo-inertia (the weight of Bregman's divergence is 1/spread^2), at most 100. The default leaves what the
                   data say as good as unchanged
 
-    Lengths, gravity and all other loads are taken from the parameters of the module and of each motion. Raises ArgumentError with
-    all faults for what does not fit, and for mechanisms with constraints. See symdyn.estimation.identify and
+    Lengths, gravity and all other loads are taken from the parameters of the module and of each motion. Forces are those of the
+    tree, zero along speeds that nothing drives: with constraints their noise has to be given, since these hide a part of it.
+    Raises ArgumentError with all faults for what does not fit. See symdyn.estimation.identify and
     symdyn.estimation.pseudo_inertia for the sources.
 
     >>> module = sd.systems.pendulum().compile(backend="numpy")
@@ -75,6 +79,10 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
     deviations = _noise(module, noise, faults)
     moving = _motion_noise(module, motion_noise, noise, faults)
     loss = _friction(friction, faults)
+    if module.metadata.constraints:
+        faults += [f"{what}, and the mechanism has constraints, whose forces hide {hidden}" for what, hidden, there in (
+            ("noise is not given", "a part of it: give it", noise is None),
+            ("motion_noise was given", "how it acts: leave it out", motion_noise is not None)) if there]
     charts = _charts(module, nominal, faults) if consistent else []
     if isinstance(spread, bool) or not isinstance(spread, (int, float, np.number)) or not 0 < spread <= WIDEST:
         faults.append(f"spread is {shown(spread)}; pass a positive number up to {WIDEST:g}")
@@ -101,23 +109,27 @@ def identify(module: Module, data: MeasuredMotion | Sequence[MeasuredMotion], *,
 @dataclass(frozen=True)
 class _System:
     """The rows of all motions: A (n_rows, n_u, n), y (n_rows, n_u), the gain of the filter (n_rows,), what the noise of the
-    motion gives the forces, (n_rows, n_u, n_u) or None; where one motion ends and the next begins."""
+    motion gives the forces, (n_rows, n_u, n_u) or None; where one motion ends and the next begins. With constraints A and y are
+    along the r motions that these allow, whose speeds are allowed (n_rows, n_u, r), else None."""
 
     A: np.ndarray
     y: np.ndarray
     gain: np.ndarray
     moving: np.ndarray | None
+    allowed: np.ndarray | None
     ends: list[int]
 
     @classmethod
     def of(cls, module: Module, motions: Sequence[Rows], name: str, friction: Sequence[str],
            moving: np.ndarray | None) -> _System:
         """From motions, with the regressor of this name."""
-        parts = [_rows(module, one, name, friction) for one in motions]
+        free = allowed(module, motions) if module.metadata.constraints else [None] * len(motions)
+        parts = [_rows(module, one, name, friction, Z) for one, Z in zip(motions, free, strict=True)]
         gains = np.concatenate([np.full(len(y), one.gain) for one, (_, y) in zip(motions, parts, strict=True)])
         noise = None if moving is None else np.concatenate([_of_motion(module, one, moving) for one in motions])
+        kept = [one.kept(Z) for one, Z in zip(motions, free, strict=True) if Z is not None]
         return cls(np.concatenate([A for A, _ in parts]), np.concatenate([y for _, y in parts]), gains, noise,
-                   np.cumsum([len(y) for _, y in parts])[:-1].tolist())
+                   np.concatenate(kept) if kept else None, np.cumsum([len(y) for _, y in parts])[:-1].tolist())
 
     @property
     def n(self) -> int:
@@ -131,10 +143,13 @@ class _System:
     def weighted(self, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A (n, n_unknowns) and y (n,) with errors of deviation 1; noise: of the forces, (n_u,)."""
         sizes = noise * self.gain[:, None]
-        if self.moving is None:
+        if self.moving is None and self.allowed is None:
             A, y = self.A / sizes[:, :, None], self.y / sizes
         else:
-            roots = np.linalg.cholesky(self.moving + np.eye(len(noise)) * (sizes**2)[:, :, None])
+            covariance = np.eye(len(noise)) * (sizes**2)[:, :, None] + (0.0 if self.moving is None else self.moving)
+            if self.allowed is not None:
+                covariance = np.swapaxes(self.allowed, 1, 2) @ covariance @ self.allowed
+            roots = np.linalg.cholesky(covariance)
             both = np.linalg.solve(roots, np.concatenate([self.A, self.y[:, :, None]], axis=2))
             A, y = both[:, :, :-1], both[:, :, -1]
         return A.reshape(-1, A.shape[2]), y.ravel()
@@ -226,8 +241,10 @@ def _open(sizes: np.ndarray) -> tuple[np.ndarray, float]:
     return is_open, float(sizes[0] / sizes[~is_open].min()) if (~is_open).any() else np.inf
 
 
-def _rows(module: Module, motion: Rows, name: str, friction: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-    """A (n_rows, n_u, n) and y (n_rows, n_u) of a motion, behind its filter: forces less what loads of the system give."""
+def _rows(module: Module, motion: Rows, name: str, friction: Sequence[str],
+          Z: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """A (n_rows, n_u, n) and y (n_rows, n_u) of a motion, behind its filter: forces less what loads of the system give; along
+    the columns of Z (n_t, n_u, r), if there are constraints."""
     n_u, x, ud = module.metadata.sizes.u, motion.x, motion.ud
     parameters = "inertial_parameters" if name == "regressor" else "base_parameters"
     Y = module.evaluate(name, motion.t, x, motion.params, motion.inputs, ud).reshape(len(motion.t), n_u, -1)
@@ -235,7 +252,10 @@ def _rows(module: Module, motion: Rows, name: str, friction: Sequence[str]) -> t
     y = motion.tau + Y @ there - module.evaluate("inverse_dynamics", motion.t, x, motion.params, motion.inputs, ud)
     u = x[:, module.metadata.sizes.q:][:, :n_u]
     losses = [(np.sign(u) if kind == "coulomb" else u)[:, :, None] * np.eye(n_u) for kind in friction]
-    return motion.thinned(np.concatenate([Y, *losses], axis=2)), motion.thinned(y)
+    A = np.concatenate([Y, *losses], axis=2)
+    if Z is not None:
+        A, y = np.swapaxes(Z, 1, 2) @ A, np.einsum("tur,tu->tr", Z, y)
+    return motion.thinned(A), motion.thinned(y)
 
 
 def _of_motion(module: Module, motion: Rows, deviations: np.ndarray) -> np.ndarray:
@@ -256,10 +276,6 @@ def _base_names(module: Module) -> tuple[str, ...]:
 
 def _check_mechanism(module: Module) -> None:
     metadata = module.metadata
-    if metadata.constraints:
-        raise ArgumentError(f"{module.name}: identification takes a tree of bodies, and there are the constraints "
-                            f"{', '.join(metadata.constraints)}, whose forces are not measured; cut the loops, and give the "
-                            "forces that close them as inputs")
     if "regressor" not in module.functions:
         raise ArgumentError(f"{module.name}: there is no regressor, which takes rigid bodies without added mass; describe the "
                             "mechanism by bodies and joints (sd.System)")

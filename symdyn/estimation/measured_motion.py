@@ -71,9 +71,11 @@ class Rows:
 
     def thinned(self, values: np.ndarray) -> np.ndarray:
         """Values over time (n_t, ...) behind the filter, as many as it leaves."""
-        if self.sos is None:
-            return values
-        return sosfiltfilt(self.sos, values, axis=0)[self.margin:len(values) - self.margin:self.step]
+        return values if self.sos is None else self.kept(sosfiltfilt(self.sos, values, axis=0))
+
+    def kept(self, values: np.ndarray) -> np.ndarray:
+        """Values over time (n_t, ...) at the times that the filter leaves."""
+        return values if self.sos is None else values[self.margin:len(values) - self.margin:self.step]
 
     @property
     def gain(self) -> float:

@@ -239,9 +239,6 @@ def test_other_faults() -> None:
     with pytest.raises(ArgumentError, match="motion 1 has no z, and the system has the extra states n; give them"):
         sd.identify(with_state, rest)
     assert len(sd.identify(with_state, replace(rest, z=rows)).values) == 2
-    loop = sd.systems.four_bar().augmented().compile(backend="numpy")
-    with pytest.raises(ArgumentError, match="identification takes a tree of bodies, and there are the constraints"):
-        sd.identify(loop, sd.MeasuredMotion([0, 1], np.zeros((2, 3))))
     ball = sd.System("ball", gravity=[0, 0, -9.81])
     ball.add_joint(sd.Free("free", ball.ground, ball.add_body("body", 1, [1, 1, 1]), orientation=sd.EulerParameters()))
     with pytest.raises(ArgumentError, match=r"the speeds .* are not the rates of the coordinates in their order; give u and ud"):
