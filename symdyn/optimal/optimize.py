@@ -50,7 +50,7 @@ MISSED = 1e-6
 TRANSVERSAL = 0.5
 
 
-def optimize(module: Module, cost: Loss, duration: float | tuple[float, float], start: Ends | str | None = None,
+def optimize(module: Module, cost: Loss | Sequence[Loss], duration: float | tuple[float, float], start: Ends | str | None = None,
              end: Ends | None = None, *, bounds: Limits | None = None, rates: Limits | None = None,
              path: Sequence[sp.Basic] = (), boundary: Sequence[sp.Basic] = (), parameters: Limits | None = None,
              params: Values | None = None, inputs: Numbers | None = None, t: float = 0.0,
@@ -61,7 +61,8 @@ def optimize(module: Module, cost: Loss, duration: float | tuple[float, float], 
     """The motion of least cost between a start and an end, with its inputs and free parameters.
 
     cost         sd.Loss of expressions: integral of coordinates, speeds, extra states, inputs, parameters, outputs and sd.t; end
-                 of these at the end and of values at the start, called "q1(0)". Entries of outputs are called "tip[0]"
+                 of these at the end and of values at the start, called "q1(0)". Entries of outputs are called "tip[0]". Or of
+                 functions that give their derivatives; or several of them, which are added up
     duration     s; or (least, most) for one that is found
     start, end   by name or symbol: a number, (least, most), or None for any value; or a whole state in order. A state that start
                  leaves out has the system's initial value, one that end leaves out is free; start="free": all are

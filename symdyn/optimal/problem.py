@@ -15,6 +15,7 @@ from symdyn.arguments import take
 from symdyn.errors import ArgumentError, UnsupportedExpression
 from symdyn.optimal.expressions import Expressions
 from symdyn.optimal.field import Arguments
+from symdyn.optimal.functions import WithFunctions
 from symdyn.optimal.outputs import WithOutputs, output_names
 from symdyn.real_numbers import NotReal, number
 from symdyn.runtime.losses import Loss
@@ -61,8 +62,8 @@ class Problem:
     inputs: np.ndarray
     rates: np.ndarray
     params: np.ndarray
-    integrand: Expressions | WithOutputs
-    end_cost: Expressions | WithOutputs
+    integrand: Expressions | WithOutputs | WithFunctions
+    end_cost: Expressions | WithOutputs | WithFunctions
     path: Conditions
     boundary: Conditions
     timed: frozenset[str]
@@ -138,13 +139,21 @@ def problem_of(module: Module, cost: Any, duration: Any, start: Any, end: Any, b
     timed = _timed(module, p) if T[0] < T[1] else frozenset[str]()
     along_it = _Read(module, of, p, point, 0, constants, "outputs" in timed, faults)
     at_both = _Read(module, of, p, both, of.n_x, constants, "outputs" in timed, faults)
-    if not isinstance(cost, Loss):
-        faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...) with expressions")
-        cost = Loss(integral=0)
-    integrand = along_it.rows([along_it.one(cost.integral, "the integral of the cost")], "the integral of the cost")
-    end_cost = at_both.rows([at_both.one(cost.end, "the end of the cost")], "the end of the cost")
+    losses = list(cost) if isinstance(cost, (list, tuple)) else [cost]
+    if not losses or not all(isinstance(one, Loss) for one in losses):
+        faults.add(f"the cost is {shown(cost)}; pass sd.Loss(integral=..., end=...), or several, which are added up")
+        losses = []
+    integrand = along_it.cost([one.integral for one in losses], "the integral of the cost")
+    end_cost = at_both.cost([one.end for one in losses], "the end of the cost")
     along, at_ends = _conditions(path, "path", along_it), _conditions(boundary, "boundary", at_both)
     faults.demand_none()
+    if T[0] < T[1]:
+        times, x = (t0, t0 + T[0], t0 + T[1]), begin.clip(-1e3, 1e3).mean(axis=0)
+        for made in (integrand, end_cost):
+            if isinstance(made, WithFunctions) and made.depend_on_time(times, x):
+                faults.add(f"the duration is free, and a function for {made.what} depends on t, by which it gives no derivative; "
+                           "give the duration as a number, or write the cost as an expression")
+        faults.demand_none()
     assert integrand is not None and end_cost is not None and along is not None and at_ends is not None
     params_bounds = np.array(list(free_bounds.values())).reshape(-1, 2).T
     return Problem(module, of, p, t0, T, begin, stop, states, of_inputs, of_rates, params_bounds, integrand, end_cost, along,
@@ -268,7 +277,7 @@ class _Read:
                 raise TypeError
         except (sp.SympifyError, TypeError):
             self.faults.add(f"{what} is {shown(given)}; pass an expression of coordinates, speeds, inputs, parameters, outputs "
-                            "and sd.t: second derivatives are needed, which functions do not have")
+                            "and sd.t")
             return sp.S.Zero
         there = (*self.names, *self.constants, *output_names(self.module))
         unknown = sorted({str(s) for s in found.free_symbols} - set(there))
@@ -276,6 +285,15 @@ class _Read:
             self.faults.add(f"{what} has {', '.join(unknown)}, which is not there; there are {', '.join(there)}")
             return sp.S.Zero
         return found
+
+    def cost(self, given: Sequence[Any], what: str) -> Expressions | WithOutputs | WithFunctions | None:
+        """Costs, added up; None, and a fault, for what has no derivatives."""
+        functions = [one for one in given if callable(one) and not hasattr(one, "free_symbols")]
+        total = sum((self.one(one, what) for one in given if one not in functions), sp.S.Zero)
+        made = self.rows([total], what)
+        if made is None or not functions:
+            return made
+        return WithFunctions(made, functions, what, self.module, self.of, self.p, self.first)
 
     def rows(self, given: Sequence[sp.Expr], what: str) -> Expressions | WithOutputs | None:
         """Expressions as a function; None, and a fault, for what has no derivatives."""

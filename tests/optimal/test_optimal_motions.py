@@ -172,6 +172,35 @@ def test_path_and_boundary_conditions() -> None:
     assert around["x"][-1] - around["x"][0] == pytest.approx(1) and around.cost < 1e-12 and around["x"][0] > 2 - 1e-7
 
 
+@pytest.mark.parametrize("options", [{}, {"transcription": "radau"}, {"transcription": "shooting"},
+                                     {"method": "slsqp", "intervals": 6}])
+def test_costs_by_functions(options: dict[str, Any]) -> None:
+    """The same motion as by expressions, a free parameter and a free duration included."""
+    x, v, m = sp.symbols("x x_dot m")
+
+    def integral(t: float, x: np.ndarray, p: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return p[0] * np.cosh(x[1]), np.array([0, p[0] * np.sinh(x[1])]), np.array([np.cosh(x[1])])
+
+    def end(t: float, x: np.ndarray, p: np.ndarray) -> tuple[float, np.ndarray]:
+        return 3 * (x[0] - 2) ** 4, np.array([12 * (x[0] - 2) ** 3, 0])
+
+    known = sd.Loss(integral=F**2 + m * sp.cosh(v), end=3 * (x - 2) ** 4)
+    found = [sd.optimize(slider(), cost, (0.5, 4), start={"x": 0.1}, end={"x_dot": 0}, parameters={"m": (0.5, 2)}, tolerance=None,
+                         **options) for cost in (known, [EFFORT, sd.Loss(integral=integral), sd.Loss(end=end)])]
+    rtol = 1e-4 if "method" in options else 1e-8
+    assert found[1].cost == pytest.approx(found[0].cost, rel=rtol)
+    assert np.abs(found[1].x - found[0].x).max() < 1e2 * rtol and abs(found[1].duration - found[0].duration) < 1e2 * rtol
+
+
+def test_functions_that_are_not_finite() -> None:
+    with pytest.raises(sd.EvaluationError, match=r"the cost, or its derivative, is not finite at the guess"):
+        sd.optimize(slider(), sd.Loss(end=lambda t, x, p: (np.inf, x)), 2.0)
+    # Steps that lead to where it is not are not taken.
+    barrier = sd.Loss(end=lambda t, x, p: (-np.log(1.5 - x[0]) if x[0] < 1.5 else np.nan, np.array([1 / (1.5 - x[0]), 0.0])))
+    found = sd.optimize(slider(), [EFFORT, barrier, sd.Loss(end=-20 * sp.Symbol("x"))], 2.0, end={"x_dot": 0}, tolerance=None)
+    assert found["x"][-1] == pytest.approx(1.5 - 1 / (20 - 3 * found["x"][-1]), abs=1e-6)
+
+
 def test_outputs_in_conditions_and_costs() -> None:
     """The tip of an arm, by the output and by hand."""
     module = sd.systems.two_link_arm().compile(backend="c")

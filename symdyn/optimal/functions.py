@@ -1,0 +1,94 @@
+"""Costs that are functions of the user, which give their derivatives: added to an expression, at many points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.errors import EvaluationError
+from symdyn.optimal.expressions import Expressions
+from symdyn.optimal.field import Arguments
+from symdyn.optimal.outputs import WithOutputs
+from symdyn.runtime.losses import cost_of
+
+if TYPE_CHECKING:
+    from symdyn.runtime.module import Module
+
+# Of differences of derivatives, relative to 1 and the argument: a third of the digits is best for central ones.
+STEP = float(np.finfo(float).eps) ** (1 / 3)
+
+
+class WithFunctions:
+    """An expression and functions of (t, x, p), added up, as Rows with one value.
+
+    functions   of the user, see sd.Loss; what: as messages call them
+    first       where [x; inputs; free parameters; t] begin among the arguments; p (n_p,): values of all parameters
+
+    First derivatives are those that the functions give, second ones central differences of these: they say how a solver goes on,
+    and not where it ends.
+    """
+
+    def __init__(self, expression: Expressions | WithOutputs, functions: Sequence[Callable[..., Any]], what: str, module: Module,
+                 of: Arguments, p: np.ndarray, first: int) -> None:
+        self.expression, self.functions, self.what, self.module = expression, functions, what, module
+        self.of, self.p, self.first, self.m = of, p.copy(), first, 1
+        self._x = np.arange(of.n_x) + first
+        self._by = np.concatenate([self._x, first + of.n_x + of.n_in + np.arange(len(of.free))])
+        self._names = [module.metadata.parameters[k] for k in of.free]
+        self.slopes, self.curvature = expression.slopes.copy(), expression.curvature.copy()
+        self.slopes[:, self._by] = True
+        self.curvature[np.ix_(self._by, self._by)] = True
+
+    def values(self, at: np.ndarray) -> np.ndarray:
+        return self.expression.values(at) + self._of_functions(at)[0][:, None]
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        found = self.expression.jacobian(at)
+        found[:, 0, self._by] += self._of_functions(at)[1]
+        return found
+
+    def hessian(self, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        found, n = self.expression.hessian(at, weights), len(self._by)
+        second = np.zeros((len(at), n, n))
+        for k, column in enumerate(self._by):
+            h = STEP * (1 + np.abs(at[:, column]))
+            sides = []
+            for way in (-1, 1):
+                moved = at.copy()
+                moved[:, column] += way * h
+                sides.append(self._of_functions(moved)[1])
+            second[:, k] = (sides[1] - sides[0]) / (2 * h)[:, None]
+        found[:, self._by[:, None], self._by] += weights[:, :, None] * (second + second.transpose(0, 2, 1)) / 2
+        return found
+
+    def depend_on_time(self, t: Sequence[float], x: np.ndarray) -> bool:
+        """Whether values or derivatives at a state (n_x,) are others at other times."""
+        rows = np.array(t, dtype=float), np.tile(x, (len(t), 1)), np.zeros((len(t), self.of.n_in))
+        for function in self.functions:
+            found = cost_of(self.module, self.what, function, self._names, self.p)(*rows)
+            if np.ptp(np.column_stack([found.values, found.by_x]), axis=0).any():
+                return True
+        return False
+
+    def _of_functions(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (N,) of all functions and their derivatives (N, n) by the state and free parameters; NaN where they are not
+        finite."""
+        value, slopes = np.zeros(len(at)), np.zeros((len(at), len(self._by)))
+        inputs = np.zeros((1, self.of.n_in))
+        for k, row in enumerate(at):
+            if not np.isfinite(row).all():
+                value[k], slopes[k] = np.nan, np.nan
+                continue
+            p = self.p.copy()
+            p[list(self.of.free)] = row[self._by[self.of.n_x:]]
+            for function in self.functions:
+                try:
+                    found = cost_of(self.module, self.what, function, self._names, p)(row[-1:], row[None, self._x], inputs)
+                except EvaluationError:
+                    value[k], slopes[k] = np.nan, np.nan
+                    break
+                value[k] += found.values[0]
+                slopes[k] += np.concatenate([found.by_x[0], np.zeros(0) if found.by is None else found.by[0]])
+        return value, slopes
