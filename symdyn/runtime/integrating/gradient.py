@@ -18,6 +18,7 @@ from symdyn.runtime.consistent import check_start
 from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.across import Chain
+from symdyn.runtime.integrating.at_kinks import ending, staying
 from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.methods import DEFAULT, check_compiled
 from symdyn.runtime.integrating.outcome import Request
@@ -123,6 +124,9 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
         value += way.back(integral, weights)
     if not np.isfinite(value):
         raise EvaluationError(f"{module.name}: the loss is {value:g}")
+    for doubt in (*staying(module, request, np.array([span[0], t]), np.array([start, x]), integral),
+                  *([] if end is None else ending(module, request, t, x, end))):
+        warnings.warn(doubt, SimulationWarning, stacklevel=3)
     return Gradient(module.name, asked.names, value, _chosen(asked, names, weights), (t, x), way.n_steps, way.memory,
                     clock.perf_counter() - begun)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symdyn.errors import ArgumentError
+from symdyn.runtime.integrating.at_kinks import staying
 from symdyn.runtime.integrating.methods import COMPILED
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.shown import name_of, shown
@@ -110,8 +111,13 @@ class Asked:
                                 "speeds, or make the inputs functions of the time alone")
 
     def doubts(self, module: Module, request: Request, outcome: Outcome) -> list[str]:
-        """What to warn of: columns in which everything is zero all along, jumps that no event looks for."""
-        return [*self._without_effect(module, outcome), *unseen_jumps(module, request, outcome)] if self.names else []
+        """What to warn of: columns in which everything is zero all along, jumps that no event looks for, kinks that the motion
+        stays at."""
+        if not self.names:
+            return []
+        x = outcome.x[:, :module.metadata.sizes.x]
+        return [*self._without_effect(module, outcome), *unseen_jumps(module, request, outcome),
+                *staying(module, request, outcome.t, x)]
 
     def _without_effect(self, module: Module, outcome: Outcome) -> list[str]:
         n_x = module.metadata.sizes.x
