@@ -307,7 +307,13 @@ class Solution:
         return found[..., :self._sizes.x], found[..., self._sizes.x:].reshape(*found.shape[:-1], -1, self._sizes.x)
 
     def states_and_inputs(self, t: Times) -> tuple[np.ndarray, np.ndarray]:
-        """States at any times of the motion, as by a call, (..., n_x), with the inputs there, (..., n_in)."""
+        """States at any times of the motion, as by a call, (..., n_x), with the inputs there, (..., n_in).
+
+        >>> motion = sd.systems.cart_pole().compile(backend="numpy").simulate((0, 1), inputs={"F": ([0, 1], [0, 2])})
+        >>> motion.states_and_inputs([0.25, 0.5])[1]
+        array([[0.5],
+               [1. ]])
+        """
         x, times = self(t), np.asarray(t, dtype=float)
         rows = self._inputs.rows(times.ravel(), x.reshape(-1, x.shape[-1]))
         return x, np.broadcast_to(rows, (times.size, rows.shape[1])).reshape(*times.shape, rows.shape[1])
