@@ -183,6 +183,8 @@ class ModuleMetadata(Metadata):
     events, event_leaves   see EventRecord; entries of [t; x; inputs] whose ranges bound events
     charts, watches        see Chart, ValidityRange; switches: see JumpRecord; not_smooth: why there is no Taylor series
     drawn, flexible        what bodies look like and how they bend, as the pictures take it
+    connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force")
+    down                   direction of gravity, zero where there is none
     output_units           of outputs that are points
     contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord
     """
@@ -210,6 +212,8 @@ class ModuleMetadata(Metadata):
     not_smooth: str = ""
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
+    connections: tuple[tuple[str, str, str, str], ...] = ()
+    down: tuple[float, float, float] = (0.0, 0.0, 0.0)
     output_units: Mapping[str, str] = field(default_factory=dict)
     contacts: tuple[ContactRecord, ...] = ()
     compliant: tuple[CompliantRecord, ...] = ()

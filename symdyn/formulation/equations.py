@@ -81,6 +81,8 @@ class Equations:
     joints       of those in `reactions`: name, parent, child, kind
     otherwise    the same on the same tape for states where what the quantities divide by vanishes (dependent constraints)
     drawn        what bodies look like, as plain data; None stands in it for the entries of the quantity drawn_lengths, in order
+    down         direction of gravity, zero where there is none
+    connections  loads along the line between two points: name, the two bodies, kind (spring, damper, both, force)
     flexible     how flexible bodies bend, as plain data
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     events       what is looked for along a motion (see model.event), in the order of the quantity events
@@ -112,6 +114,8 @@ class Equations:
     otherwise: Equations | None = None
     drawn: tuple[Mapping[str, Any], ...] = ()
     flexible: tuple[Mapping[str, Any], ...] = ()
+    connections: tuple[tuple[str, str, str, str], ...] = ()
+    down: tuple[float, float, float] = (0.0, 0.0, 0.0)
     watched: Callable[[], Sequence[Any]] = tuple
     events: tuple[Any, ...] = ()
     contacts: tuple[Any, ...] = ()

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from symdyn.given import BodyOrName, Frame, Inertia, JointOrName, Named, Numbers, Scalar, Values, Vector
     from symdyn.model.shapes import Shape
     from symdyn.runtime.module import Module
+    from symdyn.viewer import View
 
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
@@ -622,6 +623,24 @@ class System:
         array([ 0.      , -0.979366])
         """
         return self.equations(tune).compile(backend, templates, specialize)
+
+    def show(self, path: str | Path | None = None, params: Numbers | None = None, q: Values | None = None) -> View:
+        """The mechanism to look at before anything is simulated: a page that turns and zooms, with a slider for every coordinate,
+        and for every parameter that moves something. Its kinematics run in the page; loops are closed there by Newton's method.
+
+        path     where to write it, one HTML file that needs no network; in a notebook the result shows itself
+        params   numbers for parameters, by symbol or name; others take their default, those without one 1, which the page notes
+        q        coordinates to begin with, in order, or by symbol or name; others take their initial value
+        Raises ArgumentError for points that are not finite there, for kinematics that cannot run in a page, and for another
+        ending than .html; ModelError for a description with faults; MissingExtra without matplotlib.
+
+        >>> import tempfile
+        >>> sd.systems.two_link_arm().show(f"{tempfile.mkdtemp()}/arm.html").name
+        'two_link_arm'
+        """
+        from symdyn.viewer import show
+
+        return show(self, path, params, q)
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write a tree of fixed, revolute and prismatic joints as a URDF file, with the parameters' default numbers.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 class Bending:
     """Displacements in body axes of points (n, 3), to second order in eta (n_t, n_eta).
 
+    coordinates   names of the elastic coordinates
     shapes   (n, 3, n_eta), first derivatives by eta; second: (n, 3, n_eta, n_eta), second ones, the foreshortening
     """
 
@@ -24,19 +26,24 @@ class Bending:
     shapes: np.ndarray
     second: np.ndarray
     eta: np.ndarray
+    coordinates: tuple[str, ...]
 
     def of(self, part: Part) -> Bending:
         """The displacements of a part's vertices: those of the beam's points next to them."""
+        return self.at_stations(part.stations)
+
+    def at_stations(self, stations: np.ndarray) -> Bending:
+        """The displacements of other points (n, 3) along the beam."""
         axis = int(np.ptp(self.points, axis=0).argmax())
         order = np.argsort(self.points[:, axis])
         along = self.points[order, axis]
 
         def nearest(values: np.ndarray) -> np.ndarray:
             columns = values[order].reshape(len(order), -1).T
-            found = np.column_stack([np.interp(part.stations[:, axis], along, column) for column in columns])
-            return found.reshape(len(part.stations), *values.shape[1:])
+            found = np.column_stack([np.interp(stations[:, axis], along, column) for column in columns])
+            return found.reshape(len(stations), *values.shape[1:])
 
-        return Bending(part.stations, nearest(self.shapes), nearest(self.second), self.eta)
+        return replace(self, points=stations, shapes=nearest(self.shapes), second=nearest(self.second))
 
     def between(self, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> Bending:
         """At other times: a share w (n, 1) of the way from the times a to the times b."""
@@ -56,9 +63,15 @@ def bendings(solution: Solution) -> dict[int, Bending]:
     elastic coordinates, and `second` (n, 3, n_eta, n_eta), the second derivatives.
     """
     metadata = solution.module.metadata
+    return bent_bodies(metadata.flexible, metadata.bodies, lambda name: solution[name])
+
+
+def bent_bodies(records: Sequence[Mapping[str, Any]], bodies: Sequence[str],
+                values: Callable[[str], np.ndarray]) -> dict[int, Bending]:
+    """Flexible bodies by their index among bodies; values: of an elastic coordinate over time, (n_t,)."""
     found = {}
-    for record in metadata.flexible:
-        eta = np.column_stack([solution[name] for name in record["coordinates"]])
+    for record in records:
+        eta = np.column_stack([values(name) for name in record["coordinates"]])
         points, shapes, second = (np.array(record[name], dtype=float) for name in ("stations", "shapes", "second"))
-        found[metadata.bodies.index(record["body"])] = Bending(points, shapes, second, eta)
+        found[list(bodies).index(record["body"])] = Bending(points, shapes, second, eta, tuple(record["coordinates"]))
     return found

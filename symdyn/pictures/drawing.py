@@ -117,7 +117,9 @@ def _skeleton(solution: Solution, centres: np.ndarray) -> tuple[Skeleton, list[i
     origins, rotations = frames[..., :3], frames[..., 3:].reshape(n_t, -1, 3, 3)
     if "joint_points" not in module.functions:
         return guess_skeleton(origins, rotations, centres, _ends(solution, kept)), kept
-    kept = [k for k in kept if k not in carriers(module.metadata)]
+    about = module.metadata
+    made = carriers(about.bodies, about.reactions, about.reaction_bodies)
+    kept = [k for k in kept if k not in made]
     joints = placed_joints(module.metadata, kept, solution.rows("joint_points").reshape(n_t, -1, 6))
     ends = _ends(solution, kept)
     return jointed_skeleton(joints, origins[:, kept], rotations[:, kept], centres[:, kept], ends), kept

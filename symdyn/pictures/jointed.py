@@ -50,11 +50,10 @@ def placed_joints(metadata: ModuleMetadata, bodies: Sequence[int], points: np.nd
             for k, ((parent, child), kind) in enumerate(ends)]
 
 
-def carriers(metadata: ModuleMetadata) -> set[int]:
-    """Places of the massless bodies that joints in loops have been given."""
-    ends = {name for pair in metadata.reaction_bodies for name in pair}
-    made = {f"{name}_carrier" for name in metadata.reactions} - ends
-    return {k for k, name in enumerate(metadata.bodies) if name in made}
+def carriers(bodies: Sequence[str], joints: Sequence[str], joined: Sequence[tuple[str, str]]) -> set[int]:
+    """Indices of the massless bodies that joints in loops have been given; joined: the two bodies of each joint."""
+    made = {f"{name}_carrier" for name in joints} - {name for pair in joined for name in pair}
+    return {k for k, name in enumerate(bodies) if name in made}
 
 
 def jointed_skeleton(joints: Sequence[PlacedJoint], origins: np.ndarray, rotations: np.ndarray, centres: np.ndarray,

@@ -64,13 +64,13 @@ class Solids:
         names = [*module.metadata.bodies, "ground"]
         own = [*colors_of(len(names) - 1), _GROUND_COLOR]
         parts, bending, water = [], [], None
-        for record in _filled(solution, records):
+        for record in filled(records, lengths_of(solution)):
             body = names.index(record["body"])
             if record["kind"] == "water":
-                water = _water(record, module.name)
+                water = water_of(record, module.name)
                 continue
             to = names.index(record["to"]) if record.get("to") is not None else None
-            color = to_rgb(own[body]) if record["color"] is None else _color(record["color"], module.name)
+            color = to_rgb(own[body]) if record["color"] is None else color_of(record["color"], module.name)
             made = list(parts_of(record, body, color, to, body in bent))
             parts += made
             bending += [bent[body].of(part) if body in bent and part.to is None else None for part in made]
@@ -131,25 +131,31 @@ def part_way(A: np.ndarray, B: np.ndarray, w: Any) -> np.ndarray:
     return np.asarray(A @ (np.eye(3) + np.sin(turned) * K + (1 - np.cos(turned)) * K @ K))
 
 
-def _filled(solution: Solution, records: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The records with the lengths that follow from the parameters of the run."""
+def lengths_of(solution: Solution) -> np.ndarray:
+    """The lengths in pictures that follow from the parameters of the run, in order."""
     if "drawn_lengths" not in solution.module.functions:
-        return list(records)
-    lengths = iter(solution.module.evaluate("drawn_lengths", solution.t[0], solution.x[0], solution.params,
-                                            solution.inputs[0]).ravel())
-    return [{**record, "values": {name: [[next(lengths) if e is None else e for e in row] for row in rows]
+        return np.zeros(0)
+    return solution.module.evaluate("drawn_lengths", solution.t[0], solution.x[0], solution.params, solution.inputs[0]).ravel()
+
+
+def filled(records: Sequence[Mapping[str, Any]], lengths: np.ndarray) -> list[Mapping[str, Any]]:
+    """The records with lengths in place of None, in order."""
+    left = iter(lengths)
+    return [{**record, "values": {name: [[next(left) if e is None else e for e in row] for row in rows]
                                   for name, rows in record["values"].items()}} for record in records]
 
 
-def _water(record: Mapping[str, Any], name: str) -> Water:
-    values, color = record["values"], _color(record["color"] or _WATER_COLOR, name)
+def water_of(record: Mapping[str, Any], name: str) -> Water:
+    """The water surface of a record; name: of the mechanism, for messages."""
+    values, color = record["values"], color_of(record["color"] or _WATER_COLOR, name)
     if "size" not in values:
         return Water(values["level"][0][0], None, color)
     center, half = np.array(values["center"][0]), np.array(values["size"][0]) / 2
     return Water(values["level"][0][0], np.array([center - half, center + half]), color)
 
 
-def _color(given: Any, name: str) -> tuple[float, float, float]:
+def color_of(given: Any, name: str) -> tuple[float, float, float]:
+    """A colour as numbers. Raises ArgumentError for one that does not exist; name: of the mechanism."""
     try:
         return to_rgb(given)
     except ValueError:

@@ -16,7 +16,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from symdyn.backend.source import Content, Source, render
+from symdyn.backend.source import Content, Source, render, template_folders
 from symdyn.errors import EvaluationError
 from symdyn.runtime.building.compiler import find_compiler
 from symdyn.runtime.building.library import CUnit, PythonUnit, Unit
@@ -222,7 +222,7 @@ def test_other_backends_write_plain_functions() -> None:
 
 def test_a_dialect_of_ones_own(tmp_path: Path) -> None:
     """The entry is all there is to it, also where arrays start at one."""
-    folder = shutil.copytree(Path(__file__).parent / "javascript", tmp_path / "javascript")
+    folder = shutil.copytree(template_folders()[0] / "javascript", tmp_path / "javascript")
     path = folder / "dialect.toml"
     path.write_text("first = 1\n" + path.read_text() + '\n[sincos]\nleast = 3\ntake = "const both = all([{angles}], {n});"\n'
                     'sin = "both.s[{k}]"\ncos = "both.c[{k}]"\n')

@@ -18,7 +18,7 @@ from symdyn.formulation.trees.chosen_speeds import algebra_of
 from symdyn.formulation.trees.quantities import TreeQuantities
 from symdyn.formulation.trees.tree import Tree, build
 from symdyn.model.joints import Fixed, Joint, Modal
-from symdyn.model.loads import expressions_of
+from symdyn.model.loads import ForceBetween, SpringDamper, expressions_of
 from symdyn.model.orientation import EulerAngles, EulerParameters
 from symdyn.model.points import Point
 from symdyn.model.quantity import quantities_in
@@ -80,6 +80,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   contacts=model.contacts, compliant=model.compliant,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
+                  connections=_connections(quantities), down=_down(model),
                   flexible=tuple(j.record for j in model.joints if isinstance(j, Modal)),
                   **more)
 
@@ -91,6 +92,25 @@ def _joints(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]
 
     carried = {name(c.parent): name(c.child) for c in quantities.model.loops if isinstance(c, Joint) and c.inner}
     return tuple((j.name, name(j.parent), carried.get(name(j.child), name(j.child)), j.kind) for j in quantities.reacting)
+
+
+def _connections(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str], ...]:
+    """Name, bodies and kind of the loads along a line."""
+    def kind(load: SpringDamper | ForceBetween) -> str:
+        if isinstance(load, ForceBetween):
+            return "force"
+        return "damper" if load.stiffness == 0 else "spring" if load.damping == 0 else "both"
+
+    return tuple((load.label, name_of(load.body_a), name_of(load.body_b), kind(load)) for load in quantities.connections)
+
+
+def _down(model: Model) -> tuple[float, float, float]:
+    """The direction of gravity at the parameters' numbers, 1 where they have none; zero where it has none."""
+    numbers = {s: sp.Float(model.defaults.get(s, 1.0)) for s in model.gravity.free_symbols}
+    g = [float(e) if e.is_real else 0.0 for e in (sp.N(sp.sympify(e).xreplace(numbers)) for e in model.gravity)]
+    length = sum(v * v for v in g) ** 0.5
+    x, y, z = (v / length if length > 0 else 0.0 for v in g)
+    return x, y, z
 
 
 def _notes(model: Model, tree: Tree) -> list[str]:

@@ -26,6 +26,7 @@ from symdyn.formulation.trees.reactions import reactions
 from symdyn.formulation.trees.tree import GROUND, Tree
 from symdyn.model.elements import Element
 from symdyn.model.joints import Joint
+from symdyn.model.loads import ForceBetween, SpringDamper
 from symdyn.model.orientation import EulerAngles
 from symdyn.model.points import Point
 from symdyn.model.quantity import Measure, Quantity, quantities_in
@@ -106,9 +107,12 @@ class TreeQuantities(Motion):
         """name -> function that records it."""
         own = {"k_tilde": self.k_tilde, "F_tilde": self.F_tilde, "J": self.J, "Jdot": self.Jdot,
                "Jd_qd": self.Jd_qd, "positions": self.positions, "frames": self.frames,
-               "joint_points": self.joint_points, "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
+               "joint_points": self.joint_points, "joint_axes": self.joint_axes,
+               "reactions": self.reactions, "cut_loads": self.cut_loads, "energy": self.energy,
                "power": self.power, "power_x": self.power_x,
                **{f"output_{o.name}": partial(self.output, o.name, o.value) for o in self.model.outputs}}
+        if self.connections:
+            own["spring_points"] = self.spring_points
         if self.model.compliant:
             own["compliant_contacts"] = self.compliant_contacts
         deep = any(contact.depth is not None for contact in self.model.compliant)
@@ -200,6 +204,23 @@ class TreeQuantities(Motion):
     def joint_points(self) -> np.ndarray:
         """Where each joint sits on its parent, then on its child, n-frame, m, (n_joints, 6)."""
         ends = [end for j in self.reacting for end in ((j.parent, j.parent_point), (j.child, j.child_point))]
+        return np.array([self.kinematics.position(self.loads.pose(body), self.algebra.constants(point)) for body, point in ends],
+                        dtype=object).reshape(-1, 6)
+
+    def joint_axes(self) -> np.ndarray:
+        """Unit axis of each joint, n-frame, (n_joints, 3); zero for one that has none or two."""
+        rows = [self.kinematics.rotation(self.loads.pose(j.parent)) @ self.algebra.matrix(j.parent_rotation)
+                @ self.algebra.constants(j.axis) if hasattr(j, "axis") else zeros(3) for j in self.reacting]
+        return np.array(rows, dtype=object).reshape(-1, 3)
+
+    @property
+    def connections(self) -> tuple[SpringDamper | ForceBetween, ...]:
+        """The loads along the line between two points."""
+        return tuple(load for load in self.model.loads if isinstance(load, (SpringDamper, ForceBetween)))
+
+    def spring_points(self) -> np.ndarray:
+        """Both ends of every load along a line, n-frame, m, (n, 6)."""
+        ends = [end for load in self.connections for end in ((load.body_a, load.point_a), (load.body_b, load.point_b))]
         return np.array([self.kinematics.position(self.loads.pose(body), self.algebra.constants(point)) for body, point in ends],
                         dtype=object).reshape(-1, 6)
 

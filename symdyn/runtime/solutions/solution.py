@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.integrating.sensitivities import Asked
     from symdyn.runtime.module import Module
     from symdyn.statics.regulator import Weights
+    from symdyn.viewer import View
 
 # With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
 REST = 1e-10
@@ -614,6 +615,24 @@ class Solution:
         from symdyn.pictures import animate
 
         return animate(self, path, fps, speed, view)
+
+    def view(self, path: PathName | None = None, compare: Solution | None = None, forces: bool = False) -> View:
+        """The motion to look at: a page that plays, turns and zooms, with the curves below.
+
+        path      where to write it, one HTML file that needs no network; in a notebook the result shows itself
+        compare   another motion, which is shown beside this one at the same times
+        forces    with the forces in the joints as arrows; their code is compiled when it is first used
+        Raises ArgumentError for a module that gives no frames of bodies, for positions that are not finite, and for another
+        ending than .html; MissingExtra without matplotlib.
+
+        >>> import tempfile
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> solution.view(f"{tempfile.mkdtemp()}/pendulum.html").name
+        'pendulum'
+        """
+        from symdyn.viewer import view
+
+        return view(self, path, compare, forces)
 
     def report(self, path: PathName) -> Path:
         """Write one HTML file with everything about the run: parameters, start, curves, extremes, energy, pictures, and what

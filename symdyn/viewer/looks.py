@@ -1,0 +1,282 @@
+"""What a mechanism looks like without a word from the user: solids from joints, points and inertia.
+
+Sizes follow from distances between points and from moments of inertia. Positions do not: every solid is given by points and axes
+that move, so that the same list holds at every configuration and for other values of the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+GROUND = -1
+# Colours that readers with any kind of colour vision can tell apart: Okabe and Ito, Color Universal Design, 2008.
+PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+METAL, DARK, STEEL = "#6b7280", "#374151", "#7c8797"
+_FLOATING = ("free", "planar", "custom", "modal")
+_SLIDING = ("prismatic", "cylindrical", "helical")
+# Closer than this, relative to the mechanism, are points that are the same; what counts as extended.
+_SAME, _EXTENT = 1e-6, 0.02
+# Radius of a link, of the mechanism's length.
+_RADIUS = 0.02
+
+# A point by its index, a point of a body (body, x, y, z), ("off", point, axis, distance), or ("foot", a, b, axis): the point
+# of the axis through a that is nearest to b.
+Ref = Any
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism at one configuration, n-frame.
+
+    bodies        names; frames (n_b, 12), centres (n_b, 3); drawn: bodies that have shapes of the user's
+    joints        name, parent, child, kind; joint_points (n_j, 6) on parent and child, joint_axes (n_j, 3)
+    connections   loads along lines: name, bodies, kind; spring_points (n_s, 6)
+    inertia       (n_b, 10): m, m c, moments about the origin (xx xy xz yy yz zz), body axes; None where not known
+    down          direction of gravity, zero where there is none
+    tips          further points that bodies reach to: body, (3,) in its axes
+    """
+
+    bodies: Sequence[str]
+    frames: np.ndarray
+    centres: np.ndarray
+    joints: Sequence[tuple[str, str, str, str]]
+    joint_points: np.ndarray
+    joint_axes: np.ndarray
+    connections: Sequence[tuple[str, str, str, str]]
+    spring_points: np.ndarray
+    inertia: np.ndarray | None
+    planar: bool
+    down: tuple[float, float, float]
+    drawn: frozenset[int] = frozenset()
+    tips: Sequence[tuple[int, np.ndarray]] = ()
+
+    @property
+    def points(self) -> np.ndarray:
+        """All points, (n, 3), in the order of their indices: joints on parent and child, centres, origins, ends of springs."""
+        return np.concatenate([part.reshape(-1, 3) for part in (self.joint_points, self.centres, self.frames[:, :3],
+                                                                self.spring_points)])
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """What is above in the picture: the coordinate axis against gravity, else y in a plane and z in space."""
+        k = int(np.abs(self.down).argmax())
+        if abs(self.down[k]) < 0.99 or (self.planar and k == 2):
+            return (0.0, 1.0, 0.0) if self.planar else (0.0, 0.0, 1.0)
+        x, y, z = (-float(np.sign(v)) if i == k else 0.0 for i, v in enumerate(self.down))
+        return x, y, z
+
+    def owners(self) -> list[int]:
+        """The body that each of the points is fixed to."""
+        n_b, of = len(self.bodies), self.index
+        return [*[of(name) for _, *ends, _ in self.joints for name in ends], *range(n_b), *range(n_b),
+                *[of(name) for _, *ends, _ in self.connections for name in ends]]
+
+    def index(self, name: str) -> int:
+        return list(self.bodies).index(name) if name in self.bodies else GROUND
+
+    def local(self, body: int, point: np.ndarray) -> np.ndarray:
+        """A point of the n-frame in the axes of a body."""
+        if body == GROUND:
+            return point
+        return np.asarray(self.frames[body, 3:].reshape(3, 3).T @ (point - self.frames[body, :3]))
+
+    def centre(self, body: int) -> np.ndarray:
+        return self.local(body, self.centres[body])
+
+    def moments(self, body: int) -> tuple[float, np.ndarray]:
+        """Mass, and the moments of inertia about the centre of mass over the mass, (3, 3), m²; zero for a point mass."""
+        if self.inertia is None or not self.inertia[body, 0] > 0:
+            return 0.0, np.zeros((3, 3))
+        m, c = float(self.inertia[body, 0]), self.inertia[body, 1:4] / self.inertia[body, 0]
+        xx, xy, xz, yy, yz, zz = self.inertia[body, 4:]
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / m - (c @ c * np.eye(3) - np.outer(c, c))
+        return m, np.where(np.abs(about) > 1e-12 * max(c @ c, 1e-300), about, 0.0)
+
+
+@dataclass(frozen=True)
+class Item:
+    """A solid: its kind, what it hangs on, its sizes in m, its colour, what it is called.
+
+    kind    rod, pin, ball, block, box, ellipsoid, stand, spring, damper, both, thread, disc
+    axis    index of the joint's axis; turn: (9,), own axes in body axes, of boxes and ellipsoids, row by row
+    layer   "" for what is always shown, else what shows it: "inertia", "centres"
+    """
+
+    kind: str
+    ends: tuple[Ref, ...]
+    size: tuple[float, ...]
+    color: str
+    name: str
+    body: int = GROUND
+    axis: int = -1
+    turn: tuple[float, ...] = ()
+    layer: str = ""
+
+
+def looks_of(m: Mechanism) -> tuple[list[Item], float]:
+    """The solids of a mechanism, and its length, m."""
+    length = _length(m)
+    r = _RADIUS * length * (1.0 if len(m.bodies) <= 8 else 0.7)
+    items = [*_joints(m, r, length), *_springs(m, r)]
+    for body in range(len(m.bodies)):
+        if body not in m.drawn:
+            items += [replace(item, body=body) for item in _body(m, body, r, length)]
+        items += [replace(item, body=body) for item in _on_request(m, body, r, length)]
+    return items, length
+
+
+def _length(m: Mechanism) -> float:
+    """How far points of the mechanism are apart, at most; of a single body its size, from its inertia."""
+    spans = [float(np.linalg.norm(np.ptp(m.points, axis=0)))]
+    for body in range(len(m.bodies)):
+        own = [m.local(body, point) for point, owner in zip(m.points, m.owners(), strict=True) if owner == body]
+        spans.append(float(np.linalg.norm(np.ptp(own, axis=0))) * (1.0 if len(m.bodies) == 1 else 1.5))
+        spans.append(2.5 * float(np.sqrt(max(np.trace(m.moments(body)[1]), 0.0))))
+    found = max(spans)
+    return found if np.isfinite(found) and found > 0 else 1.0
+
+
+def _color(body: int) -> str:
+    return METAL if body == GROUND else PALETTE[body % len(PALETTE)]
+
+
+def _joints(m: Mechanism, r: float, length: float) -> Iterator[Item]:
+    """Joints as their kind, and stands where the ground holds them."""
+    for j, (name, parent, child, kind) in enumerate(m.joints):
+        ends = (m.index(parent), m.index(child))
+        title = f"{name} ({kind})"
+        if kind in _FLOATING or kind == "fixed" or all(end == GROUND or end in m.drawn for end in ends):
+            continue
+        own = replace(Item(kind, (2 * j + 1,), (r, r), DARK, title), axis=j, body=ends[1])
+        if kind == "rod":
+            yield Item("rod", (2 * j, 2 * j + 1), (0.6 * r, 0.6 * r), METAL, title)
+            continue
+        if kind in _SLIDING:
+            yield replace(own, kind="block", size=(2.2 * r, 2.2 * r, 3.2 * r), color=_color(ends[1]))
+            far = 0.6 * length
+            rail = ((("off", 2 * j, j, -far), ("off", 2 * j, j, far)) if GROUND in ends else (2 * j, 2 * j + 1))
+            yield Item("rod", rail, (0.5 * r, 0.5 * r), STEEL, title)
+            continue
+        yield replace(own, kind="pin", size=(1.5 * r, 1.9 * r)) if np.any(m.joint_axes[j]) else replace(
+            own, kind="ball", size=(1.9 * r,))
+        if GROUND in ends:
+            yield Item("stand", (2 * j + int(ends[1] == GROUND),), (3.2 * r, 4.5 * r), METAL, f"{title}, on the ground")
+
+
+def _springs(m: Mechanism, r: float) -> Iterator[Item]:
+    first = 2 * len(m.joints) + 2 * len(m.bodies)
+    for k, (name, _, _, kind) in enumerate(m.connections):
+        ends = (first + 2 * k, first + 2 * k + 1)
+        yield Item("thread" if kind == "force" else kind, ends, (0.3 * r,) if kind == "force" else (1.3 * r,), STEEL,
+                   f"{name} ({'spring and damper' if kind == 'both' else kind})")
+
+
+def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
+    """A body as rods between its points, or as a solid of its inertia where it has no extent."""
+    color, name = _color(body), m.bodies[body]
+    mass, moments = m.moments(body)
+    held = _attached(m, body, length)
+    centre = m.centre(body)
+    at_centre = (body, *centre)
+    extended = float(np.sqrt(max(np.trace(moments), 0.0))) > _EXTENT * length
+    sphere = Item("ball", (at_centre,), (2.4 * r,), color, name)
+    if len(held) > 1:
+        items = list(_rods(m, held, r, color, name))
+        points = np.array([point for _, point, _ in held])
+        off = min(_distance_to_line(centre, points[0], p) for p in points[1:])
+        return items + ([sphere] if mass and not extended and off > 3 * r else [])
+    if not held:
+        return [_solid(body, centre, moments, length, color, name) if extended else replace(sphere, size=(3 * r,))]
+    ref, start, joint = held[0]
+    way = centre - start
+    distance = float(np.linalg.norm(way))
+    if distance > _EXTENT * length:
+        if not extended:
+            return [Item("rod", (ref, at_centre), (0.8 * r, 0.6 * r), color, name), sphere]
+        along = way / distance
+        across = float(np.trace(moments) - along @ moments @ along) / 2
+        half = min(float(np.sqrt(max(3 * across, 0.0))), 1.1 * distance)
+        return [Item("rod", (ref, (body, *(centre + half * along))), (r, 0.65 * r), color, name)]
+    if not extended:
+        slides = joint >= 0 and m.joints[joint][3] in _SLIDING
+        return [] if slides else [replace(sphere, size=(2.0 * r,))]
+    axis = m.local(body, m.frames[body, :3] + m.joint_axes[joint]) if joint >= 0 else np.zeros(3)
+    if joint >= 0 and m.joints[joint][3] == "revolute" and axis @ moments @ axis > 0.4 * np.trace(moments):
+        radius = float(np.sqrt(2 * axis @ moments @ axis))
+        return [Item("disc", (ref,), (min(radius, 0.5 * length), 0.7 * r), color, name, axis=joint)]
+    return [_solid(body, centre, moments, 0.09 * length, color, name)]
+
+
+def _attached(m: Mechanism, body: int, length: float) -> list[tuple[Ref, np.ndarray, int]]:
+    """Points of a body that hold something: what refers to them, where they are in its axes, their joint or -1. The joint that
+    carries the body comes first."""
+    found: list[tuple[Ref, np.ndarray, int]] = []
+    springs = 2 * len(m.joints) + 2 * len(m.bodies)
+    ends = [(j, side) for side in (1, 0) for j, (_, *names, kind) in enumerate(m.joints)
+            if m.index(names[side]) == body and kind not in _FLOATING]
+    candidates = [(2 * j + side, j) for j, side in ends] + [
+        (springs + k, -1) for k, owner in enumerate(m.owners()[springs:]) if owner == body]
+    every = [(ref, m.local(body, m.points[ref]), j) for ref, j in candidates] + [
+        ((body, *tip), tip, -1) for owner, tip in m.tips if owner == body]
+    for ref, point, j in every:
+        if all(np.linalg.norm(point - other) > _SAME * length for _, other, _ in found):
+            found.append((ref, point, j))
+    return found
+
+
+def _rods(m: Mechanism, held: Sequence[tuple[Ref, np.ndarray, int]], r: float, color: str, name: str) -> Iterator[Item]:
+    """Tapered rods from the first point; along the axis of its hinge first where the next point is off it and along it."""
+    first, start, joint = held[0]
+    for ref, point, _ in held[1:]:
+        way = point - start
+        if joint >= 0 and np.any(m.joint_axes[joint]) and len(held) == 2:
+            body = m.index(m.joints[joint][2]) if first % 2 else m.index(m.joints[joint][1])
+            axis = m.local(body, (0.0 if body == GROUND else m.frames[body, :3]) + m.joint_axes[joint])
+            along = float(way @ axis)
+            across = float(np.linalg.norm(way - along * axis))
+            if min(abs(along), across) > 2 * r:
+                foot = ("foot", first, ref, joint)
+                yield Item("rod", (first, foot), (1.3 * r, 1.3 * r), color, name)
+                yield Item("ball", (foot,), (1.3 * r,), color, name)
+                yield Item("rod", (foot, ref), (1.15 * r, 0.75 * r), color, name)
+                continue
+        yield Item("rod", (first, ref), (r, 0.7 * r), color, name)
+    if len(held) == 3:
+        yield Item("rod", (held[1][0], held[2][0]), (0.7 * r, 0.7 * r), color, name)
+
+
+def _distance_to_line(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    way = (b - a) / np.linalg.norm(b - a)
+    return float(np.linalg.norm((point - a) - (point - a) @ way * way))
+
+
+def _solid(body: int, centre: np.ndarray, moments: np.ndarray, most: float, color: str, name: str) -> Item:
+    """The box with the same moments of inertia, its edges along the principal axes."""
+    sides, axes = _principal(moments, 12.0)
+    size = np.clip(sides / 2, 0.12 * sides.max() / 2, 0.5 * most)
+    return Item("box", ((body, *centre),), tuple(float(s) for s in size), color, name, turn=tuple(axes.ravel()))
+
+
+def _principal(moments: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths along the principal axes from second moments, sqrt(factor * them), and these axes as columns."""
+    second = np.trace(moments) / 2 * np.eye(3) - moments
+    values, axes = np.linalg.eigh(second)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return np.sqrt(factor * np.maximum(values, 0.0)), axes
+
+
+def _on_request(m: Mechanism, body: int, r: float, length: float) -> Iterator[Item]:
+    """The centre of mass, and the homogeneous ellipsoid of the same inertia."""
+    centre = (body, *m.centre(body))
+    mass, moments = m.moments(body)
+    yield Item("ball", (centre,), (1.4 * r,), "#111827", f"centre of mass of {m.bodies[body]}", layer="centres")
+    if mass and np.trace(moments) > (_EXTENT * length) ** 2:
+        semi, axes = _principal(moments, 5.0)
+        size = tuple(float(max(s, 0.2 * r)) for s in semi)
+        yield Item("ellipsoid", (centre,), size, _color(body), f"inertia of {m.bodies[body]}", turn=tuple(axes.ravel()),
+                   layer="inertia")

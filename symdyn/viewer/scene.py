@@ -1,0 +1,109 @@
+"""What a page draws, as plain data: solids by rules, shapes of the user's, water."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_hex
+
+from symdyn.pictures.bending import Bending
+from symdyn.pictures.meshes import Part, parts_of, sweep
+from symdyn.pictures.solids import Water, color_of, filled, water_of
+from symdyn.viewer.arrays import plain, text_of
+from symdyn.viewer.looks import PALETTE, Item, Mechanism, looks_of
+
+_GROUND_COLOR = "#9ca3af"
+# Of the mechanism's length: the radius of a line a point of print wide.
+_THREAD = 0.0012
+
+
+def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.ndarray, bent: Mapping[int, Bending],
+             name: str) -> dict[str, Any]:
+    """Items, meshes and water of a mechanism.
+
+    records   shapes of the user's, with `lengths` in place of None; bent: flexible bodies by their index
+    """
+    items, length = looks_of(m)
+    meshes, threads, water = [], [], None
+    names = [*m.bodies, "ground"]
+    for record in filled(records, lengths):
+        if record["kind"] == "water":
+            water = _water(water_of(record, name))
+            continue
+        body = names.index(record["body"])
+        to = names.index(record["to"]) if record.get("to") is not None else None
+        color = to_hex(color_of(record["color"], name)) if record["color"] is not None else (
+            _GROUND_COLOR if body == len(m.bodies) else PALETTE[body % len(PALETTE)])
+        for part in parts_of(record, body, (0.0, 0.0, 0.0), to, body in bent):
+            if len(part.faces):
+                meshes.append(_mesh(part, m, color, bent.get(body), length))
+            else:
+                threads += _threads(part, m, color, length)
+    drawn = {mesh["body"] for mesh in meshes}
+    for body, bending in bent.items():
+        if body not in drawn:
+            widths = np.full((len(bending.points), 2), 0.03 * length)
+            part = sweep(body, (0.0, 0.0, 0.0), bending.points, widths)
+            meshes.append(_mesh(part, m, PALETTE[body % len(PALETTE)], bending, length))
+    return {"bodies": list(m.bodies), "planar": m.planar,
+            "length": length, "up": list(m.up), "items": [*map(_plain, items), *threads],
+            "meshes": meshes, "water": water, "palette": list(PALETTE), "joints": [list(j) for j in m.joints],
+            "n_points": len(m.points)}
+
+
+def _plain(item: Item) -> dict[str, Any]:
+    found: dict[str, Any] = {"kind": item.kind, "ends": [_ref(end) for end in item.ends], "color": item.color, "name": item.name,
+                             "size": [_short(v) for v in item.size], "body": item.body}
+    if item.axis >= 0:
+        found["axis"] = item.axis
+    if item.turn:
+        found["turn"] = [_short(v) for v in item.turn]
+    if item.layer:
+        found["layer"] = item.layer
+    return found
+
+
+def _ref(ref: Any) -> Any:
+    return [_ref(v) for v in ref] if isinstance(ref, tuple) else _short(ref) if isinstance(ref, (float, np.floating)) else ref
+
+
+def _short(value: Any) -> float:
+    return float(f"{float(value):.7g}")
+
+
+def _body_of(index: int, m: Mechanism) -> int:
+    return -1 if index == len(m.bodies) else index
+
+
+def _mesh(part: Part, m: Mechanism, color: str, bending: Bending | None, length: float) -> dict[str, Any]:
+    triangles = [(face[0], a, b) for face in part.faces for a, b in pairwise(face[1:])]
+    body = _body_of(part.body, m)
+    found = {"body": body, "color": color, "name": m.bodies[body] if body >= 0 else "ground", "vertices": plain(part.vertices),
+             "triangles": text_of(np.array(triangles, dtype="<u2"))}
+    if bending is not None:
+        stations, which = np.unique(part.stations, axis=0, return_inverse=True)
+        of = bending.at_stations(stations)
+        n = len(stations)
+        found["bend"] = {"station": text_of(which.ravel().astype("<u2")), "shapes": plain(of.shapes.reshape(n, -1)),
+                         "second": plain(of.second.reshape(n, -1)), "eta": list(bending.coordinates)}
+    return found
+
+
+def _threads(part: Part, m: Mechanism, color: str, length: float) -> list[dict[str, Any]]:
+    """A line as thin rods from vertex to vertex; the last vertex may be on another body."""
+    body, last = _body_of(part.body, m), len(part.vertices) - 1
+    name = m.bodies[body] if body >= 0 else "ground"
+    found = []
+    for a, b, *_ in part.edges:
+        end = body if part.to is None or b != last else _body_of(part.to, m)
+        found.append(Item("thread", ((body, *part.vertices[a]), (end, *part.vertices[b])), (_THREAD * part.width * length,),
+                          color, f"line of {name}", body))
+    return [_plain(item) for item in found]
+
+
+def _water(water: Water) -> dict[str, Any]:
+    return {"level": water.level, "color": to_hex(water.color),
+            "reach": None if water.reach is None else [[float(v) for v in row] for row in water.reach]}

@@ -1,0 +1,92 @@
+// Curves over time with a cursor.
+const number = v => Number.isFinite(v) ? (Math.abs(v) >= 1e5 || (v && Math.abs(v) < 1e-3) ? v.toExponential(2) : String(+v.toPrecision(4))) : "";
+
+// Round numbers within a range, about as many as asked for.
+function ticks(low, high, count) {
+    const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].map(f => f * power).find(s => s >= raw);
+    const found = [];
+    for (let v = Math.ceil(low / step) * step; v <= high + 1e-9 * step; v += step) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
+    return found;
+}
+
+class Plot {
+    constructor(panel, parent, seek) {
+        this.panel = panel;
+        [this.t] = columnsOf(panel.t);
+        this.columns = columnsOf(panel.values);
+        const figure = element(parent, "figure", "plot");
+        const caption = element(figure, "figcaption");
+        element(caption, "b", "", `${panel.title || panel.names[0]}${panel.unit ? ` [${panel.unit}]` : ""}`);
+        this.digits = this.columns.map(column => {
+            const range = column.reduce((m, v) => Math.max(m, v), -Infinity) - column.reduce((m, v) => Math.min(m, v), Infinity);
+            return range > 0 ? Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(range)))) : 12;
+        });
+        this.values = panel.names.map((name, k) => {
+            const entry = element(caption, "span", "entry");
+            element(entry, "i").style.background = this.color(k);
+            symbol(entry, name);
+            return element(entry, "output");
+        });
+        this.box = element(figure, "div", "curves");
+        this.canvas = element(this.box, "canvas");
+        this.canvas.setAttribute("role", "img");
+        this.canvas.setAttribute("aria-label", `${panel.title}: ${panel.names.join(", ")} over time`);
+        this.cursor = element(this.box, "div", "cursor");
+        const at = event => seek(this.time(event.clientX - this.canvas.getBoundingClientRect().left));
+        this.canvas.addEventListener("pointerdown", event => { this.canvas.setPointerCapture(event.pointerId); at(event); });
+        this.canvas.addEventListener("pointermove", event => { if (event.buttons) at(event); });
+        new ResizeObserver(() => this.draw()).observe(this.box);
+        matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    }
+
+    color(k) { return PALETTE[k % PALETTE.length]; }
+
+    get span() { return this.t[this.t.length - 1] - this.t[0] || 1; }
+
+    x(t) { return this.left + (t - this.t[0]) / this.span * (this.wide - this.left - 16); }
+
+    time(x) { return Math.max(this.t[0], Math.min(this.t[0] + this.span, this.t[0] + (x - this.left) / (this.wide - this.left - 16) * this.span)); }
+
+    draw() {
+        const { canvas } = this, ratio = window.devicePixelRatio || 1, style = getComputedStyle(document.body);
+        this.wide = canvas.clientWidth;
+        this.left = 54;
+        const high = canvas.clientHeight;
+        [canvas.width, canvas.height] = [this.wide * ratio, high * ratio];
+        const g = canvas.getContext("2d");
+        g.scale(ratio, ratio);
+        g.font = "11px system-ui, sans-serif";
+        let low = Infinity, top = -Infinity;
+        for (const column of this.columns) for (const v of column) { low = Math.min(low, v); top = Math.max(top, v); }
+        if (!(top > low)) [low, top] = [low - 1, top + 1];
+        const y = v => 6 + (top - v) / (top - low) * (high - 28);
+        g.textBaseline = "middle";
+        for (const v of ticks(low, top, 4)) {
+            g.strokeStyle = style.getPropertyValue("--line");
+            g.beginPath(); g.moveTo(this.left, y(v)); g.lineTo(this.wide - 16, y(v)); g.stroke();
+            g.fillStyle = style.getPropertyValue("--quiet");
+            g.textAlign = "right";
+            g.fillText(number(v), this.left - 5, y(v));
+        }
+        g.textAlign = "center";
+        for (const v of ticks(this.t[0], this.t[0] + this.span, Math.max(2, this.wide / 110))) g.fillText(number(v), this.x(v), high - 8);
+        this.columns.forEach((column, k) => {
+            g.strokeStyle = this.color(k);
+            g.lineWidth = 1.5;
+            g.setLineDash(k >= PALETTE.length ? [5, 3] : []);
+            g.beginPath();
+            column.forEach((v, i) => g[i ? "lineTo" : "moveTo"](this.x(this.t[i]), y(v)));
+            g.stroke();
+        });
+        this.seek(this.now ?? this.t[0]);
+    }
+
+    seek(time) {
+        this.now = time;
+        if (this.wide) this.cursor.style.transform = `translateX(${this.x(Math.max(this.t[0], Math.min(this.t[0] + this.span, time)))}px)`;
+        let a = 0, b = this.t.length - 1;
+        while (b - a > 1) { const c = (a + b) >> 1; if (this.t[c] <= time) a = c; else b = c; }
+        const k = time - this.t[a] < this.t[b] - time ? a : b;
+        this.values.forEach((output, i) => { output.textContent = number(+this.columns[i][k].toFixed(this.digits[i])); });
+    }
+}

@@ -1,0 +1,117 @@
+// Draws meshes and lines by WebGL 2. Without a graphics card smooth edges cost half of the frames: still pictures are then drawn
+// finer, moving ones are not.
+const VERTEX = `#version 300 es
+in vec3 place; in vec3 normal;
+uniform mat4 camera, model; uniform vec3 stretch; uniform float taper;
+out vec3 direction, world;
+void main() {
+    vec3 p = place;
+    p.xy *= mix(1.0, taper, clamp(p.z, 0.0, 1.0));
+    vec4 w = model * vec4(p, 1.0);
+    world = w.xyz;
+    direction = mat3(model) * (normal / (stretch * stretch));
+    gl_Position = camera * w;
+}`;
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 direction, world;
+uniform vec4 color; uniform vec3 light; uniform float flat_;
+out vec4 shown;
+void main() {
+    vec3 n = flat_ > 0.5 ? normalize(cross(dFdx(world), dFdy(world))) : normalize(direction);
+    float d = 0.5 + 0.5 * dot(n, light);
+    shown = vec4(color.rgb * (flat_ > 1.5 ? 1.0 : 0.42 + 0.62 * d), color.a);
+}`;
+
+function softwareOnly() {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    if (!gl) return true;
+    const about = gl.getExtension("WEBGL_debug_renderer_info");
+    const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
+    gl.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+class Renderer {
+    constructor(canvas) {
+        this.canvas = canvas;
+        this.software = softwareOnly();
+        const gl = this.gl = canvas.getContext("webgl2", { antialias: !this.software, alpha: false });
+        if (!gl) throw new Error("this browser offers no WebGL 2");
+        const program = this.program = gl.createProgram();
+        for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+            const shader = gl.createShader(kind);
+            gl.shaderSource(shader, text);
+            gl.compileShader(shader);
+            gl.attachShader(program, shader);
+        }
+        gl.bindAttribLocation(program, 0, "place");
+        gl.bindAttribLocation(program, 1, "normal");
+        gl.linkProgram(program);
+        if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+        gl.useProgram(program);
+        this.at = Object.fromEntries(["camera", "model", "stretch", "taper", "color", "light", "flat_"].map(
+            name => [name, gl.getUniformLocation(program, name)]));
+        gl.enable(gl.DEPTH_TEST);
+        gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    }
+
+    // vertices: places and normals in turn, six numbers each; triangles: indices, or null for a line through all vertices.
+    mesh(vertices, triangles, moving = false) {
+        const gl = this.gl, array = gl.createVertexArray(), buffer = gl.createBuffer();
+        gl.bindVertexArray(array);
+        gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, vertices, moving ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
+        for (const k of [0, 1]) {
+            gl.enableVertexAttribArray(k);
+            gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 24, 12 * k);
+        }
+        if (triangles) {
+            gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+            gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
+        }
+        gl.bindVertexArray(null);
+        return { array, buffer, count: triangles ? triangles.length : vertices.length / 6, lines: !triangles };
+    }
+
+    change(mesh, vertices) {
+        this.gl.bindBuffer(this.gl.ARRAY_BUFFER, mesh.buffer);
+        this.gl.bufferData(this.gl.ARRAY_BUFFER, vertices, this.gl.DYNAMIC_DRAW);
+        if (mesh.lines) mesh.count = vertices.length / 6;
+    }
+
+    // Sizes of the canvas, finer by a factor where the graphics card is slow and nothing moves.
+    begin(fine, background) {
+        const gl = this.gl, canvas = this.canvas;
+        const ratio = this.software ? (fine ? 2 : 1) : Math.min(window.devicePixelRatio || 1, 2);
+        const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+        if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+        gl.viewport(0, 0, width, height);
+        gl.disable(gl.SCISSOR_TEST);
+        gl.clearColor(...background, 1);
+        gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    }
+
+    // Part `which` of `many` beside each other.
+    part(which, many, camera, light) {
+        const gl = this.gl, width = this.canvas.width / many;
+        gl.viewport(which * width, 0, width, this.canvas.height);
+        gl.uniformMatrix4fv(this.at.camera, false, camera);
+        gl.uniform3fv(this.at.light, light);
+    }
+
+    // flat: 0 by normals, 1 by faces, 2 without light.
+    draw(mesh, model, stretch, color, taper = 1, flat = 0, alpha = 1) {
+        const gl = this.gl, at = this.at;
+        gl.uniformMatrix4fv(at.model, false, model);
+        gl.uniform3fv(at.stretch, stretch);
+        gl.uniform1f(at.taper, taper);
+        gl.uniform1f(at.flat_, flat);
+        gl.uniform4f(at.color, color[0], color[1], color[2], alpha);
+        if (alpha < 1) gl.enable(gl.BLEND);
+        gl.bindVertexArray(mesh.array);
+        if (mesh.lines) gl.drawArrays(mesh.strip ? gl.LINE_STRIP : gl.LINES, 0, mesh.count);
+        else gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_SHORT, 0);
+        if (alpha < 1) gl.disable(gl.BLEND);
+    }
+}

@@ -1,0 +1,335 @@
+// What is seen: a camera that turns, the solids of one mechanism or of several beside each other, names under the pointer.
+const FIELD = 0.6;
+const AXES = [["x", "#D55E00"], ["y", "#009E73"], ["z", "#0072B2"]];
+
+class Stage {
+    constructor(canvas, scenes) {
+        this.canvas = canvas;
+        this.scenes = scenes;
+        this.renderer = new Renderer(canvas);
+        this.library = Object.fromEntries(Object.entries(MESHES).map(([name, parts]) => [name, this.renderer.mesh(...parts)]));
+        this.planar = scenes[0].data.planar;
+        this.up = scenes[0].data.up;
+        // A plane is looked at from z; else the camera goes around from the first direction across.
+        this.ahead = this.planar ? [0, 0, 1] : Math.abs(this.up[0]) > 0.9 ? [0, 1, 0] : [1, 0, 0];
+        this.side = cross(this.up, this.ahead);
+        this.length = Math.max(...scenes.map(s => s.data.length));
+        this.layers = { names: false, frames: false, centres: false, inertia: false, forces: true };
+        this.forceScale = 1;
+        this.follow = -1;
+        this.trail = -2;
+        this.frames = 0;
+        this.after = () => {};
+        for (const scene of scenes) this.prepare(scene);
+        new ResizeObserver(() => this.invalidate()).observe(canvas);
+        document.addEventListener("visibilitychange", () => this.invalidate());
+    }
+
+    prepare(scene) {
+        scene.meshes = scene.data.meshes.map(mesh => {
+            const [x, y, z] = columnsOf(mesh.vertices), n = x.length, vertices = new Float32Array(6 * n);
+            for (let k = 0; k < n; k++) vertices.set([x[k], y[k], z[k]], 6 * k);
+            const made = this.renderer.mesh(vertices, new Uint16Array(bytes(mesh.triangles)), Boolean(mesh.bend));
+            const bend = mesh.bend && { station: new Uint16Array(bytes(mesh.bend.station)), shapes: columnsOf(mesh.bend.shapes),
+                second: columnsOf(mesh.bend.second), eta: mesh.bend.eta };
+            return { ...mesh, made, own: vertices.slice(), vertices, bend, color: colorOf(mesh.color) };
+        });
+        scene.items = scene.data.items.map(item => ({ ...item, color: colorOf(item.color) }));
+        scene.floor = this.planar ? null : this.grid(scene);
+        scene.trails = scene.data.bodies.map(() => null);
+    }
+
+    // Points of everything that is drawn now.
+    reach(scene) {
+        const found = [];
+        const { source } = scene;
+        for (const item of scene.items) if (!item.layer && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
+            for (const end of item.ends) found.push(source.at(end));
+        for (const mesh of scene.meshes) for (let k = 0; k < mesh.own.length; k += 6)
+            found.push(source.world(mesh.body, mesh.own[k], mesh.own[k + 1], mesh.own[k + 2]));
+        for (let k = 0; k < source.bodies; k++) found.push(source.world(k, 0, 0, 0));
+        return found;
+    }
+
+    // Look at all that is drawn, over the whole motion.
+    fit() {
+        const all = this.scenes.map(scene => {
+            const { source, data } = scene, now = source.time, found = [];
+            const count = data.kind === "recorded" ? 40 : 1;
+            for (let k = 0; k < count; k++) {
+                if (data.kind === "recorded") source.seek(source.t[Math.round((source.t.length - 1) * k / (count - 1))]);
+                found.push(...this.reach(scene));
+            }
+            if (data.kind === "recorded") source.seek(now);
+            return found;
+        }).flat();
+        const low = [0, 1, 2].map(k => all.reduce((m, p) => Math.min(m, p[k]), Infinity));
+        const high = [0, 1, 2].map(k => all.reduce((m, p) => Math.max(m, p[k]), -Infinity));
+        this.floor = all.reduce((m, p) => Math.min(m, inner(p, this.up)), Infinity);
+        this.radius = Math.max(0.5 * size(minus(high, low)), 0.25 * this.length);
+        this.camera = { target: times(add(low, high), 0.5), distance: 1, azimuth: this.planar ? 0 : -0.95, elevation: this.planar ? 0 : 0.34 };
+        const aspect = Math.max(0.1, this.canvas.clientWidth / this.scenes.length / (this.canvas.clientHeight || 1));
+        const { x, y, z, f } = this.matrix(aspect), margin = 0.07 * this.length;
+        this.camera.distance = all.reduce((far, p) => {
+            const d = minus(p, this.camera.target);
+            return Math.max(far, inner(z, d) + f * Math.max((Math.abs(inner(x, d)) + margin) / aspect, Math.abs(inner(y, d)) + margin));
+        }, 0.5 * this.length);
+        this.home = { ...this.camera };
+    }
+
+    grid(scene) {
+        const count = 10, reach = 1.2 * scene.data.length, z = 0, lines = [];
+        for (let k = -count; k <= count; k++) {
+            const v = reach * k / count;
+            for (const [a, b] of [[[v, -reach], [v, reach]], [[-reach, v], [reach, v]]]) lines.push(...a, z, 0, 0, 1, ...b, z, 0, 0, 1);
+        }
+        return this.renderer.mesh(new Float32Array(lines), null);
+    }
+
+    get eye() {
+        const { azimuth: a, elevation: e, distance } = this.camera, c = Math.cos(e);
+        const way = add(add(times(this.ahead, c * Math.cos(a)), this.side, c * Math.sin(a)), this.up, Math.sin(e));
+        return [add(this.target, way, distance), way];
+    }
+
+    get target() {
+        const { source } = this.scenes[0];
+        return this.follow < 0 ? this.camera.target : add(this.camera.target, minus(source.world(this.follow, 0, 0, 0), this.followed));
+    }
+
+    setFollow(body) {
+        if (this.follow >= 0) this.camera.target = this.target;
+        this.follow = body;
+        if (body >= 0) this.followed = this.scenes[0].source.world(body, 0, 0, 0);
+        this.invalidate();
+    }
+
+    // The matrix of the camera for a picture of some width over height; right, up and way to the eye.
+    matrix(aspect) {
+        const [eye, z] = this.eye, x = unit(cross(this.up, z)), y = cross(z, x);
+        const f = 1 / Math.tan(FIELD / 2), near = this.camera.distance / 50, far = this.camera.distance * 40;
+        const view = new Float32Array([x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -inner(x, eye), -inner(y, eye), -inner(z, eye), 1]);
+        const lens = new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0]);
+        return { all: product(lens, view), x, y, z, f };
+    }
+
+    invalidate() {
+        if (this.waiting) return;
+        this.waiting = requestAnimationFrame(() => {
+            this.waiting = 0;
+            this.draw(false);
+            clearTimeout(this.later);
+            if (this.renderer.software) this.later = setTimeout(() => this.draw(true), 250);
+        });
+    }
+
+    draw(fine) {
+        const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+        this.renderer.begin(fine, dark ? [0.09, 0.1, 0.12] : [0.985, 0.985, 0.98]);
+        const many = this.scenes.length, { canvas } = this, aspect = canvas.width / many / canvas.height;
+        this.lens = this.matrix(aspect);
+        const light = unit(add(add(this.lens.z, this.lens.x, -0.5), this.lens.y, 0.9));
+        this.scenes.forEach((scene, k) => {
+            this.renderer.part(k, many, this.lens.all, light);
+            this.drawScene(scene, dark);
+        });
+        this.frames++;
+        this.after();
+    }
+
+    drawScene(scene, dark) {
+        const { source, data } = scene, { renderer, library } = this, unitScale = [1, 1, 1];
+        scene.picks = [];
+        if (scene.floor) {
+            const place = add(this.home.target, this.up, this.floor - inner(this.home.target, this.up));
+            if (!data.water) renderer.draw(scene.floor, placed(this.ahead, this.side, this.up, place, unitScale), unitScale,
+                dark ? [0.25, 0.27, 0.3] : [0.86, 0.87, 0.89], 1, 2);
+        }
+        for (const item of scene.items) if (!item.layer || (this.layers[item.layer] && item.kind !== "ellipsoid")) this.drawItem(scene, item);
+        for (const mesh of scene.meshes) this.drawMesh(scene, mesh);
+        if (this.layers.frames) for (let k = 0; k < source.bodies; k++) AXES.forEach(([name, color], i) => {
+            const e = [0, 0, 0];
+            e[i] = 0.13 * this.length;
+            this.rod(scene, source.world(k, 0, 0, 0), source.world(k, ...e), [0.005 * this.length, 0.005 * this.length], colorOf(color),
+                `${name} axis of ${data.bodies[k]}`);
+        });
+        if (this.layers.forces && source.force) this.drawForces(scene);
+        this.drawTrails(scene);
+        if (this.layers.inertia) for (const item of scene.items) if (item.kind === "ellipsoid") this.drawItem(scene, item);
+        if (data.water) {
+            const w = data.water, r = 4 * this.radius, [x, y] = this.home.target;
+            const [[x0, y0], [x1, y1]] = w.reach || [[x - r, y - r], [x + r, y + r]];
+            renderer.draw(library.box, placed([1, 0, 0], [0, 1, 0], [0, 0, 1], [(x0 + x1) / 2, (y0 + y1) / 2, w.level],
+                [(x1 - x0) / 2, (y1 - y0) / 2, 1e-4 * this.length]), unitScale, colorOf(w.color), 1, 2, 0.4);
+        }
+    }
+
+    rod(scene, a, b, radii, color, name, mesh = "rod") {
+        const way = minus(b, a), long = size(way);
+        if (!(long > 1e-9 * this.length)) return;
+        const z = times(way, 1 / long), [x, y] = across(z), stretch = [radii[0], radii[0], long];
+        this.renderer.draw(this.library[mesh], placed(x, y, z, a, stretch), stretch, color, mesh === "rod" ? radii[1] / radii[0] : 1);
+        if (name) scene.picks.push({ a, b, radius: Math.max(...radii), name });
+    }
+
+    drawItem(scene, item) {
+        const before = scene.picks.length;
+        this.drawSolid(scene, item);
+        for (const pick of scene.picks.slice(before)) pick.joint = item.axis !== undefined && item.kind !== "disc";
+    }
+
+    drawSolid(scene, item) {
+        const { source } = scene, { kind, size: s, color, name } = item, a = source.at(item.ends[0]);
+        const solid = (mesh, x, y, z, stretch, alpha = 1) => {
+            this.renderer.draw(this.library[mesh], placed(x, y, z, a, stretch), stretch, color, 1, 0, alpha);
+            scene.picks.push({ a, b: a, radius: Math.max(...stretch), name });
+        };
+        const X = [1, 0, 0], Y = [0, 1, 0], Z = [0, 0, 1];
+        if (kind === "ball") solid("ball", X, Y, Z, [s[0], s[0], s[0]]);
+        else if (kind === "pin" || kind === "disc") {
+            const n = source.axis(item.axis);
+            this.rod(scene, add(a, n, -s[1]), add(a, n, s[1]), [s[0], s[0]], color, name);
+        } else if (kind === "block") {
+            const n = unit(source.axis(item.axis)), [x, y] = this.planar ? [cross([0, 0, 1], n), [0, 0, 1]] : across(n);
+            solid("box", x, y, n, s);
+        } else if (kind === "box" || kind === "ellipsoid") {
+            const [x, y, z] = [0, 1, 2].map(k => source.world(item.ends[0][0], item.turn[k], item.turn[3 + k], item.turn[6 + k], true));
+            solid(kind === "box" ? "box" : "ball", x, y, z, s, kind === "box" ? 1 : 0.35);
+        } else if (kind === "stand") {
+            const down = times(this.up, -1);
+            this.rod(scene, add(a, down, s[1]), a, [s[0], 0.25 * s[0]], color, name);
+        } else {
+            const b = source.at(item.ends[1]);
+            if (kind === "rod") this.rod(scene, a, b, s, color, name);
+            else if (kind === "thread") {
+                const [eye] = this.eye, r = Math.max(s[0], 0.0012 * size(minus(eye, a)));
+                this.rod(scene, a, b, [r, r], color, name);
+            } else {
+                if (kind !== "damper") this.rod(scene, a, b, [s[0], s[0]], color, name, "spring");
+                if (kind !== "spring") {
+                    const middle = times(add(a, b), 0.5), r = kind === "both" ? 0.5 * s[0] : s[0];
+                    this.rod(scene, a, middle, [0.8 * r, 0.8 * r], color, name);
+                    this.rod(scene, middle, b, [0.4 * r, 0.4 * r], color, name);
+                }
+            }
+        }
+    }
+
+    drawMesh(scene, mesh) {
+        const { source } = scene, k = mesh.body;
+        if (mesh.bend) this.bend(mesh, source);
+        const o = source.world(k, 0, 0, 0), [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(e => source.world(k, ...e, true));
+        this.renderer.draw(mesh.made, placed(x, y, z, o, [1, 1, 1]), [1, 1, 1], mesh.color, 1, 1);
+        let far = 0;
+        for (let v = 0; v < mesh.own.length; v += 6) {
+            const d = Math.abs(mesh.own[v] - mesh.own[0]) + Math.abs(mesh.own[v + 1] - mesh.own[1]) + Math.abs(mesh.own[v + 2] - mesh.own[2]);
+            if (d > far) [far, mesh.far] = [d, v];
+        }
+        const end = v => source.world(k, mesh.own[v], mesh.own[v + 1], mesh.own[v + 2]);
+        scene.picks.push({ a: end(0), b: end(mesh.far || 0), radius: 0.01 * this.length, name: mesh.name });
+    }
+
+    // Displacements to second order in the elastic coordinates.
+    bend(mesh, source) {
+        const { station, shapes, second, eta } = mesh.bend, e = eta.map(name => source.eta[name] || 0), m = e.length;
+        const n = shapes[0].length, moved = new Float64Array(3 * n);
+        for (let s = 0; s < n; s++) for (let i = 0; i < 3; i++) {
+            let d = 0;
+            for (let a = 0; a < m; a++) {
+                d += shapes[i * m + a][s] * e[a];
+                for (let b = 0; b < m; b++) d += 0.5 * second[(i * m + a) * m + b][s] * e[a] * e[b];
+            }
+            moved[3 * s + i] = d;
+        }
+        station.forEach((s, v) => { for (let i = 0; i < 3; i++) mesh.vertices[6 * v + i] = mesh.own[6 * v + i] + moved[3 * s + i]; });
+        this.renderer.change(mesh.made, mesh.vertices);
+    }
+
+    drawForces(scene) {
+        const { source, data } = scene, scale = 0.35 * this.length * this.forceScale / (data.forces.largest || 1), color = colorOf("#B45309");
+        data.forces.joints.forEach((name, j) => {
+            const f = source.force.slice(3 * j, 3 * j + 3), n = size(f);
+            if (n * scale < 0.01 * this.length) return;
+            const a = source.at(2 * j + 1), b = add(a, f, scale), r = 0.007 * this.length, head = Math.min(5 * r / (n * scale), 0.5);
+            const neck = add(b, f, -scale * head);
+            this.rod(scene, a, neck, [r, r], color, `force of ${name}: ${n.toPrecision(4)} N`);
+            this.rod(scene, neck, b, [2.4 * r, 0.01 * r], color);
+        });
+    }
+
+    drawTrails(scene) {
+        const { source, data } = scene;
+        for (let k = 0; k < source.bodies; k++) {
+            if (this.trail !== -1 && this.trail !== k) continue;
+            scene.trails[k] ||= this.trailOf(scene, k);
+            const one = [1, 1, 1];
+            this.renderer.draw(scene.trails[k], placed([1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0], one), one,
+                colorOf(data.palette[k % data.palette.length]), 1, 2);
+        }
+    }
+
+    // The way of a centre of mass through the whole motion.
+    trailOf(scene, body) {
+        const { source, data } = scene, now = source.time, points = [], point = 2 * data.joints.length + body;
+        const stride = Math.max(1, Math.ceil(source.t.length / 4000));
+        for (let k = 0; k < source.t.length; k += stride) {
+            source.seek(source.t[k]);
+            points.push(...source.at(point), 0, 0, 1);
+        }
+        source.seek(now);
+        const mesh = this.renderer.mesh(new Float32Array(points), null);
+        mesh.strip = true;
+        return mesh;
+    }
+
+    // Place on the canvas, in its own pixels, and depth; null behind the eye.
+    project(p, which = 0) {
+        const m = this.lens.all, w = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
+        if (w <= 0) return null;
+        const x = (m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12]) / w, y = (m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13]) / w;
+        const wide = this.canvas.clientWidth / this.scenes.length;
+        return [which * wide + (x + 1) / 2 * wide, (1 - y) / 2 * this.canvas.clientHeight, w];
+    }
+
+    // What is nearest to the eye under a place on the canvas.
+    pick(x, y) {
+        const which = Math.min(this.scenes.length - 1, Math.floor(x / this.canvas.clientWidth * this.scenes.length));
+        let best = null, depth = Infinity;
+        for (const { a, b, radius, name, joint } of this.scenes[which].picks || []) {
+            const p = this.project(a, which), q = this.project(b, which);
+            if (!p || !q) continue;
+            const d = [q[0] - p[0], q[1] - p[1]], long = d[0] * d[0] + d[1] * d[1];
+            const s = long > 0 ? Math.max(0, Math.min(1, ((x - p[0]) * d[0] + (y - p[1]) * d[1]) / long)) : 0;
+            const w = p[2] + (q[2] - p[2]) * s, wide = radius * this.lens.f / w * this.canvas.clientHeight / 2;
+            if (Math.hypot(x - p[0] - s * d[0], y - p[1] - s * d[1]) <= Math.max(wide, 5)) {
+                // A joint inside of its links is named before them.
+                const behind = joint ? w - 3 * radius : w;
+                if (behind < depth) [best, depth] = [name, behind];
+            }
+        }
+        return best;
+    }
+
+    turn(dx, dy) {
+        this.camera.azimuth -= dx;
+        this.camera.elevation = Math.max(-1.5, Math.min(1.5, this.camera.elevation + dy));
+        this.invalidate();
+    }
+
+    zoom(factor) {
+        this.camera.distance = Math.max(0.02 * this.home.distance, Math.min(20 * this.home.distance, this.camera.distance * factor));
+        this.invalidate();
+    }
+
+    pan(dx, dy) {
+        const s = this.camera.distance * Math.tan(FIELD / 2) * 2 / this.canvas.clientHeight;
+        this.camera.target = add(add(this.camera.target, this.lens.x, -dx * s), this.lens.y, dy * s);
+        this.invalidate();
+    }
+
+    reset() {
+        this.setFollow(-1);
+        this.fit();
+        this.invalidate();
+    }
+}

@@ -1,0 +1,334 @@
+"""Pages with mechanisms and motions, opened in a browser: what they draw, compute, ask for and can be used with."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.runtime.solutions.solution import Solution
+from symdyn.viewer import View
+from tests.helpers import browser
+
+pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as opened:
+        yield opened
+
+
+class Opened:
+    """A page from the disk; what it asks for and says is a failure."""
+
+    def __init__(self, chromium: Any, path: Path, wide: int = 1280, high: int = 800, dark: bool = False) -> None:
+        self.said: list[str] = []
+        self.page = chromium.new_page(viewport={"width": wide, "height": high}, color_scheme="dark" if dark else "light")
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("console", lambda message: self.said.append(message.text))
+        own = (path.as_uri(), "data:")
+        self.page.on("request", lambda request: request.url.startswith(own) or self.said.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_function("window.symdyn && symdyn.stage.frames > 0", timeout=20_000)
+
+    def __enter__(self) -> Opened:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.page.close()
+        if error[0] is None:
+            assert self.said == []
+
+    def pixels(self) -> np.ndarray:
+        """The picture as the last frame has it, (n, 4)."""
+        found = self.page.evaluate("""() => { const s = symdyn.stage, gl = s.renderer.gl; s.draw(false);
+            const p = new Uint8Array(4 * s.canvas.width * s.canvas.height);
+            gl.readPixels(0, 0, s.canvas.width, s.canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+            let text = ""; for (let k = 0; k < p.length; k += 4096) text += String.fromCharCode(...p.subarray(k, k + 4096));
+            return btoa(text); }""")
+        return np.frombuffer(base64.b64decode(found), np.uint8).reshape(-1, 4)
+
+    def slide(self, name: str, value: float) -> None:
+        """Move a slider as its user does."""
+        self.page.evaluate("""([name, value]) => { const s = document.querySelector(`input[data-name="${name}"]`);
+            s.step = "any"; s.value = value; s.dispatchEvent(new Event("input")); }""", [name, value])
+
+
+@pytest.fixture(scope="module")
+def arm() -> Solution:
+    return sd.systems.two_link_arm().compile(backend="numpy").simulate((0, 3))
+
+
+# -- the mechanism
+
+
+@pytest.mark.parametrize("name", ["two_link_arm", "four_bar", "puma560"])
+def test_a_mechanism_is_drawn_and_a_slider_moves_it(name: str, chromium: Any, tmp_path: Path) -> None:
+    system = sd.systems.get(name)
+    view = system.show(tmp_path / "view.html")
+    assert isinstance(view, View) and view.path == tmp_path / "view.html" and len(view.html) < 3e6
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        before = opened.pixels()
+        assert len(np.unique(before[:, :3], axis=0)) > 50
+        assert (before[:, :3] != before[0, :3]).any(axis=1).mean() > 0.01
+        first = opened.page.evaluate("symdyn.scenes[0].data.sliders[0]")
+        opened.slide(first["name"], first["value"] + 0.5)
+        assert (opened.pixels() != before).any(axis=1).mean() > 0.005
+
+
+@pytest.mark.parametrize("name", ["two_link_arm", "puma560", "floating_wind_turbine", "four_bar"])
+def test_kinematics_of_the_page_are_those_of_the_module(name: str, chromium: Any, tmp_path: Path) -> None:
+    system = sd.systems.get(name)
+    system.show(tmp_path / "view.html")
+    module = system.compile()
+    rng = np.random.default_rng(4)
+    p = module.parameters() * rng.uniform(0.9, 1.1, len(module.metadata.parameters))
+    functions = [f for f in ("frames", "positions", "joint_points", "joint_axes") if f in module.functions]
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        for _ in range(3):
+            q = rng.uniform(-1.5, 1.5, module.metadata.sizes.q)
+            found = opened.page.evaluate("""([names, q, p]) => { const f = symdyn.scenes[0].source.functions;
+                const at = { q, p, inputs: [], u: [], t: 0 }; at.c = f.prologue(at);
+                return names.map(n => f[n](at)); }""", [functions, q.tolist(), p.tolist()])
+            x = np.concatenate([q, np.zeros(module.metadata.sizes.x - len(q))])
+            inputs = np.zeros(module.metadata.sizes.inputs)
+            for function, values in zip(functions, found, strict=True):
+                wanted = module.evaluate(function, 0.0, x, p, inputs).ravel()
+                np.testing.assert_allclose(values, wanted, rtol=0, atol=1e-13 * max(1.0, np.abs(wanted).max()))
+
+
+def test_loops_stay_closed(chromium: Any, tmp_path: Path) -> None:
+    """Dependent coordinates follow the one that is moved; where the loop cannot close, all stays."""
+    system = sd.systems.four_bar()
+    system.show(tmp_path / "view.html")
+    module = system.compile(backend="numpy")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        for name, value in (("q1", 1.6), ("q1", 0.7), ("l2", 2.2)):
+            opened.slide(name, value)
+            values = opened.page.evaluate("symdyn.scenes[0].source.values")
+            order = module.metadata.q if name in module.metadata.q else module.metadata.parameters
+            assert values["q" if name in module.metadata.q else "p"][order.index(name)] == pytest.approx(value, abs=1e-12)
+            x = np.concatenate([values["q"], np.zeros(module.metadata.sizes.u)])
+            assert np.abs(module.evaluate("C", 0.0, x, np.array(values["p"]), np.zeros(0))).max() < 1e-9
+        q = opened.page.evaluate("symdyn.scenes[0].source.values.q")
+        opened.slide("l2", 30.0)
+        assert "cannot be closed" in opened.page.text_content("#note")
+        np.testing.assert_allclose(opened.page.evaluate("symdyn.scenes[0].source.values.q"), q)
+
+
+def test_euler_parameters_keep_unit_length(chromium: Any, tmp_path: Path) -> None:
+    system = sd.System("top", gravity=[0, 0, -9.81])
+    body = system.add_body("body", mass=1, inertia=[0.1, 0.2, 0.3])
+    system.add_joint(sd.Free("free", system.ground, body, orientation=sd.EulerParameters()))
+    system.show(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        name = opened.page.evaluate("symdyn.scenes[0].data.sliders[symdyn.scenes[0].data.unit_groups[0][1]].name")
+        opened.slide(name, 0.6)
+        q = np.array(opened.page.evaluate("symdyn.scenes[0].source.values.q"))
+        group = opened.page.evaluate("symdyn.scenes[0].data.unit_groups[0]")
+        assert q[group[1]] == 0.6 and np.linalg.norm(q[group]) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_names_under_the_pointer(chromium: Any, tmp_path: Path) -> None:
+    sd.systems.two_link_arm().show(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        found = set()
+        for point in ("0.5 * (p[0] + p[3])", "p[3]", "p[0]"):
+            box = opened.page.locator("#canvas").bounding_box()
+            x, y, _ = opened.page.evaluate(f"""() => {{ const s = symdyn.scenes[0].source, e = k => {{
+                const p = [s.points[k], 0, 0, s.points[6 + k]]; return {point}; }};
+                return symdyn.stage.project([e(0), e(1), e(2)]); }}""")
+            opened.page.mouse.move(box["x"] + x, box["y"] + y)
+            found.add(opened.page.text_content("#tip"))
+        assert found == {"link1", "elbow (revolute)", "shoulder (revolute)"}
+
+
+# -- the motion
+
+
+def test_a_motion_plays_and_is_scrubbed(arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    arm.view(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        before = opened.pixels()
+        opened.slide("t", 1.234)
+        assert (opened.pixels() != before).any(axis=1).mean() > 0.001
+        found = np.array(opened.page.evaluate("Array.from(symdyn.scenes[0].source.points)")).reshape(-1, 3)
+        n_j = len(arm.module.metadata.reactions)
+        x = arm(1.234)
+        wanted = arm.module.evaluate("positions", 1.234, x, arm.params, np.zeros(arm.module.metadata.sizes.inputs)).reshape(-1, 3)
+        np.testing.assert_allclose(found[2 * n_j:2 * n_j + 2], wanted, atol=3e-3)
+        assert opened.page.evaluate("document.querySelector('.cursor').style.transform") != ""
+        opened.page.click("button.play")
+        opened.page.wait_for_function("symdyn.scenes[0].source.time > 1.3", timeout=20_000)
+        opened.page.click("button.play")
+        assert opened.page.get_attribute("button.play", "aria-label") == "Play"
+
+
+def test_follow_trail_and_comparison(arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    other = arm.module.simulate((0, 2), q=[0.0, 0.1])
+    arm.view(tmp_path / "view.html", compare=other, forces=True)
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        before = opened.pixels()
+        opened.page.select_option("#tools .choice >> nth=1 >> select", "-1")
+        trails = opened.pixels()
+        assert (trails != before).any(axis=1).sum() > 100
+        opened.page.select_option("#tools .choice >> nth=0 >> select", "1")
+        start = opened.page.evaluate("symdyn.stage.target")
+        opened.slide("t", 1.0)
+        moved = np.subtract(opened.page.evaluate("symdyn.stage.target"), start)
+        body = arm.module.metadata.bodies.index("link2")
+        way = arm(1.0)
+        idle = np.zeros(arm.module.metadata.sizes.inputs)
+        frames = [arm.module.evaluate("frames", t, x, arm.params, idle).reshape(-1, 12)[body, :3]
+                  for t, x in ((0.0, arm.x[0]), (1.0, way))]
+        np.testing.assert_allclose(moved, frames[1] - frames[0], atol=3e-3)
+        force = np.array(opened.page.evaluate("symdyn.scenes[0].source.force")).reshape(-1, 3)
+        k = int(np.abs(arm.t - 1.0).argmin())
+        wanted = arm.reactions["shoulder"]
+        np.testing.assert_allclose(force[0], wanted[k, :3], atol=0.01 * np.abs(wanted).max())
+
+
+def test_thinning_keeps_what_the_eye_sees(arm: Solution) -> None:
+    from symdyn.viewer.recorded import _error, _quaternions, _rows
+
+    frames = arm.frames.reshape(len(arm.t), -1, 12)
+    rows = _rows(arm.t, frames, 1.0)
+    assert len(rows) < len(arm.t) / 2 and _error(arm.t, frames, rows, 1.0) <= 1.0
+    q = _quaternions(frames[..., 3:].reshape(*frames.shape[:2], 3, 3))
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    np.testing.assert_allclose(1 - 2 * (y * y + z * z), frames[..., 3], atol=1e-12)
+    np.testing.assert_allclose(2 * (x * y + w * z), frames[..., 6], atol=1e-12)
+
+
+def test_ten_minutes_of_the_turbine() -> None:
+    motion = sd.systems.floating_wind_turbine().compile().simulate((0, 600), q={"azimuth": 0.5}, u={"azimuth_dot": 1.2})
+    assert len(motion.view().html) < 8e6
+
+
+# -- the page as a page
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("wide", [1280, 400])
+def test_nothing_is_wider_than_its_box(wide: int, dark: bool, arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    arm.view(tmp_path / "motion.html")
+    sd.systems.puma560().show(tmp_path / "mechanism.html")
+    for name in ("motion.html", "mechanism.html"):
+        with Opened(chromium, tmp_path / name, wide, dark=dark) as opened:
+            wider = opened.page.evaluate("""() => [...document.querySelectorAll("body, body *")].filter(e =>
+                e.getBoundingClientRect().right > innerWidth + 1 || (e.scrollWidth > e.clientWidth + 1 && e.clientWidth
+                && getComputedStyle(e).display !== "inline" && !["SELECT", "CANVAS", "VAR"].includes(e.tagName)))
+                .map(e => e.tagName + "." + e.className)""")
+            assert wider == []
+            assert opened.page.evaluate(CONTRAST) == []
+
+
+# Text with less contrast to what is behind it than WCAG 2.2 AA asks for, 4.5.
+CONTRAST = """() => {
+    const channel = v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const parse = text => text.match(/[\\d.]+/g).map(Number);
+    const light = c => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
+    const behind = e => { for (; e; e = e.parentElement) { const c = parse(getComputedStyle(e).backgroundColor);
+        if (c.length < 4 || c[3] > 0.99) return c; } return [255, 255, 255]; };
+    return [...document.querySelectorAll("body *")].filter(e => e.checkVisibility() && [...e.childNodes].some(
+        n => n.nodeType === 3 && n.textContent.trim()) && !["SCRIPT", "STYLE", "OPTION"].includes(e.tagName)).flatMap(e => {
+        const a = light(parse(getComputedStyle(e).color)), b = light(behind(e));
+        const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        return ratio < 4.5 ? [e.tagName + " " + e.textContent.slice(0, 20) + " " + ratio.toFixed(2)] : [];
+    });
+}"""
+
+
+def test_the_keyboard_reaches_every_control(arm: Solution, chromium: Any, tmp_path: Path) -> None:
+    arm.view(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        count = opened.page.evaluate("document.querySelectorAll('button, input, select, summary, [tabindex]').length")
+        reached = set()
+        for _ in range(count):
+            opened.page.keyboard.press("Tab")
+            reached.add(opened.page.evaluate("""[...document.querySelectorAll('button, input, select, summary, [tabindex]')]
+                .indexOf(document.activeElement)"""))
+        assert reached == set(range(count))
+        unnamed = opened.page.evaluate("""[...document.querySelectorAll('button, input, select, canvas')].filter(e =>
+            !e.getAttribute("aria-label") && !(e.labels && e.labels.length)).map(e => e.outerHTML)""")
+        assert unnamed == []
+        opened.page.focus("#canvas")
+        before = opened.page.evaluate("symdyn.stage.camera")
+        for key in ("ArrowLeft", "ArrowUp", "+"):
+            opened.page.keyboard.press(key)
+        after = opened.page.evaluate("symdyn.stage.camera")
+        assert all(after[k] != before[k] for k in ("azimuth", "elevation", "distance"))
+        opened.page.keyboard.press("Home")
+        assert opened.page.evaluate("symdyn.stage.camera.azimuth") == before["azimuth"]
+
+
+def test_a_notebook_shows_the_page(chromium: Any, tmp_path: Path) -> None:
+    view = sd.systems.pendulum().show()
+    text = view._repr_html_()
+    assert re.match(r'<iframe srcdoc="[^"]*" title="pendulum"', text)
+    page = tmp_path / "notebook.html"
+    page.write_text(f"<!doctype html><link rel=icon href='data:,'>{text}", encoding="utf-8")
+    opened = chromium.new_page()
+    said: list[str] = []
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.goto(page.as_uri())
+    frame = opened.frames[1]
+    frame.wait_for_function("window.symdyn && symdyn.stage.frames > 0", timeout=20_000)
+    assert said == []
+    opened.close()
+
+
+# -- what cannot be shown
+
+
+def test_what_cannot_be_shown(arm: Solution, tmp_path: Path) -> None:
+    with pytest.raises(sd.ModelError, match="the system has no bodies; add one with add_body"):
+        sd.System("empty").show()
+    with pytest.raises(sd.ArgumentError, match=r"cannot write the view to arm\.txt: the ending must be \.html"):
+        arm.view(tmp_path / "arm.txt")
+    with pytest.raises(sd.ArgumentError, match="two_link_arm: compare is 3; pass another solution"):
+        arm.view(compare=3)  # type: ignore[arg-type]
+    with pytest.raises(sd.ArgumentError, match="two_link_arm: forces is 'all'; pass True or False"):
+        arm.view(forces="all")  # type: ignore[arg-type]
+    with pytest.raises(sd.ArgumentError, match="params: there is no 'k'; there are g, m, l"):
+        sd.systems.pendulum().show(params={"k": 3})
+    q, k = sd.coordinates("q"), sd.parameters("k")
+    system = sd.System("far")
+    body = system.add_body("body", mass=1)
+    system.add_joint(sd.Prismatic("rail", system.ground, body, coordinate=q, parent_point=[1 / k, 0, 0]))
+    with pytest.raises(sd.ArgumentError, match=r"are not finite at the coordinates and parameters to be shown; pass others"):
+        system.show(params={k: 0.0})
+
+
+def test_parameters_without_a_number_are_noted(chromium: Any, tmp_path: Path) -> None:
+    q, m, length = sd.coordinates("q"), *sd.parameters("m l")
+    system = sd.System("bare", gravity=[0, -9.81])
+    bob = system.add_body("bob", mass=m, com=[0, -length])
+    system.add_joint(sd.Revolute("pin", system.ground, bob, coordinate=q))
+    system.show(tmp_path / "view.html")
+    with Opened(chromium, tmp_path / "view.html") as opened:
+        assert opened.page.text_content("#note") == "No value is known of m, l: 1 is shown."
+        opened.slide("l", 2.0)
+        centre = opened.page.evaluate("Array.from(symdyn.scenes[0].source.points).slice(6, 9)")
+        np.testing.assert_allclose(centre, [0, -2, 0], atol=1e-12)
+
+
+def test_a_motion_without_finite_positions(arm: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = arm.rows
+
+    def broken(name: str) -> np.ndarray:
+        found = rows(name).copy()
+        if name == "frames":
+            found[7] = np.nan
+        return found
+
+    monkeypatch.setattr(arm, "rows", broken, raising=False)
+    with pytest.raises(sd.ArgumentError, match=f"not finite at t = {arm.t[7]:.6g} s; end the motion before it"):
+        arm.view()
