@@ -32,6 +32,7 @@ _HOME = {
     "symdyn.formulation.by_hand.augmented": ("augmented",),
     "symdyn.exact.prove": ("prove",),
     "symdyn.overview.page": ("full_report",),
+    "symdyn.viewer.page": ("View",),
     "symdyn.report.latex": ("latex",),
     "symdyn.flexible.beam": ("Beam",),
     "symdyn.flexible.shape": ("Shape",),

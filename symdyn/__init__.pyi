@@ -234,6 +234,7 @@ from symdyn.runtime.losses import Loss as Loss
 from symdyn.sympy_mechanics.border import from_sympy as from_sympy
 from symdyn.sympy_mechanics.system import from_system as from_system
 from symdyn.urdf.read import read_urdf as read_urdf
+from symdyn.viewer.page import View as View
 
 __version__: str
 t: Symbol

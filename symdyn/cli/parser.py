@@ -20,6 +20,7 @@ from symdyn.cli.simulate import simulate
 from symdyn.cli.stress import stress
 from symdyn.cli.sweep import sweep
 from symdyn.cli.values import path, stabilization
+from symdyn.cli.view import view
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -55,6 +56,8 @@ def make_parser() -> argparse.ArgumentParser:
                                     "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
+    _add_view(formulation(command("view", view, "look at a mechanism with a slider for every coordinate, or at its motion: one "
+                                  "HTML page, which is opened in the browser")))
     _add_sweep(command("sweep", sweep, "simulate many samples of parameters and initial states, as a TOML file describes",
                        system=False))
     proof = command("report", report, "what is generated, what is skipped and why, operation counts, and a proof by "
@@ -116,6 +119,18 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--gif", action="store_true", help="save an animation too")
     parser.add_argument("--report", metavar="FILE", type=path, help="write a report of the run: one HTML file, no network needed")
     parser.add_argument("--progress", action="store_true", help="show a bar (needs tqdm)")
+    _add_output(parser)
+
+
+def _add_view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--motion", action="store_true", help="simulate, and play the motion")
+    parser.add_argument("--t", metavar="TIME", nargs="+", type=float, help="with --motion, END or START END, s (default: the "
+                        "system's)")
+    parser.add_argument("--forces", action="store_true", help="with --motion, forces in the joints as arrows")
+    for flag, what in (("--set", "parameters, such as m1=2.0"), ("--q", "initial coordinates, such as q1=0.1")):
+        parser.add_argument(flag, metavar="NAME=NUMBER", nargs="+", action="extend", default=[], help=what)
+    parser.add_argument("--backend", choices=("c", "numpy"), help="default: c if there is a compiler, else numpy")
+    parser.add_argument("--no-browser", action="store_true", help="write the page only")
     _add_output(parser)
 
 

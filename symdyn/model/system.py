@@ -13,7 +13,7 @@ import numpy as np
 import sympy as sp
 
 from symdyn.counting import counted
-from symdyn.errors import ModelError
+from symdyn.errors import MissingExtra, ModelError
 from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
@@ -703,6 +703,14 @@ class System:
         parts += [counted(len(things), one) for things, one in ((self.loops, "loop closure"), (self.constraints, "constraint"))
                   if things]
         return f"System({shown(self.name)}, {', '.join(parts)})"
+
+    def _repr_html_(self) -> str | None:
+        """A small picture and tables, in a notebook; the text of `repr` without matplotlib."""
+        try:
+            from symdyn.viewer.summary import summary_of
+        except MissingExtra:
+            return None
+        return summary_of(self)
 
     def set_defaults(self, defaults: Numbers) -> System:
         """Add numbers for parameters; returns the system.

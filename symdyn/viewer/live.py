@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from symdyn.arguments import take
 from symdyn.emission import emit
 from symdyn.errors import ArgumentError, SymdynError
 from symdyn.formulation.equations import Equations
+from symdyn.formulation.trees.embedding import embed
 from symdyn.pictures.bending import bent_bodies
 from symdyn.pictures.jointed import carriers
 from symdyn.tape.floats import evaluate_rows
@@ -21,6 +23,7 @@ from symdyn.viewer.scene import scene_of
 
 if TYPE_CHECKING:
     from symdyn.given import Numbers, Values
+    from symdyn.model.record import Model
     from symdyn.model.system import System
 
 # What the page evaluates to place what is drawn, and to close loops.
@@ -44,6 +47,14 @@ def show(system: System, path: Any = None, params: Numbers | None = None, q: Val
              "holonomic": list(equations.holonomic), "unit_groups": _groups(equations),
              "sliders": _sliders(equations, values, [*names, *(_CLOSURE if closes else ())], data["length"])}
     return page_of(model.name, data, _functions(equations, [*names, *(_CLOSURE if closes else ())]), path)
+
+
+def mechanism_of(model: Model) -> tuple[Mechanism, np.ndarray]:
+    """The mechanism of a model at its initial coordinates, its loops as they are there, and the lengths of its shapes."""
+    equations = embed(replace(model, loops=(), constraints=()))
+    values, _ = _values(equations, None, None)
+    numbers = _evaluate(equations, [n for n in _POSES if n in equations.quantities], values)
+    return _mechanism(equations, numbers), numbers.get("drawn_lengths", np.zeros(0)).ravel()
 
 
 def _values(equations: Equations, params: Any, q: Any) -> tuple[dict[str, float], list[str]]:

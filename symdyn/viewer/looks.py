@@ -84,6 +84,20 @@ class Mechanism:
             return point
         return np.asarray(self.frames[body, 3:].reshape(3, 3).T @ (point - self.frames[body, :3]))
 
+    def at(self, ref: Ref) -> np.ndarray:
+        """The point of the n-frame that is referred to."""
+        if isinstance(ref, int):
+            return np.asarray(self.points[ref])
+        if ref[0] == "off":
+            return np.asarray(self.at(ref[1]) + ref[3] * self.joint_axes[ref[2]])
+        if ref[0] == "foot":
+            a, n = self.at(ref[1]), self.joint_axes[ref[3]]
+            return np.asarray(a + n * (n @ (self.at(ref[2]) - a)))
+        body, *place = ref
+        if body == GROUND:
+            return np.array(place, dtype=float)
+        return np.asarray(self.frames[body, :3] + self.frames[body, 3:].reshape(3, 3) @ place)
+
     def centre(self, body: int) -> np.ndarray:
         return self.local(body, self.centres[body])
 

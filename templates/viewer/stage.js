@@ -44,7 +44,10 @@ class Stage {
         const found = [];
         const { source } = scene;
         for (const item of scene.items) if (!item.layer && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
-            for (const end of item.ends) found.push(source.at(end));
+            for (const end of item.ends) {
+                const p = source.at(end), r = item.ends.length > 1 ? 0 : Math.max(...item.size);
+                for (const e of [[r, r, r], [-r, -r, -r], [r, -r, r], [-r, r, -r]]) found.push(add(p, e));
+            }
         for (const mesh of scene.meshes) for (let k = 0; k < mesh.own.length; k += 6)
             found.push(source.world(mesh.body, mesh.own[k], mesh.own[k + 1], mesh.own[k + 2]));
         for (let k = 0; k < source.bodies; k++) found.push(source.world(k, 0, 0, 0));

@@ -7,11 +7,13 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import symdyn as sd
+from symdyn.cli import main
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.viewer import View
 from tests.helpers import browser
@@ -208,8 +210,10 @@ def test_thinning_keeps_what_the_eye_sees(arm: Solution) -> None:
 
 
 def test_ten_minutes_of_the_turbine() -> None:
-    motion = sd.systems.floating_wind_turbine().compile().simulate((0, 600), q={"azimuth": 0.5}, u={"azimuth_dot": 1.2})
-    assert len(motion.view().html) < 8e6
+    """Twenty stored times a second, its rotor turning."""
+    module = sd.systems.floating_wind_turbine().compile()
+    motion = module.simulate(np.linspace(0, 600, 12_001), u={"azimuth_dot": 1.2})
+    assert len(motion.t) == 12_001 and len(motion.view().html) < 8e6
 
 
 # -- the page as a page
@@ -283,6 +287,45 @@ def test_a_notebook_shows_the_page(chromium: Any, tmp_path: Path) -> None:
     frame.wait_for_function("window.symdyn && symdyn.stage.frames > 0", timeout=20_000)
     assert said == []
     opened.close()
+
+
+# -- a System in a notebook, and the command line
+
+
+@pytest.mark.parametrize("name", ["two_link_arm", "flyball_governor", "stewart_platform"])
+def test_a_system_shows_a_picture_and_tables(name: str) -> None:
+    system = sd.systems.get(name)
+    text = system._repr_html_()
+    assert text is not None
+    svg = re.search(r"<svg .*?</svg>", text)
+    assert svg is not None
+    ElementTree.fromstring(svg[0])
+    places = np.array([float(v) for points in re.findall(r'(?:polygon|polyline) points="([^"]*)"', svg[0])
+                       for v in re.split("[ ,]", points)]).reshape(-1, 2)
+    assert len(places) > 10 and np.ptp(places, axis=0).max() > 100
+    assert all(f"<td>{body.name}</td>" in text for body in system.check().bodies[:12])
+
+
+def test_a_system_with_faults_shows_them() -> None:
+    text = sd.System("empty <b>")._repr_html_()
+    assert text is not None and "the system has no bodies" in text and "&lt;b&gt;" in text
+
+
+def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda address: bool(opened.append(address)))
+    assert main(["view", "pendulum", "--output", str(tmp_path), "--q", "q1=0.4"]) == 0
+    path = tmp_path / "view.html"
+    assert opened == [path.as_uri()]
+    assert capsys.readouterr().out == f"wrote {path}\nno browser was found; open the file in one\n"
+    assert '"value":0.4' in path.read_text()
+    motion = ["--motion", "--t", "2", "--backend", "numpy", "--no-browser"]
+    assert main(["view", "pendulum", *motion, "--output", str(tmp_path)]) == 0
+    assert len(opened) == 1 and '"kind":"recorded"' in path.read_text()
+    for words, said in ((["--t", "2"], "--t and --forces go with --motion; without it the page has sliders"),
+                        (["--motion", "--t", "0", "1", "2"], "--t takes END or START END, found 3 times")):
+        assert main(["view", "pendulum", *words]) == 2
+        assert said in capsys.readouterr().err
 
 
 # -- what cannot be shown
