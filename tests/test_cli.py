@@ -518,7 +518,7 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["derive", "n_link_pendulum", "--option", "n"], "--option 'n': write name=value"),
     (["derive", "puma560", "--option", "convention=mine"], "puma560 has no convention 'mine'"),
     (["derive", "pendulum", "--quantity", "N_tilde"], "no quantity 'N_tilde'; it has"),
-    (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, numpy"),
+    (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, javascript, numpy"),
     (["generate", "pendulum", "--functions", "lhs"], "no function lhs; it has rhs"),
     (["generate", "pendulum", "--templates", "absent"], "template folder absent does not exist"),
     (["simulate", "pendulum", "--set", "mm=1"], "there is no 'mm', did you mean m?"),

@@ -204,7 +204,7 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
         off = min(_distance_to_line(centre, points[0], p) for p in points[1:])
         return items + ([sphere] if mass and not extended and off > 3 * r else [])
     if not held:
-        return [_solid(body, centre, moments, length, color, name) if extended else replace(sphere, size=(3 * r,))]
+        return [_free(body, centre, moments, length, color, name) if extended else replace(sphere, size=(3 * r,))]
     ref, start, joint = held[0]
     way = centre - start
     distance = float(np.linalg.norm(way))
@@ -212,8 +212,8 @@ def _body(m: Mechanism, body: int, r: float, length: float) -> list[Item]:
         if not extended:
             return [Item("rod", (ref, at_centre), (0.8 * r, 0.6 * r), color, name), sphere]
         along = way / distance
-        across = float(np.trace(moments) - along @ moments @ along) / 2
-        half = min(float(np.sqrt(max(3 * across, 0.0))), 1.1 * distance)
+        # Of a slender rod m l² / 12 about every axis across it; in a plane one of them is known.
+        half = min(float(np.sqrt(3 * np.linalg.eigvalsh(moments)[-1])), 1.1 * distance)
         return [Item("rod", (ref, (body, *(centre + half * along))), (r, 0.65 * r), color, name)]
     if not extended:
         slides = joint >= 0 and m.joints[joint][3] in _SLIDING
@@ -266,6 +266,20 @@ def _rods(m: Mechanism, held: Sequence[tuple[Ref, np.ndarray, int]], r: float, c
 def _distance_to_line(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     way = (b - a) / np.linalg.norm(b - a)
     return float(np.linalg.norm((point - a) - (point - a) @ way * way))
+
+
+def _free(body: int, centre: np.ndarray, moments: np.ndarray, most: float, color: str, name: str) -> Item:
+    """The ball, cylinder or box with the same moments of inertia, whichever fits their symmetry."""
+    sides, axes = _principal(moments, 1.0)
+    alike = [abs(sides[i] - sides[j]) < 0.01 * sides.max() for i, j in ((1, 2), (2, 0), (0, 1))]
+    if all(alike):
+        return Item("ball", ((body, *centre),), (float(np.sqrt(5.0) * sides[0]),), color, name)
+    if any(alike):
+        k = alike.index(True)
+        half = max(float(np.sqrt(3.0) * sides[k]), 0.02 * most) * axes[:, k]
+        radius = float(2.0 * sides[k - 1])
+        return Item("rod", ((body, *(centre - half)), (body, *(centre + half))), (radius, radius), color, name)
+    return _solid(body, centre, moments, most, color, name)
 
 
 def _solid(body: int, centre: np.ndarray, moments: np.ndarray, most: float, color: str, name: str) -> Item:

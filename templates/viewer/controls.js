@@ -12,7 +12,7 @@ const GREEK = { alpha: "α", beta: "β", gamma: "γ", delta: "δ", epsilon: "ε"
 
 // A name as it is typeset: theta_1_dot becomes θ with a dot and the index 1.
 function symbol(parent, name) {
-    const match = /^([A-Za-z]+?)_?(\d+|_[A-Za-z0-9_]+|)((?:_d?dot)?)$/.exec(name);
+    const match = /^([A-Za-z]+?)_?(\d+|(?<=_)(?!d?dot$)[A-Za-z0-9]+|)(_d?dot|)$/.exec(name);
     if (!match || !(match[1] in GREEK || match[1].length === 1)) return element(parent, "span", "symbol", name);
     const made = element(parent, "span", "symbol"), dots = match[3] === "_dot" ? "\u0307" : match[3] ? "\u0308" : "";
     element(made, "var", "", (GREEK[match[1]] || match[1]) + dots);

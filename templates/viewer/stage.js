@@ -45,7 +45,7 @@ class Stage {
         const { source } = scene;
         for (const item of scene.items) if (!item.layer && !(item.kind === "rod" && JSON.stringify(item.ends).includes("off")))
             for (const end of item.ends) {
-                const p = source.at(end), r = item.ends.length > 1 ? 0 : Math.max(...item.size);
+                const p = source.at(end), r = Math.max(...item.size) * (item.ends.length > 1 ? 0.6 : 1);
                 for (const e of [[r, r, r], [-r, -r, -r], [r, -r, r], [-r, r, -r]]) found.push(add(p, e));
             }
         for (const mesh of scene.meshes) for (let k = 0; k < mesh.own.length; k += 6)

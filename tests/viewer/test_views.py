@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from symdyn.cli import main
 from symdyn.runtime.solutions.solution import Solution
 from symdyn.viewer import View
 from tests.helpers import browser
+from tests.user_functions import HEIGHT
 
 pytest.importorskip("matplotlib")
 
@@ -348,6 +351,25 @@ def test_what_cannot_be_shown(arm: Solution, tmp_path: Path) -> None:
     system.add_joint(sd.Prismatic("rail", system.ground, body, coordinate=q, parent_point=[1 / k, 0, 0]))
     with pytest.raises(sd.ArgumentError, match=r"are not finite at the coordinates and parameters to be shown; pass others"):
         system.show(params={k: 0.0})
+
+
+def test_kinematics_that_cannot_run_in_a_page() -> None:
+    x = sd.coordinates("x")
+    system = sd.System("bead", gravity=[0, -9.81])
+    bead = system.add_body("bead", mass=1)
+    system.add_joint(sd.Planar("wire", system.ground, bead, coordinates=[x, HEIGHT(x), 0]))
+    said = r"bead: the kinematics cannot run in a page: .*; simulate it and use solution\.view"
+    with pytest.raises(sd.ArgumentError, match=said):
+        system.show()
+
+
+def test_without_matplotlib() -> None:
+    """Views say how to get it; a System falls back to its text."""
+    program = ("import sys; sys.modules['matplotlib'] = None; import symdyn; s = symdyn.systems.pendulum(); "
+               "print(s._repr_html_()); s.show()")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout == "None\n"
+    assert "MissingExtra: pictures need matplotlib: pip install 'symdyn[plot]'" in done.stderr
 
 
 def test_parameters_without_a_number_are_noted(chromium: Any, tmp_path: Path) -> None:
