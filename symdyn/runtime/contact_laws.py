@@ -1,12 +1,15 @@
 """Laws of rigid contact at one instant: which contacts open, stick or slide, with which accelerations; and what an impact does.
 
 Both are the same problem: relative velocities (of an impact) or accelerations w = b + D lam, with lam_N >= 0, w_N >= 0 and
-lam_N w_N = 0 in every contact, and friction within Coulomb's cone. It is solved exactly: each combination of modes is a system of
-linear equations, whose solution counts where it fulfils the inequalities. So all solutions are found, none or several as well
-(Painleve). Beyond MOST_COMBINATIONS, and in space, where directions of slip are unknowns as well, the first one found counts.
+lam_N w_N = 0 in every contact, and friction within Coulomb's cone. Each combination of modes is a system of linear equations,
+whose solution counts where it fulfils the inequalities. Of few contacts in a plane all combinations are solved at once: so all
+solutions are found, none or several as well (Painleve). Of more, and in space, where directions of slip are unknowns, Lemke's
+method gives the modes, in space with a cone of FACETS, which are then put right for the round one; combinations are tried one
+after the other only where that fails.
 
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, chapters 5, 8 (impacts: Newton's and Poisson's
-law); Glocker, Set-Valued Force Laws, 2001.
+law); Glocker, Set-Valued Force Laws, 2001; Stewart and Trinkle, An implicit time-stepping scheme for rigid body dynamics with
+inelastic collisions and Coulomb friction, 1996 (the complementarity problem with a cone of facets).
 """
 
 from __future__ import annotations
@@ -17,17 +20,25 @@ from itertools import islice, product
 
 import numpy as np
 
+from symdyn.runtime.complementarity import lemke
+
 OPEN, STICKING, SLIDING = "open", "sticking", "sliding"
 # Inequalities hold to this part of the sizes of what stands in them.
 NOISE = 1e-9
-# Combinations of modes that are all tried, and that are tried at most.
-MOST_COMBINATIONS, MOST_TRIED = 1024, 200_000
+# Combinations of modes that are all solved, that are tried at most in a plane and in space, and that are solved at once.
+MOST_COMBINATIONS, MOST_TRIED, MOST_TRIED_IN_SPACE, AT_ONCE = 1024, 20_000, 100, 256
+# Steps of Newton's method for directions of slip, the angle that derivatives are taken over, rad.
+STEPS, SMALL_ANGLE = 20, 1e-7
 # Accelerations that differ by more than this part of their size are different solutions.
 DIFFERENT = 1e-6
 # Singular values below this part of the largest: rows that depend on each other.
 DEPENDENT = 1e-10
 # Directions that are tried first where a contact in space begins to slide.
 DIRECTIONS = 48
+# Times that each direction is put right for the others, where all at once do not converge.
+ROUNDS = 20
+# Sides of the cone of friction in space that Lemke's method takes; covering vectors that it starts with in search of solutions.
+FACETS, COVERS = 8, 5
 
 
 @dataclass(frozen=True)
@@ -70,21 +81,38 @@ class Solved:
 
 
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
-    """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS."""
+    """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS in a plane."""
     options = [list(_options(site)) for site in sites]
-    planar = all(len(site.rows) < 3 for site in sites)
-    few = planar and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS
-    found: list[Solved] = []
-    for modes in islice(product(*options), MOST_TRIED):
-        one = _solved(D, b, sites, modes)
-        if one is None:
-            continue
+    if all(len(site.rows) < 3 for site in sites) and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS:
+        found = [one for one in _Table(D, b, sites, options).solved(list(product(*[range(len(o)) for o in options]))) if one]
+    else:
+        found = _by_lemke(D, b, sites) or _first(D, b, sites, options)
+    different: list[Solved] = []
+    for one in found:
         size = max(np.abs(one.w).max(initial=0.0), np.abs(b).max(initial=0.0))
-        if all(np.abs(one.w - other.w).max(initial=0.0) > DIFFERENT * size for other in found):
-            found.append(one)
-        if not few:
-            break
-    return sorted(found, key=lambda one: float(np.abs(one.lam).sum()))
+        if all(np.abs(one.w - other.w).max(initial=0.0) > DIFFERENT * size for other in different):
+            different.append(one)
+    return sorted(different, key=lambda one: float(np.abs(one.lam).sum()))
+
+
+def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved) -> list[int]:
+    """Sites on the border of two modes, which both give these accelerations: those that neither press nor leave, and those whose
+    friction is at its bound without slip. Those of which a mode is ruled out are there because they change it."""
+    if one.shared:
+        return []
+    size = float(np.abs(b).max(initial=0.0))
+    force = max(float(np.abs(one.lam).max(initial=0.0)), size / max(float(np.diag(D).max(initial=0.0)), 1e-300))
+    found = []
+    for place, site in enumerate(sites):
+        if site.excluded:
+            continue
+        k, tangents = site.rows[0], list(site.rows[1:])
+        pressing, slip = one.lam[k] > NOISE * force, np.linalg.norm(one.w[tangents])
+        bound = site.static * one.lam[k] - np.linalg.norm(one.lam[tangents])
+        at_bound = bool(tangents) and site.slip is None and site.static > 0 and slip <= NOISE * size and bound <= NOISE * force
+        if at_bound if pressing else abs(one.w[k]) <= NOISE * size:
+            found.append(place)
+    return found
 
 
 def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Sequence[Site], law: str) -> list[Solved]:
@@ -127,76 +155,298 @@ def _options(site: Site) -> Iterator[Mode]:
         yield Mode(OPEN, still, False)
 
 
-def _solved(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: tuple[Mode, ...]) -> Solved | None:
-    """The solution of one combination of modes; None where it breaks an inequality."""
+class _Table:
+    """Combinations of modes of contacts as systems of linear equations: the forces are lam = H x + fixed, of which the active x
+    are unknown, for each mode of each site."""
+
+    def __init__(self, D: np.ndarray, b: np.ndarray, sites: Sequence[Site], options: Sequence[Sequence[Mode]]) -> None:
+        self.D, self.b, self.sites, self.options = D, b, sites, options
+        n = len(b)
+        least = np.zeros(n)
+        for site in sites:
+            least[site.rows[0]] = site.least
+        self.size = float(max(np.abs(b).max(initial=0.0), (np.abs(D) @ least).max(initial=0.0), 1e-300))  # of w
+        self.H, self.fixed, self.active = [], [], []
+        for site, modes in zip(sites, options, strict=True):
+            k, tangents = site.rows[0], list(site.rows[1:])
+            H, fixed, active = np.zeros((len(modes), n, n)), np.zeros((len(modes), n)), np.zeros((len(modes), n), dtype=bool)
+            for i, mode in enumerate(modes):
+                column = np.zeros(n)
+                column[k] = 1.0
+                if mode.kind == SLIDING and tangents:
+                    column[tangents] = -site.kinetic * mode.direction
+                if mode.held:
+                    active[i, k] = True
+                    H[i, :, k] = column
+                elif site.least:
+                    fixed[i] = site.least * column
+                if mode.kind == STICKING:
+                    active[i, tangents] = True
+                    H[i, tangents, tangents] = 1.0
+            self.H.append(H)
+            self.fixed.append(fixed)
+            self.active.append(active)
+
+    def linear(self, chosen: np.ndarray) -> tuple[np.ndarray, ...]:
+        """lam and w (n_chosen, n) of combinations, rows of indices of the modes of each site; whether the rows that hold do hold,
+        and whether they depend on each other."""
+        each = range(len(self.sites))
+        H, fixed = (np.sum([of[k][chosen[:, k]] for k in each], axis=0) for of in (self.H, self.fixed))
+        active = np.any([self.active[k][chosen[:, k]] for k in each], axis=0)
+        free = self.b + fixed @ self.D.T
+        A, right = np.where(active[:, :, None], self.D @ H, np.eye(len(self.b))), np.where(active, -free, 0.0)
+        x, shared = _least_norm(A, right)
+        left = np.abs((A @ x[:, :, None])[:, :, 0] - right).max(axis=1)
+        exact = left <= NOISE * np.maximum(np.abs(right).max(axis=1), self.size)
+        lam = (H @ x[:, :, None])[:, :, 0] + fixed
+        w = self.b + lam @ self.D.T
+        w[active & exact[:, None]] = 0.0
+        return lam, w, exact, shared
+
+    def broken(self, chosen: np.ndarray, lam: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Which sites break an inequality, (n_chosen, n_sites)."""
+        size = self.size
+        force = np.maximum(np.abs(lam).max(axis=1, initial=0.0), size / max(np.diag(self.D).max(initial=0.0), 1e-300))
+        result = np.zeros(chosen.shape, dtype=bool)
+        for place, (site, modes) in enumerate(zip(self.sites, self.options, strict=True)):
+            k, tangents, mode = site.rows[0], list(site.rows[1:]), chosen[:, place]
+            held = np.array([m.held for m in modes])[mode]
+            result[:, place] = np.where(held, lam[:, k] < site.least - NOISE * force, w[:, k] < -NOISE * size)
+            if not tangents:
+                continue
+            sticking = np.array([m.kind == STICKING for m in modes])[mode]
+            cone = np.linalg.norm(lam[:, tangents], axis=1) > site.static * lam[:, k] + NOISE * force
+            result[:, place] |= sticking & cone
+            if site.slip is None:
+                along = (w[:, tangents] * np.array([m.direction for m in modes])[mode]).sum(axis=1)
+                sliding = np.array([m.kind == SLIDING for m in modes])[mode]
+                result[:, place] |= sliding & (along < -NOISE * size)
+        return result
+
+    def solved(self, combinations: Sequence[Sequence[int]]) -> list[Solved | None]:
+        """The solution of each combination; None where it breaks an inequality."""
+        found: list[Solved | None] = []
+        for first in range(0, len(combinations), AT_ONCE):
+            chosen = np.array(combinations[first:first + AT_ONCE], dtype=int)
+            lam, w, exact, shared = self.linear(chosen)
+            good = exact & ~self.broken(chosen, lam, w).any(axis=1)
+            found += [Solved(tuple(o[k] for o, k in zip(self.options, row, strict=True)), lam[i], w[i], bool(shared[i]))
+                      if good[i] else None for i, row in enumerate(chosen)]
+        return found
+
+
+def _least_norm(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x of least norm with A x nearest to right (m, n), and whether rows depend on each other (m,)."""
+    if not A.shape[1]:
+        return right, np.zeros(len(A), dtype=bool)
+    U, s, V = np.linalg.svd(A)
+    kept: np.ndarray = s > DEPENDENT * s[:, :1]
+    scaled = np.where(kept, (right[:, None, :] @ U)[:, 0] / np.where(kept, s, 1.0), 0.0)
+    return (scaled[:, None, :] @ V)[:, 0], np.asarray(~kept.all(axis=1))
+
+
+def _solved(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode]) -> Solved | None:
+    """The solution of one combination of modes, with the directions in which contacts in space begin to slide; None where it
+    breaks an inequality."""
     unknown = [k for k, (s, m) in enumerate(zip(sites, modes, strict=True))
                if len(s.rows) == 3 and m.kind == SLIDING and not m.direction.any()]
-    if unknown:
-        directed = _directed(D, b, sites, modes, unknown)
+    directed = _directed(D, b, sites, modes, unknown) if unknown else modes
+    return None if directed is None else _Table(D, b, sites, [[m] for m in directed]).solved([[0] * len(sites)])[0]
+
+
+def _first(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], options: Sequence[Sequence[Mode]]) -> list[Solved]:
+    """The first combination that is a solution, of as many as are tried."""
+    planar = all(len(site.rows) < 3 for site in sites)
+    for modes in islice(product(*options), MOST_TRIED if planar else MOST_TRIED_IN_SPACE):
+        one = _solved(D, b, sites, modes)
+        if one is not None:
+            return [one]
+    return []
+
+
+def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
+    """Solutions that Lemke's method comes to from different covering vectors; in space the first, for the round cone."""
+    stream = np.random.default_rng(0)
+    planar, found = all(len(site.rows) < 3 for site in sites), list[Solved]()
+    for k in range(COVERS):
+        if found and not planar:
+            break
+        weights = None if k == 0 else stream.uniform(0.1, 1.0, 64)
+        answer = _modes_by_lemke(D, b, sites, weights)
+        one = _repaired(D, b, sites, *answer) if answer is not None else None
+        if one is not None:
+            found.append(one)
+    return found
+
+
+def _modes_by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site],
+                    weights: np.ndarray | None) -> tuple[tuple[Mode, ...], np.ndarray] | None:
+    """Modes and forces by the complementarity problem with a cone of facets; None where there is no solution.
+
+    Contacts that may stick are bounded by static friction; those that then slide take kinetic friction, and the problem is solved
+    again with their direction.
+    """
+    sites = list(sites)
+    slips: dict[int, np.ndarray] = {}
+    while True:
+        problem = _Faceted(D, b, sites, slips)
+        cover = None if weights is None else np.resize(weights, len(problem.q))
+        found = lemke(problem.M, problem.q, cover)
+        if found is None:
+            return None
+        modes = problem.modes(found.z, found.w)
+        begun = {k: mode.direction for k, mode in enumerate(modes) if mode.kind == SLIDING and k not in slips
+                 and sites[k].slip is None and len(sites[k].rows) > 1 and sites[k].kinetic != sites[k].static}
+        if not begun:
+            return modes, problem.W.T @ found.z + problem.lam_0
+        slips.update(begun)
+
+
+class _Faceted:
+    """The complementarity problem w = M z + q of contacts: for each normal force beyond the least, and where it may stick the
+    forces beta along the facets' directions, and the speed gamma of its slip.
+
+    slips   directions of sites that have begun to slide
+    """
+
+    def __init__(self, D: np.ndarray, b: np.ndarray, sites: Sequence[Site], slips: dict[int, np.ndarray]) -> None:
+        self.sites, self.slips = sites, slips
+        self.first: dict[int, int] = {}
+        columns: list[np.ndarray] = []
+        speeds: list[tuple[int, int, int]] = []  # place of gamma, of the normal force, site
+        lam_0 = np.zeros(len(b))
+        n = 0
+        for place, site in enumerate(sites):
+            if OPEN not in site.excluded and {STICKING, SLIDING} <= set(site.excluded):
+                continue
+            self.first[place] = n
+            k, tangents = site.rows[0], list(site.rows[1:])
+            slip = site.slip if site.slip is not None else slips.get(place)
+            column = np.zeros(len(b))
+            column[k] = 1.0
+            if tangents and slip is not None:
+                column[tangents] = -site.kinetic * slip
+            lam_0 += site.least * column
+            columns.append(column)
+            n += 1
+            if tangents and slip is None:
+                for direction in _facets(len(tangents)):
+                    column = np.zeros(len(b))
+                    column[tangents] = direction
+                    columns.append(column)
+                    n += 1
+                speeds.append((n, self.first[place], place))
+                columns.append(np.zeros(len(b)))
+                n += 1
+        W = np.array(columns).reshape(n, len(b))
+        self.W, self.lam_0 = W, lam_0
+        at = b + D @ lam_0
+        self.M, self.q = W @ D @ W.T, W @ at
+        scale = max(float(np.abs(np.diag(D)).max(initial=0.0)), 1e-300)  # gamma in units of a force
+        for row, normal, place in speeds:
+            facets = range(normal + 1, row)
+            self.M[list(facets), row] = scale
+            self.M[row, list(facets)] = -scale
+            self.M[row, normal] = scale * sites[place].static
+            self.q[row] = scale * sites[place].static * sites[place].least
+
+    def modes(self, z: np.ndarray, w: np.ndarray) -> tuple[Mode, ...]:
+        """What each contact does."""
+        small_z, small_w = (NOISE * max(float(np.abs(v).max(initial=0.0)), 1e-300) for v in (z, self.q))
+        found = []
+        for place, site in enumerate(self.sites):
+            n_tangents = len(site.rows) - 1
+            if place not in self.first:
+                found.append(Mode(OPEN, np.zeros(n_tangents), False))
+                continue
+            k = self.first[place]
+            held = bool(w[k] <= small_w) or bool(z[k] > small_z)
+            slip = site.slip if site.slip is not None else self.slips.get(place)
+            if not held and site.least == 0:
+                found.append(Mode(OPEN, np.zeros(n_tangents), False))
+            elif not n_tangents or slip is not None:
+                found.append(Mode(SLIDING, np.zeros(n_tangents) if slip is None else slip, held))
+            else:
+                facets = _facets(n_tangents)
+                force = z[k + 1:k + 1 + len(facets)] @ facets
+                size = np.linalg.norm(force)
+                slides = size > small_z and (STICKING in site.excluded or z[k + 1 + len(facets)] > small_z)
+                found.append(Mode(SLIDING, -force / size, held) if slides else Mode(STICKING, np.zeros(n_tangents), held))
+        return tuple(found)
+
+
+def _facets(n: int) -> np.ndarray:
+    """Directions of friction, (n_facets, n)."""
+    if n == 1:
+        return np.array([[1.0], [-1.0]])
+    angles = 2 * np.pi * np.arange(FACETS) / FACETS
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], forces: np.ndarray) -> Solved | None:
+    """The solution that begins with these modes: while contacts break an inequality, those take the mode that their numbers ask
+    for. Where rows depend on each other, given forces may fulfil what those of least norm do not. None where that comes to no
+    end."""
+    seen = set()
+    for _ in range(10 + 4 * len(sites)):
+        unknown = [k for k, (site, mode) in enumerate(zip(sites, modes, strict=True))
+                   if len(site.rows) == 3 and site.slip is None and mode.kind == SLIDING]
+        directed = _directed(D, b, sites, modes, unknown) if unknown else tuple(modes)
         if directed is None:
             return None
-        modes = directed
-    lam, w, exact, shared = _linear(D, b, sites, modes)
-    size = max(np.abs(b).max(initial=0.0), 1e-300)
-    force = max(np.abs(lam).max(initial=0.0), size / max(np.diag(D).max(initial=0.0), 1e-300))
-    if not exact:
-        return None
-    for site, mode in zip(sites, modes, strict=True):
-        k, tangents = site.rows[0], list(site.rows[1:])
-        if mode.held and lam[k] < site.least - NOISE * force:
+        table, only = _Table(D, b, sites, [[m] for m in directed]), np.zeros((1, len(sites)), dtype=int)
+        lam, w, exact, shared = table.linear(only)
+        broken = table.broken(only, lam, w)[0]
+        if exact[0] and not broken.any():
+            return Solved(directed, lam[0], w[0], bool(shared[0]))
+        if exact[0] and shared[0] and not unknown and not table.broken(only, forces[None, :], w).any() and np.abs(
+                b + D @ forces - w[0]).max() <= NOISE * table.size:
+            return Solved(directed, forces, w[0], True)
+        named = tuple((m.kind, m.held) for m in directed)
+        if named in seen or not exact[0]:
             return None
-        if not mode.held and w[k] < -NOISE * size:
-            return None
-        if mode.kind == STICKING and np.linalg.norm(lam[tangents]) > site.static * lam[k] + NOISE * force:
-            return None
-        if mode.kind == SLIDING and site.slip is None and tangents and w[tangents] @ mode.direction < -NOISE * size:
-            return None
-    return Solved(modes, lam, w, shared)
+        seen.add(named)
+        modes = [_other(site, mode, lam[0], w[0]) if bad else mode
+                 for site, mode, bad in zip(sites, directed, broken, strict=True)]
+    return None
 
 
-def _linear(D: np.ndarray, b: np.ndarray, sites: Sequence[Site],
-            modes: Sequence[Mode]) -> tuple[np.ndarray, np.ndarray, bool, bool]:
-    """lam and w of given modes, whether the rows that hold do hold, and whether they depend on each other."""
-    n = len(b)
-    H, fixed, active = np.zeros((n, n)), np.zeros(n), []
-    for site, mode in zip(sites, modes, strict=True):
-        k, tangents = site.rows[0], list(site.rows[1:])
-        column = np.zeros(n)
-        column[k] = 1.0
-        if mode.kind == SLIDING and tangents:
-            column[tangents] = -site.kinetic * mode.direction
-        if mode.held:
-            active.append(k)
-            H[:, k] = column
-        elif site.least:
-            fixed += site.least * column
-        if mode.kind == STICKING:
-            active += tangents
-            H[tangents, tangents] = 1.0
-    x, exact, shared = np.zeros(n), True, False
-    if active:
-        A, right = (D @ H)[np.ix_(active, active)], -(b + D @ fixed)[active]
-        x[active], _, rank, _ = np.linalg.lstsq(A, right, rcond=DEPENDENT)
-        shared = bool(rank < len(active))
-        left = np.abs(A @ x[active] - right).max()
-        exact = bool(left <= NOISE * max(np.abs(right).max(), np.abs(b).max()))
-    lam = H @ x + fixed
-    w = b + D @ lam
-    if exact:
-        w[active] = 0.0
-    return lam, w, exact, shared
+def _other(site: Site, mode: Mode, lam: np.ndarray, w: np.ndarray) -> Mode:
+    """The mode that a contact goes to where its own breaks an inequality."""
+    n = len(site.rows) - 1
+    still = np.zeros(n)
+    if mode.held and lam[site.rows[0]] < site.least:
+        return Mode(mode.kind, mode.direction, False) if site.least else Mode(OPEN, still, False)
+    if mode.kind == STICKING and SLIDING not in site.excluded:
+        force = lam[list(site.rows[1:])]
+        size = np.linalg.norm(force)
+        return Mode(SLIDING, -force / size if size else still, mode.held)
+    if n and site.slip is None and STICKING not in site.excluded:
+        return Mode(STICKING, still, True)
+    return Mode(SLIDING, still if site.slip is None else site.slip, True)
 
 
-def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: tuple[Mode, ...],
+def _linear(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode]) -> np.ndarray:
+    """w of given modes."""
+    found: np.ndarray = _Table(D, b, sites, [[m] for m in modes]).linear(np.zeros((1, len(sites)), dtype=int))[1][0]
+    return found
+
+
+def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode],
               unknown: Sequence[int]) -> tuple[Mode, ...] | None:
     """The modes with the directions in which contacts in space begin to slide: along w_T, one after the other until all fit."""
     chosen = list(modes)
     for k in unknown:
-        w = _linear(D, b, sites, [Mode(OPEN, m.direction, m.held) if j in unknown else m for j, m in enumerate(chosen)])[1]
+        if modes[k].direction.any():
+            continue
+        w = _linear(D, b, sites, [Mode(OPEN, m.direction, m.held) if j in unknown else m for j, m in enumerate(chosen)])
         start = w[list(sites[k].rows[1:])]
         size = np.linalg.norm(start)
         chosen[k] = Mode(SLIDING, start / size if size else np.array([1.0, 0.0]), modes[k].held)
-    for _ in range(100):
+    together = _directions(D, b, sites, chosen, unknown)
+    if together is not None:
+        return together
+    for _ in range(ROUNDS):
         before = [chosen[k].direction for k in unknown]
         for k in unknown:
             found = _direction(D, b, sites, chosen, k)
@@ -208,26 +458,72 @@ def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: tuple[
     return tuple(chosen)
 
 
+def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode],
+                unknown: Sequence[int]) -> tuple[Mode, ...] | None:
+    """All unknown directions at once by Newton's method from those given; None where it does not converge."""
+    places = list(unknown)
+    tangents = np.array([sites[k].rows[1:] for k in places])
+    angles = np.array([np.arctan2(modes[k].direction[1], modes[k].direction[0]) for k in places])
+
+    def across(trials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        d = np.stack([np.cos(trials), np.sin(trials)], axis=2)
+        options: list[list[Mode]] = [[m] for m in modes]
+        chosen = np.zeros((len(trials), len(sites)), dtype=int)
+        for i, k in enumerate(places):
+            options[k] = [Mode(SLIDING, one, modes[k].held) for one in d[:, i]]
+            chosen[:, k] = range(len(trials))
+        w = _Table(D, b, sites, options).linear(chosen)[1][:, tangents]
+        return w[:, :, 1] * d[:, :, 0] - w[:, :, 0] * d[:, :, 1], (w * d).sum(axis=2)
+
+    scale = float(np.abs(b).max(initial=0.0))
+    size = np.inf
+    for _ in range(STEPS):
+        values, along = across(np.vstack([angles, angles + SMALL_ANGLE * np.eye(len(places))]))
+        slope = (values[1:] - values[0]).T / SMALL_ANGLE
+        step = np.linalg.lstsq(slope, -values[0], rcond=DEPENDENT)[0]
+        last, size = size, float(np.abs(step).max())
+        if size > 1.0:
+            return None
+        angles = angles + step
+        if size < 1e-15 or (size < 1e-10 and size >= last / 2):
+            break
+    values, along = across(angles[None, :])
+    if np.abs(values).max() > NOISE * scale or (along < -NOISE * scale).any():
+        return None
+    found = list(modes)
+    for k, angle in zip(places, angles, strict=True):
+        found[k] = Mode(SLIDING, np.array([np.cos(angle), np.sin(angle)]), modes[k].held)
+    return tuple(found)
+
+
 def _direction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence[Mode], k: int) -> np.ndarray | None:
     """The direction d of one contact with w_T along d; None where there is none."""
     from scipy.optimize import brentq
 
     tangents = list(sites[k].rows[1:])
 
-    def across(angle: float) -> tuple[float, float]:
-        d = np.array([np.cos(angle), np.sin(angle)])
-        trial = [Mode(SLIDING, d, m.held) if j == k else m for j, m in enumerate(modes)]
-        w = _linear(D, b, sites, trial)[1][tangents]
-        return float(w[1] * d[0] - w[0] * d[1]), float(w @ d)
+    def across(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        d = np.column_stack([np.cos(angles), np.sin(angles)])
+        trials = [[Mode(SLIDING, one, m.held) for one in d] if j == k else [m] for j, m in enumerate(modes)]
+        chosen = np.zeros((len(angles), len(sites)), dtype=int)
+        chosen[:, k] = range(len(angles))
+        w = _Table(D, b, sites, trials).linear(chosen)[1][:, tangents]
+        return w[:, 1] * d[:, 0] - w[:, 0] * d[:, 1], (w * d).sum(axis=1)
 
     first = float(np.arctan2(modes[k].direction[1], modes[k].direction[0]))
-    if abs(across(first)[0]) <= 1e-15 * np.abs(b).max(initial=0.0) and across(first)[1] > 0:
-        return np.array([np.cos(first), np.sin(first)])
     angles = first + np.pi * (np.arange(DIRECTIONS + 1) / DIRECTIONS * 2 - 1) * (1 + 1e-9)
-    values = [across(a)[0] for a in angles]
-    roots = [brentq(lambda a: across(a)[0], lo, hi, xtol=1e-15, rtol=1e-15) for lo, hi, f, g in
-             zip(angles[:-1], angles[1:], values[:-1], values[1:], strict=True) if f * g <= 0 and f != g]
-    good = [a for a in roots if across(a)[1] >= 0]
+    values, along = across(np.append(angles, first))
+    if abs(values[-1]) <= 1e-15 * np.abs(b).max(initial=0.0) and along[-1] > 0:
+        return np.array([np.cos(first), np.sin(first)])
+    def root(low: float, high: float) -> float:
+        f, g = (across(np.array([a]))[0][0] for a in (low, high))
+        if f * g >= 0:  # rounding has turned a sign: one of the ends is the root
+            return low if abs(f) < abs(g) else high
+        return float(brentq(lambda a: across(np.array([a]))[0][0], low, high, xtol=1e-15, rtol=1e-15))
+
+    roots = [root(low, high) for low, high, f, g in zip(angles[:-1], angles[1:], values[:-2], values[1:-1], strict=True)
+             if f * g <= 0 and f != g]
+    good = [a for a in roots if across(np.array([a]))[1][0] >= 0]
     if not good:
         return None
     best = min(good, key=lambda a: abs(a - first))

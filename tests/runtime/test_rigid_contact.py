@@ -157,6 +157,16 @@ def test_several_solutions_are_reported() -> None:
     assert not solutions(D, np.array([-1.0, 0.0]), [Site((0, 1), 1.0, 1.0, slip=np.array([-1.0]))])
 
 
+def test_block_on_a_slope_as_steep_as_its_friction_holds_is_reported() -> None:
+    foot = sd.Contact("foot", "body", "ground", friction=0.75)
+    system = sd.System("block", gravity=[6.0, -8.0])
+    body = system.add_body("body", mass=1.0, inertia=1.0)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    system.add_contact(foot)
+    with pytest.warns(SimulationWarning, match="t = 0 s contacts foot are on the border of two modes .* foot sticking was taken"):
+        system.compile().simulate((0, 0.1))
+
+
 def test_rod_that_may_leave_or_jam_leaves_with_a_warning() -> None:
     """Spinning quickly in Painleve's region its tip would leave, but friction might hold it as well: two motions."""
     angle, spin = 1.1, 5.0

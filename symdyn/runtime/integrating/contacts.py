@@ -17,7 +17,7 @@ import numpy as np
 
 from symdyn.backend.metadata import ContactRecord
 from symdyn.errors import ArgumentError, EvaluationError
-from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, impact, solutions
+from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.stops import describe_stop
@@ -453,6 +453,11 @@ class _Phases:
         if len(found) > 1:
             self.doubts.append(f"{self.module.name}: at t = {t:.9g} s the laws of contact and friction allow {len(found)} "
                                f"motions (Painleve); the one in which contacts are {self._named(closed, found[0])} was taken")
+        border = [self.records[closed[k]].name for k in degenerate(D, b, self._sites(at, closed), found[0])] if found else []
+        if border:
+            self.doubts.append(f"{self.module.name}: at t = {t:.9g} s contacts {', '.join(border)} are on the border of two "
+                               f"modes with the same accelerations; {self._named(closed, found[0])} was taken, and a small "
+                               "change of the state may lead to another motion")
         self.modes = [OPEN] * len(self.records)
         self.fresh = [False] * len(self.records)
         self.shared = bool(found) and found[0].shared
