@@ -115,6 +115,11 @@ from symdyn.model import shapes as shapes
 from symdyn.model.closures import Gear as Gear
 from symdyn.model.closures import Rod as Rod
 from symdyn.model.contacts.contact import Contact as Contact
+from symdyn.model.contacts.joints import Backlash as Backlash
+from symdyn.model.contacts.joints import JointFriction as JointFriction
+from symdyn.model.contacts.joints import OneWayClutch as OneWayClutch
+from symdyn.model.contacts.joints import Rope as Rope
+from symdyn.model.contacts.joints import Stop as Stop
 from symdyn.model.elements import (
     Box as Box,
 )

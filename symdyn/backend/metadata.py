@@ -117,7 +117,8 @@ class EventRecord(NamedTuple):
 
 class ContactRecord(NamedTuple):
     """A rigid contact in one place: the contact that it is of, its number of rows, the parameters that its mode is set by ("" and
-    none without friction), what its events are called after its name, its law of impacts."""
+    none without friction), what its events are called after its name, its law of impacts, its kind, whether its first row is a
+    normal one."""
 
     name: str
     contact: str
@@ -127,11 +128,18 @@ class ContactRecord(NamedTuple):
     sliding: tuple[str, ...]
     events: tuple[str, ...]
     impact: str
+    kind: str
+    normal: bool
+
+    @property
+    def tangents(self) -> int:
+        """Its number of tangential rows."""
+        return self.rows - self.normal
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """The parameters that a run sets."""
-        return (self.closed, *([self.sticking] if self.sticking else ()), *self.sliding)
+        return (*filter(None, (self.closed, self.sticking)), *self.sliding)
 
 
 class CompliantRecord(NamedTuple):

@@ -101,9 +101,9 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         not_smooth=not_smooth(equations.quantity("rhs").tolist()),
         connections=tuple(equations.connections), down=equations.down, drawn=tuple(equations.drawn),
         flexible=tuple(equations.flexible), output_units=dict(equations.symbols.point_units),
-        contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name,
-                                     c.switches[1].name if len(c.rows) > 1 else "", tuple(s.name for s in c.sliding), c.events,
-                                     c.impact) for c in equations.contacts),
+        contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name if c.normal else "",
+                                     c.switches[-1].name if len(c.rows) > c.normal else "", tuple(s.name for s in c.sliding),
+                                     c.events, c.impact, c.kind, c.normal) for c in equations.contacts),
         compliant=tuple(CompliantRecord(c.name, len(c.rows)) for c in equations.compliant))
 
 

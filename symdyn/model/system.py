@@ -18,6 +18,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.joints import JointElement
 from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.elements import AddedMass, Element
 from symdyn.model.event import Event, make_event
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
 Load = TypeVar("Load", Element, AddedMass)
+ContactLike = TypeVar("ContactLike", bound=Contact | JointElement)
 
 
 class System:
@@ -99,7 +101,7 @@ class System:
         self.constraints: list[Constraint] = []
         self.events: list[Event] = []
         self.loops: list[Joint | Gear] = []
-        self.contacts: list[Contact] = []
+        self.contacts: list[Contact | JointElement] = []
         self.rigid_contacts: list[RigidContact] = []
         self.compliant_contacts: list[CompliantContact] = []
         self.ground_motion: Joint | None = None
@@ -380,8 +382,9 @@ class System:
             self.loads.append(load)
         return load
 
-    def add_contact(self, contact: Contact) -> Contact:
-        """Add a contact between two bodies, see Contact; its results are `Solution.contacts[name]`.
+    def add_contact(self, contact: ContactLike) -> ContactLike:
+        """Add a contact between two bodies, see Contact, or a Stop, Backlash, OneWayClutch, JointFriction or Rope; its results
+        are `Solution.contacts[name]`.
 
         >>> system = sd.System("ball", gravity=[0, -9.81])
         >>> ball = system.add_body("ball", mass=1.0)
@@ -389,8 +392,9 @@ class System:
         >>> system.add_contact(sd.Contact("floor", ball, system.ground, restitution=0.8)).name
         'floor'
         """
-        if not isinstance(contact, Contact):
-            self._faults.append(f"add_contact was given {shown(contact)}; pass sd.Contact(...)")
+        if not isinstance(contact, (Contact, JointElement)):
+            self._faults.append(f"add_contact was given {shown(contact)}; pass sd.Contact(...), or sd.Stop(...), "
+                                "sd.Backlash(...), sd.OneWayClutch(...), sd.JointFriction(...) or sd.Rope(...)")
         else:
             self.contacts.append(contact)
         return contact

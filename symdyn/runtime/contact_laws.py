@@ -15,8 +15,9 @@ inelastic collisions and Coulomb friction, 1996 (the complementarity problem wit
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, product
+from typing import Any
 
 import numpy as np
 
@@ -45,11 +46,12 @@ FACETS, COVERS = 8, 5
 class Site:
     """One contact of a problem.
 
-    rows       places of its normal row and its tangential ones
+    rows       places of its normal row and its tangential ones; of dry friction with given bounds that of its one row
     static, kinetic   coefficients of friction
     slip       unit vector of the slip that it has; None: it does not slip, and may stick or begin to slide
     least      a normal force that acts in every case: the impulse of expansion
     excluded   modes that are ruled out
+    bounded    whether static and kinetic are forces, as of dry friction of a joint, which has no normal row
     """
 
     rows: tuple[int, ...]
@@ -58,6 +60,21 @@ class Site:
     slip: np.ndarray | None = None
     least: float = 0.0
     excluded: tuple[str, ...] = ()
+    bounded: bool = False
+
+    @property
+    def normal(self) -> int | None:
+        """The place of its normal row."""
+        return None if self.bounded else self.rows[0]
+
+    @property
+    def tangents(self) -> list[int]:
+        """The places of its tangential rows."""
+        return list(self.rows if self.bounded else self.rows[1:])
+
+    def limit(self, lam: np.ndarray) -> Any:
+        """The largest friction under forces (..., n)."""
+        return self.static if self.normal is None else self.static * lam[..., self.normal]
 
 
 @dataclass(frozen=True)
@@ -81,12 +98,28 @@ class Solved:
 
 
 def solutions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
-    """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS in a plane."""
+    """Solutions that differ in w, the one with the smallest forces first; all of them up to MOST_COMBINATIONS in a plane.
+
+    What static friction can hold does not begin to slide: kinetic friction, where it is less, counts for what slides then.
+    """
+    steep = [k for k, site in enumerate(sites) if site.slip is None and site.kinetic != site.static and site.tangents
+             and STICKING not in site.excluded]
+    if steep:
+        found = []
+        for one in solutions(D, b, [replace(site, kinetic=site.static) if k in steep else site for k, site in enumerate(sites)]):
+            slides = [k for k in steep if one.modes[k].kind == SLIDING]
+            found += solutions(D, b, [replace(site, excluded=(*site.excluded, STICKING)) if k in slides else site
+                                      for k, site in enumerate(sites)]) if slides else [one]
+        return _different(b, found)
     options = [list(_options(site)) for site in sites]
-    if all(len(site.rows) < 3 for site in sites) and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS:
+    if all(len(site.tangents) < 2 for site in sites) and np.prod([float(len(o)) for o in options]) <= MOST_COMBINATIONS:
         found = [one for one in _Table(D, b, sites, options).solved(list(product(*[range(len(o)) for o in options]))) if one]
     else:
         found = _by_lemke(D, b, sites) or _first(D, b, sites, options)
+    return _different(b, found)
+
+
+def _different(b: np.ndarray, found: Sequence[Solved]) -> list[Solved]:
     different: list[Solved] = []
     for one in found:
         size = max(np.abs(one.w).max(initial=0.0), np.abs(b).max(initial=0.0))
@@ -106,9 +139,9 @@ def degenerate(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], one: Solved)
     for place, site in enumerate(sites):
         if site.excluded:
             continue
-        k, tangents = site.rows[0], list(site.rows[1:])
-        pressing, slip = one.lam[k] > NOISE * force, np.linalg.norm(one.w[tangents])
-        bound = site.static * one.lam[k] - np.linalg.norm(one.lam[tangents])
+        k, tangents = site.normal, site.tangents
+        pressing, slip = k is None or one.lam[k] > NOISE * force, np.linalg.norm(one.w[tangents])
+        bound = site.limit(one.lam) - np.linalg.norm(one.lam[tangents])
         at_bound = bool(tangents) and site.slip is None and site.static > 0 and slip <= NOISE * size and bound <= NOISE * force
         if at_bound if pressing else abs(one.w[k]) <= NOISE * size:
             found.append(place)
@@ -137,10 +170,10 @@ def impact(D: np.ndarray, v: np.ndarray, restitution: Sequence[float], sites: Se
 
 def _options(site: Site) -> Iterator[Mode]:
     """Modes of a contact, the preferred ones first."""
-    n = len(site.rows) - 1
+    n = len(site.tangents)
     still = np.zeros(n)
     for held in (True, False):
-        if not held and site.least == 0:
+        if not held and (site.least == 0 or site.bounded):
             continue
         if n == 0 or site.slip is not None:
             if SLIDING not in site.excluded:
@@ -151,7 +184,7 @@ def _options(site: Site) -> Iterator[Mode]:
         if SLIDING not in site.excluded:
             for sign in (1.0, -1.0) if n == 1 else (0.0,):  # in space the direction is an unknown
                 yield Mode(SLIDING, np.full(n, sign), held)
-    if site.least == 0 and OPEN not in site.excluded:
+    if site.least == 0 and OPEN not in site.excluded and not site.bounded:
         yield Mode(OPEN, still, False)
 
 
@@ -164,18 +197,21 @@ class _Table:
         n = len(b)
         least = np.zeros(n)
         for site in sites:
-            least[site.rows[0]] = site.least
+            least[site.rows[0]] = site.static if site.bounded else site.least
         self.size = float(max(np.abs(b).max(initial=0.0), (np.abs(D) @ least).max(initial=0.0), 1e-300))  # of w
         self.H, self.fixed, self.active = [], [], []
         for site, modes in zip(sites, options, strict=True):
-            k, tangents = site.rows[0], list(site.rows[1:])
+            k, tangents = site.normal, site.tangents
             H, fixed, active = np.zeros((len(modes), n, n)), np.zeros((len(modes), n)), np.zeros((len(modes), n), dtype=bool)
             for i, mode in enumerate(modes):
                 column = np.zeros(n)
-                column[k] = 1.0
+                if k is not None:
+                    column[k] = 1.0
                 if mode.kind == SLIDING and tangents:
                     column[tangents] = -site.kinetic * mode.direction
-                if mode.held:
+                if k is None:
+                    fixed[i] = column
+                elif mode.held:
                     active[i, k] = True
                     H[i, :, k] = column
                 elif site.least:
@@ -209,13 +245,14 @@ class _Table:
         force = np.maximum(np.abs(lam).max(axis=1, initial=0.0), size / max(np.diag(self.D).max(initial=0.0), 1e-300))
         result = np.zeros(chosen.shape, dtype=bool)
         for place, (site, modes) in enumerate(zip(self.sites, self.options, strict=True)):
-            k, tangents, mode = site.rows[0], list(site.rows[1:]), chosen[:, place]
-            held = np.array([m.held for m in modes])[mode]
-            result[:, place] = np.where(held, lam[:, k] < site.least - NOISE * force, w[:, k] < -NOISE * size)
+            k, tangents, mode = site.normal, site.tangents, chosen[:, place]
+            if k is not None:
+                held = np.array([m.held for m in modes])[mode]
+                result[:, place] = np.where(held, lam[:, k] < site.least - NOISE * force, w[:, k] < -NOISE * size)
             if not tangents:
                 continue
             sticking = np.array([m.kind == STICKING for m in modes])[mode]
-            cone = np.linalg.norm(lam[:, tangents], axis=1) > site.static * lam[:, k] + NOISE * force
+            cone = np.linalg.norm(lam[:, tangents], axis=1) > site.limit(lam) + NOISE * force
             result[:, place] |= sticking & cone
             if site.slip is None:
                 along = (w[:, tangents] * np.array([m.direction for m in modes])[mode]).sum(axis=1)
@@ -249,14 +286,14 @@ def _solved(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequence
     """The solution of one combination of modes, with the directions in which contacts in space begin to slide; None where it
     breaks an inequality."""
     unknown = [k for k, (s, m) in enumerate(zip(sites, modes, strict=True))
-               if len(s.rows) == 3 and m.kind == SLIDING and not m.direction.any()]
+               if len(s.tangents) == 2 and m.kind == SLIDING and not m.direction.any()]
     directed = _directed(D, b, sites, modes, unknown) if unknown else modes
     return None if directed is None else _Table(D, b, sites, [[m] for m in directed]).solved([[0] * len(sites)])[0]
 
 
 def _first(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], options: Sequence[Sequence[Mode]]) -> list[Solved]:
     """The first combination that is a solution, of as many as are tried."""
-    planar = all(len(site.rows) < 3 for site in sites)
+    planar = all(len(site.tangents) < 2 for site in sites)
     for modes in islice(product(*options), MOST_TRIED if planar else MOST_TRIED_IN_SPACE):
         one = _solved(D, b, sites, modes)
         if one is not None:
@@ -267,7 +304,7 @@ def _first(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], options: Sequenc
 def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solved]:
     """Solutions that Lemke's method comes to from different covering vectors; in space the first, for the round cone."""
     stream = np.random.default_rng(0)
-    planar, found = all(len(site.rows) < 3 for site in sites), list[Solved]()
+    planar, found = all(len(site.tangents) < 2 for site in sites), list[Solved]()
     for k in range(COVERS):
         if found and not planar:
             break
@@ -281,55 +318,39 @@ def _by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> list[Solve
 
 def _modes_by_lemke(D: np.ndarray, b: np.ndarray, sites: Sequence[Site],
                     weights: np.ndarray | None) -> tuple[tuple[Mode, ...], np.ndarray] | None:
-    """Modes and forces by the complementarity problem with a cone of facets; None where there is no solution.
-
-    Contacts that may stick are bounded by static friction; those that then slide take kinetic friction, and the problem is solved
-    again with their direction.
-    """
-    sites = list(sites)
-    slips: dict[int, np.ndarray] = {}
-    while True:
-        problem = _Faceted(D, b, sites, slips)
-        cover = None if weights is None else np.resize(weights, len(problem.q))
-        found = lemke(problem.M, problem.q, cover)
-        if found is None:
-            return None
-        modes = problem.modes(found.z, found.w)
-        begun = {k: mode.direction for k, mode in enumerate(modes) if mode.kind == SLIDING and k not in slips
-                 and sites[k].slip is None and len(sites[k].rows) > 1 and sites[k].kinetic != sites[k].static}
-        if not begun:
-            return modes, problem.W.T @ found.z + problem.lam_0
-        slips.update(begun)
+    """Modes and forces by the complementarity problem with a cone of facets; None where there is no solution."""
+    problem = _Faceted(D, b, sites)
+    found = lemke(problem.M, problem.q, None if weights is None else np.resize(weights, len(problem.q)))
+    return None if found is None else (problem.modes(found.z, found.w), problem.W.T @ found.z + problem.lam_0)
 
 
 class _Faceted:
     """The complementarity problem w = M z + q of contacts: for each normal force beyond the least, and where it may stick the
-    forces beta along the facets' directions, and the speed gamma of its slip.
+    forces beta along the facets' directions, and the speed gamma of its slip."""
 
-    slips   directions of sites that have begun to slide
-    """
-
-    def __init__(self, D: np.ndarray, b: np.ndarray, sites: Sequence[Site], slips: dict[int, np.ndarray]) -> None:
-        self.sites, self.slips = sites, slips
+    def __init__(self, D: np.ndarray, b: np.ndarray, sites: Sequence[Site]) -> None:
+        self.sites = sites
         self.first: dict[int, int] = {}
         columns: list[np.ndarray] = []
         speeds: list[tuple[int, int, int]] = []  # place of gamma, of the normal force, site
         lam_0 = np.zeros(len(b))
         n = 0
         for place, site in enumerate(sites):
-            if OPEN not in site.excluded and {STICKING, SLIDING} <= set(site.excluded):
+            if {STICKING, SLIDING} <= set(site.excluded):
                 continue
             self.first[place] = n
-            k, tangents = site.rows[0], list(site.rows[1:])
-            slip = site.slip if site.slip is not None else slips.get(place)
+            k, tangents = site.normal, site.tangents
             column = np.zeros(len(b))
-            column[k] = 1.0
-            if tangents and slip is not None:
-                column[tangents] = -site.kinetic * slip
-            lam_0 += site.least * column
-            columns.append(column)
-            n += 1
-            if tangents and slip is None:
+            if tangents and site.slip is not None:
+                column[tangents] = -site.kinetic * site.slip
+            if k is None:
+                lam_0 += column
+            else:
+                column[k] = 1.0
+                lam_0 += site.least * column
+                columns.append(column)
+                n += 1
+            if tangents and site.slip is None:
                 for direction in _facets(len(tangents)):
                     column = np.zeros(len(b))
                     column[tangents] = direction
@@ -343,34 +364,36 @@ class _Faceted:
         at = b + D @ lam_0
         self.M, self.q = W @ D @ W.T, W @ at
         scale = max(float(np.abs(np.diag(D)).max(initial=0.0)), 1e-300)  # gamma in units of a force
-        for row, normal, place in speeds:
-            facets = range(normal + 1, row)
-            self.M[list(facets), row] = scale
-            self.M[row, list(facets)] = -scale
-            self.M[row, normal] = scale * sites[place].static
-            self.q[row] = scale * sites[place].static * sites[place].least
+        for row, first, place in speeds:
+            site = sites[place]
+            friction = site.kinetic if STICKING in site.excluded else site.static
+            facets = list(range(first if site.bounded else first + 1, row))
+            self.M[facets, row] = scale
+            self.M[row, facets] = -scale
+            self.q[row] = scale * friction * (1.0 if site.bounded else site.least)
+            if not site.bounded:
+                self.M[row, first] = scale * friction
 
     def modes(self, z: np.ndarray, w: np.ndarray) -> tuple[Mode, ...]:
         """What each contact does."""
         small_z, small_w = (NOISE * max(float(np.abs(v).max(initial=0.0)), 1e-300) for v in (z, self.q))
-        found = []
+        found: list[Mode] = []
         for place, site in enumerate(self.sites):
-            n_tangents = len(site.rows) - 1
+            n_tangents = len(site.tangents)
             if place not in self.first:
                 found.append(Mode(OPEN, np.zeros(n_tangents), False))
                 continue
             k = self.first[place]
-            held = bool(w[k] <= small_w) or bool(z[k] > small_z)
-            slip = site.slip if site.slip is not None else self.slips.get(place)
+            held = site.bounded or bool(w[k] <= small_w) or bool(z[k] > small_z)
             if not held and site.least == 0:
                 found.append(Mode(OPEN, np.zeros(n_tangents), False))
-            elif not n_tangents or slip is not None:
-                found.append(Mode(SLIDING, np.zeros(n_tangents) if slip is None else slip, held))
+            elif not n_tangents or site.slip is not None:
+                found.append(Mode(SLIDING, np.zeros(n_tangents) if site.slip is None else site.slip, held))
             else:
-                facets = _facets(n_tangents)
-                force = z[k + 1:k + 1 + len(facets)] @ facets
+                facets, first = _facets(n_tangents), k if site.bounded else k + 1
+                force = z[first:first + len(facets)] @ facets
                 size = np.linalg.norm(force)
-                slides = size > small_z and (STICKING in site.excluded or z[k + 1 + len(facets)] > small_z)
+                slides = size > small_z and (STICKING in site.excluded or z[first + len(facets)] > small_z)
                 found.append(Mode(SLIDING, -force / size, held) if slides else Mode(STICKING, np.zeros(n_tangents), held))
         return tuple(found)
 
@@ -390,7 +413,7 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
     seen = set()
     for _ in range(10 + 4 * len(sites)):
         unknown = [k for k, (site, mode) in enumerate(zip(sites, modes, strict=True))
-                   if len(site.rows) == 3 and site.slip is None and mode.kind == SLIDING]
+                   if len(site.tangents) == 2 and site.slip is None and mode.kind == SLIDING]
         directed = _directed(D, b, sites, modes, unknown) if unknown else tuple(modes)
         if directed is None:
             return None
@@ -413,12 +436,12 @@ def _repaired(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
 
 def _other(site: Site, mode: Mode, lam: np.ndarray, w: np.ndarray) -> Mode:
     """The mode that a contact goes to where its own breaks an inequality."""
-    n = len(site.rows) - 1
+    n = len(site.tangents)
     still = np.zeros(n)
-    if mode.held and lam[site.rows[0]] < site.least:
+    if site.normal is not None and mode.held and lam[site.normal] < site.least:
         return Mode(mode.kind, mode.direction, False) if site.least else Mode(OPEN, still, False)
     if mode.kind == STICKING and SLIDING not in site.excluded:
-        force = lam[list(site.rows[1:])]
+        force = lam[site.tangents]
         size = np.linalg.norm(force)
         return Mode(SLIDING, -force / size if size else still, mode.held)
     if n and site.slip is None and STICKING not in site.excluded:
@@ -440,7 +463,7 @@ def _directed(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequen
         if modes[k].direction.any():
             continue
         w = _linear(D, b, sites, [Mode(OPEN, m.direction, m.held) if j in unknown else m for j, m in enumerate(chosen)])
-        start = w[list(sites[k].rows[1:])]
+        start = w[sites[k].tangents]
         size = np.linalg.norm(start)
         chosen[k] = Mode(SLIDING, start / size if size else np.array([1.0, 0.0]), modes[k].held)
     together = _directions(D, b, sites, chosen, unknown)
@@ -462,7 +485,7 @@ def _directions(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Sequ
                 unknown: Sequence[int]) -> tuple[Mode, ...] | None:
     """All unknown directions at once by Newton's method from those given; None where it does not converge."""
     places = list(unknown)
-    tangents = np.array([sites[k].rows[1:] for k in places])
+    tangents = np.array([sites[k].tangents for k in places])
     angles = np.array([np.arctan2(modes[k].direction[1], modes[k].direction[0]) for k in places])
 
     def across(trials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -500,7 +523,7 @@ def _direction(D: np.ndarray, b: np.ndarray, sites: Sequence[Site], modes: Seque
     """The direction d of one contact with w_T along d; None where there is none."""
     from scipy.optimize import brentq
 
-    tangents = list(sites[k].rows[1:])
+    tangents = sites[k].tangents
 
     def across(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -123,6 +123,22 @@ def test_lemke_finds_what_the_enumeration_finds_in_a_plane(n: int, monkeypatch: 
     assert missed <= 3  # friction of contacts that slip leaves matrices that are not copositive
 
 
+def test_what_static_friction_holds_does_not_begin_to_slide() -> None:
+    """Between the bounds of kinetic and of static friction a contact sticks, and so does a joint with dry friction."""
+    contact, joint = Site((0, 1), 0.5, 0.3), Site((0,), 2.0, 1.0, bounded=True)
+    for load, expected in ((0.4, STICKING), (0.6, SLIDING)):
+        found = solutions(np.eye(2), np.array([-1.0, load]), [contact])
+        assert [one.modes[0].kind for one in found] == [expected]
+        assert found[0].lam[1] == pytest.approx(-0.4 if expected == STICKING else -0.3)
+    for load, expected, force in ((-1.5, STICKING, 1.5), (-2.5, SLIDING, 1.0)):
+        for most in (contact_laws.MOST_COMBINATIONS, 0):
+            with pytest.MonkeyPatch.context() as patched:
+                patched.setattr(contact_laws, "MOST_COMBINATIONS", most)
+                found = solutions(np.eye(1), np.array([load]), [joint])
+            assert [one.modes[0].kind for one in found] == [expected]
+            assert found[0].lam == pytest.approx([force])
+
+
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_contacts_in_space_fulfil_the_round_cone(n: int) -> None:
     stream = np.random.default_rng(20 + n)

@@ -2,9 +2,9 @@
 
 With the forces lam along the rows, the relative accelerations there are r = r_0 + D lam, D = J M^-1 J^T (with the constraints
 of the mechanism in M^-1). A row that holds has r = 0; a tangential one that does not has lam_T = s lam_N with the friction s of
-sliding, 0 in an open contact. Elimination without exchange of rows is right for every mode that a motion can be in: where the
-accelerations follow from the forces in one way only, D with the friction of sliding is a P-matrix, whose pivots are positive in
-every order. A pivot that vanishes is the edge of Painleve's region.
+sliding, 0 in an open contact; friction of a joint that slides is a given force. Elimination without exchange of rows is right for
+every mode that a motion can be in: where the accelerations follow from the forces in one way only, D with the friction of sliding
+is a P-matrix, whose pivots are positive in every order. A pivot that vanishes is the edge of Painleve's region.
 
 Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, chapters 5 and 8; Cottle, Pang and Stone, The Linear
 Complementarity Problem, section 3.3.
@@ -20,7 +20,7 @@ import numpy as np
 from symdyn.formulation.algebra import TapeAlgebra
 from symdyn.model.contacts.lowering import SOFTNESS, RigidContact
 from symdyn.model.quantity import Quantity
-from symdyn.spatial.vectors import vector
+from symdyn.spatial.vectors import vector, zeros
 from symdyn.tape.differentiate import jacobian
 from symdyn.tape.node import is_zero
 from symdyn.tape.passes import substitute
@@ -52,15 +52,20 @@ class ContactRows:
             held = [a.expression(s) for c in self.contacts for s in c.switches]
             n = len(held)
             H: np.ndarray = np.eye(n, dtype=int).astype(object)
+            fixed = zeros(n)
             reasons: list[str] = []
             sizes: list[Any] = []  # of the rows of each contact, of which some may not move: a tangent across a joint
             first = 0
             for c in self.contacts:
-                for k, s in enumerate(c.slide, start=first + 1):
-                    H[k, first] = (1 - held[k]) * a.expression(s)
-                reasons += [f"contact {c.name}: its friction jams, there is no acceleration with a finite force (Painleve)"] * (
-                    1 + len(c.slide))
-                rows = range(first, first + 1 + len(c.slide))
+                rows = range(first, first + len(c.rows))
+                for k, s in zip(rows[c.normal:], c.slide, strict=True):
+                    free = (1 - held[k]) * a.expression(s)
+                    if c.normal:
+                        H[k, first] = free
+                    else:  # friction of a joint, whose force is known
+                        fixed[k] = free
+                reasons += [f"contact {c.name}: its friction jams, there is no acceleration with a finite force "
+                            "(Painleve)"] * len(rows)
                 sizes += [sum((self.D[k, k] for k in rows), 0)] * len(rows)
                 first += len(rows)
             A, shared = self.D @ H, a.expression(SOFTNESS)
@@ -70,11 +75,11 @@ class ContactRows:
             softened = A + np.diag([shared * held[i] * sizes[i] for i in range(n)])
             least = [a.rounding * held[i] * sizes[i] for i in range(n)]
             factors = _Factors(a, softened, least, reasons)
-            b = vector(*[-h * f for h, f in zip(held, self.free, strict=True)])
+            b = vector(*[-h * f for h, f in zip(held, self.free + self.D @ fixed, strict=True)])
             x = factors.solve(b)
             if n > 1:  # rows that depend on each other are softened, which a second step undoes in what the rows determine
                 x = x + factors.solve(b - A @ x)
-            return dict(zip(self.forces, a.name("contact_force", H @ x), strict=True))
+            return dict(zip(self.forces, a.name("contact_force", H @ x + fixed), strict=True))
 
     def numbers(self, forces: Mapping[Quantity, Any], rates_along: Callable[[np.ndarray], Sequence[Any]]) -> np.ndarray:
         """[gap, static, kinetic, restitution of each contact; slips; free accelerations; forces; D; M^-1 J^T; N M^-1 J^T] row by

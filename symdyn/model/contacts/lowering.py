@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.contact_kinds import BODIES, FRICTION
 from symdyn.model.contacts.compliance import Compliance, law_of
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
+from symdyn.model.contacts.joints import JointElement, Row
 from symdyn.model.event import Event
 from symdyn.model.faults import Faults
 from symdyn.model.loads import Force, Torque
@@ -35,14 +37,15 @@ SOFTNESS = sp.Symbol("contacts_shared", real=True)
 
 @dataclass(frozen=True)
 class RigidContact:
-    """A rigid contact in one place.
+    """A rigid contact in one place, or one row of an element of joints.
 
-    gap       m; rows: relative velocities along the normal and the tangents, m/s
+    gap       m; rows: relative velocities along the normal and the tangents, m/s; dry friction of a joint has no normal row
     forces    quantities of the forces along the rows
     switches  parameters: for each row whether it holds
-    slide     coefficients of the tangential forces by the normal force while the contact slides
+    slide     coefficients of the tangential forces by the normal force while the contact slides; without one, the forces
     sliding   parameters of the direction of slip, one for each tangent
     events    what its events are called after its name
+    kind      BODIES, or that of the element of joints
     """
 
     name: str
@@ -58,6 +61,12 @@ class RigidContact:
     restitution: sp.Expr
     impact: str
     events: tuple[str, ...]
+    kind: str = BODIES
+
+    @property
+    def normal(self) -> bool:
+        """Whether its first row is a normal one, which opens."""
+        return self.kind != FRICTION
 
     @property
     def expressions(self) -> list[sp.Expr]:
@@ -105,6 +114,11 @@ def with_contacts(system: System) -> System:
     known = {"ground", *[b.name for b in system.bodies if isinstance(b.name, str)]}
     for contact in system.contacts:
         before = len(faults)
+        if isinstance(contact, JointElement):
+            faults.extend([*contact.faults, *contact.number_faults(system.defaults)])
+            for row in contact.rows(system, faults) if len(faults) == before else ():
+                _add_row(result, contact, row)
+            continue
         faults.extend([*contact.faults, *contact.structure_faults(system.planar), *contact.number_faults(system.defaults),
                        *_body_faults(contact, known)])
         if len(faults) == before:
@@ -150,6 +164,25 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
                                               tuple(events)))
     _act(system, geometry, touch, directions, forces)
+    for what, value in events.items():
+        system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
+
+
+def _add_row(system: System, element: JointElement, row: Row) -> None:
+    """Loads, events and the row of an element of joints."""
+    name, force = row.name, contact_force(row.name, 0)
+    switch = sp.Symbol(f"{name}_{'sticking' if row.kind == FRICTION else 'closed'}", real=True)
+    sliding: tuple[sp.Symbol, ...] = ()
+    slide: tuple[sp.Expr, ...] = ()
+    events: dict[str, sp.Expr] = {CLOSES: row.gap, OPENS: force}
+    if row.kind == FRICTION:
+        sliding = (sp.Symbol(f"{name}_sliding", real=True),)
+        slide, events = _sliding(element.kinetic, (row.rate,), sliding)
+        events[SLIPS] = element.static**2 - force**2
+    system.rigid_contacts.append(RigidContact(name, element.name, row.gap, (row.rate,), (force,), (switch,), slide, sliding,
+                                              element.static, element.kinetic, element.restitution, element.impact,
+                                              tuple(events), row.kind))
+    system.loads += element.act(row, force)
     for what, value in events.items():
         system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symdyn.backend.metadata import ContactRecord
+from symdyn.contact_kinds import BODIES, CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
 from symdyn.runtime.integrating.events import Happened
@@ -87,22 +88,24 @@ def numbers(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any)
 def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> None:
     """Raise ArgumentError for contacts that overlap at the start, with how deep and a state that does not."""
     at = numbers(module, t, x, p, inputs)
-    deep = [k for k in range(len(at.gap)) if at.gap[k] < -TOUCHING]
+    deep = [k for k, gap in enumerate(at.gap) if gap < -TOUCHING and module.metadata.contacts[k].kind != CLUTCH]
     if not deep:
         return
-    first = [rows[0] for rows in rows_of(module.metadata.contacts)]
+    records = module.metadata.contacts
+    first = [rows[0] for rows in rows_of(records)]
     moved, n_q = x.copy(), module.metadata.sizes.q
     for _ in range(20):
         now = numbers(module, t, moved, p, inputs)
-        below = [k for k in range(len(now.gap)) if now.gap[k] < 0]
+        below = [k for k, gap in enumerate(now.gap) if gap < 0 and records[k].kind != CLUTCH]
         if not below:
             break
         places = [first[k] for k in below]
         push = np.linalg.lstsq(now.D[np.ix_(places, places)], -now.gap[below], rcond=1e-10)[0]
         moved[:n_q] += now.coordinates[:, places] @ push
-    told = ", ".join(f"{module.metadata.contacts[k].name} by {-at.gap[k]:.6g} m" for k in deep)
+    told = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
     names = module.metadata.q
-    lifted = bool((numbers(module, t, moved, p, inputs).gap >= -TOUCHING).all())
+    lifted = all(gap >= -TOUCHING for gap, record in zip(numbers(module, t, moved, p, inputs).gap, records, strict=True)
+                 if record.kind != CLUTCH)
     remedy = "start from q = {" + ", ".join(f"{name}: {value:.9g}" for name, value, old in zip(
         names, moved[:n_q], x[:n_q], strict=True) if value != old) + "}, where they touch" if lifted else "start further apart"
     raise ArgumentError(f"{module.name}: contacts overlap at the start: {told}; {remedy}")
@@ -152,7 +155,11 @@ class _Phases:
         metadata = self.module.metadata
         self.records = metadata.contacts
         self.rows = rows_of(self.records)
-        self.normal = [rows[0] for rows in self.rows]
+        self.normal = [rows[0] for rows in self.rows]  # of dry friction its only row
+        self.tangents = [list(rows[record.normal:]) for rows, record in zip(self.rows, self.records, strict=True)]
+        self.clutches = [k for k, record in enumerate(self.records) if record.kind == CLUTCH]
+        self.placed = [k for k, record in enumerate(self.records) if record.normal and record.kind != CLUTCH]  # by positions
+        self.frictions = [k for k, record in enumerate(self.records) if not record.normal]
         self.n_steps = 0
         place = {name: k for k, name in enumerate(metadata.parameters)}
         missing = [name for record in self.records for name in record.parameters if name not in place]
@@ -165,7 +172,7 @@ class _Phases:
         self.of_event = {k: (j, what) for j, own in enumerate(self.events) for what, k in own.items()}
         n = len(self.records)
         self.modes = [OPEN] * n
-        self.directions = [np.zeros(record.rows - 1) for record in self.records]
+        self.directions = [np.zeros(record.tangents) for record in self.records]
         self.still = [False] * n  # whether the slip of a closed contact is zero
         self.size = 0.0  # of coordinates and gaps
         self.fresh = [False] * n  # whether it has just begun to slip
@@ -225,9 +232,11 @@ class _Phases:
         """Raise _Stop where an open contact overlaps."""
         at = self._numbers(t, x)
         for k, (record, mode) in enumerate(zip(self.records, self.modes, strict=True)):
-            if mode == OPEN and at.gap[k] < -MISSED * self.size:
-                raise _Stop(f"contact {record.name} overlaps by {-at.gap[k]:.3g} m, since the instant at which it closed was "
-                            "missed; give event_spacing, or a finer rtol")
+            size = max(1.0, float(np.abs(at.slip).max())) if k in self.clutches else self.size
+            if mode == OPEN and at.gap[k] < -MISSED * size:
+                what = "turns back" if k in self.clutches else "overlaps"
+                raise _Stop(f"contact {record.name} {what} by {-at.gap[k]:.3g}{' m' * (record.kind == BODIES)}, since the "
+                            "instant at which it closed was missed; give event_spacing, or a finer rtol")
 
     def _count(self, passed: float, t: float, fired: Sequence[tuple[int, str]]) -> None:
         """Note how often the modes change without time passing; raise _Stop where that does not end."""
@@ -273,14 +282,15 @@ class _Phases:
 
     def _stiff(self) -> bool:
         """Whether the direction of friction is all but free: a contact in space begins to slip."""
-        return any(fresh and mode == SLIDING and record.rows == 3
+        return any(fresh and mode == SLIDING and record.tangents == 2
                    for fresh, mode, record in zip(self.fresh, self.modes, self.records, strict=True))
 
     def _parameters(self) -> np.ndarray:
         """The parameters with the modes of all contacts."""
         p = self.request.p.copy()
         for record, mode, direction in zip(self.records, self.modes, self.directions, strict=True):
-            p[self.place[record.closed]] = mode != OPEN
+            if record.closed:
+                p[self.place[record.closed]] = mode != OPEN
             if record.sticking:
                 p[self.place[record.sticking]] = mode == STICKING
                 for name, value in zip(record.sliding, direction, strict=True):
@@ -317,21 +327,28 @@ class _Phases:
             if what == "sticks":
                 self.still[k] = True
             elif what == "turns":  # a slip within the tolerances has no direction
-                v = self._numbers(t, x).slip[list(self.rows[k][1:])]
+                v = self._numbers(t, x).slip[self.tangents[k]]
                 self.still[k] = bool(np.linalg.norm(v) <= 10 * self.request.atol.max(initial=0.0))
             elif what in ("opens", "slips"):
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
         x = self._onto_surfaces(t, x)
         at = self._numbers(t, x)
-        self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0), np.abs(at.gap).max())
+        self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0),
+                        np.abs(at.gap[self.placed]).max(initial=0.0))
         closing = {k for k, what in fired if what == "closes"}
+        if start:
+            for k in self.frictions:
+                self.still[k] = self._slow(at, k)
         near = TOUCHING if start else TOGETHER * max(1.0, float(np.abs(x[:self.request.n_state]).max(initial=0.0)))
         for k, mode in enumerate(self.modes):
             v = at.slip[self.normal[k]]
-            if mode == OPEN and k not in closing and abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0):
+            if mode != OPEN or k in closing or not self.records[k].normal:
+                continue
+            if (abs(at.gap[k]) <= near and v <= (TOUCHING if start else 0.0)) or (k in self.clutches and v < -TOUCHING):
                 closing.add(k)
-        hit = [k for k in closing if at.slip[self.normal[k]] < (-TOUCHING if start else 0.0)]
-        touching = [k for k, mode in enumerate(self.modes) if mode != OPEN or k in closing]
+        hit = [k for k in closing if at.slip[self.normal[k]] < (-TOUCHING if start or k in self.clutches else 0.0)]
+        touching = [k for k, mode in enumerate(self.modes) if self.records[k].normal and (
+            mode != OPEN or k in closing or (hit and k in self.clutches))]
         rebound: list[int] = []
         if hit:
             x, rebound = self._impact(t, x, at, touching, hit)
@@ -339,7 +356,9 @@ class _Phases:
         else:
             for k in closing:
                 self.still[k] = self._slow(at, k)
-        closed = [k for k in touching if k not in rebound]
+            for k in self.frictions:
+                self.still[k] = self._slow(at, k)
+        closed = sorted([*[k for k in touching if k not in rebound], *self.frictions])
         self._choose(t, at, closed)
         resting = self._zeno(t, at, rebound, hit)
         if resting:
@@ -352,8 +371,8 @@ class _Phases:
 
     def _slow(self, at: Numbers, k: int) -> bool:
         """Whether a contact does not slip."""
-        tangents = list(self.rows[k][1:])
-        return bool(np.abs(at.slip[tangents]).max(initial=0.0) <= max(TOUCHING, NO_SPEED * np.abs(at.slip).max(initial=0.0)))
+        fastest = float(np.abs(at.slip).max(initial=0.0))
+        return bool(np.abs(at.slip[self.tangents[k]]).max(initial=0.0) <= max(TOUCHING, NO_SPEED * fastest))
 
     def _onto_surfaces(self, t: float, x: np.ndarray) -> np.ndarray:
         """Closed contacts back to gap zero without normal velocity, sticking ones without slip, by the smallest change in the
@@ -363,12 +382,16 @@ class _Phases:
             return x
         n_q, n_u = self.module.metadata.sizes.q, self.module.metadata.sizes.u
         at = self._numbers(t, x)
-        normal = [self.normal[k] for k in closed]
-        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[closed], rcond=1e-10)[0]
+        placed = [k for k in closed if k in self.placed]
+        normal = [self.normal[k] for k in placed]
+        push = np.linalg.lstsq(at.D[np.ix_(normal, normal)], -at.gap[placed], rcond=1e-10)[0] if placed else np.zeros(0)
         if np.abs(push).max(initial=0.0) > 0:
             x[:n_q] += at.coordinates[:, normal] @ push
             at = self._numbers(t, x)
-        held = normal + [row for k in closed if self.still[k] for row in self.rows[k][1:]]
+        held = [self.normal[k] for k in closed if self.records[k].normal]
+        held += [row for k in closed if self.still[k] for row in self.tangents[k]]
+        if not held:
+            return x
         stop = np.linalg.lstsq(at.D[np.ix_(held, held)], -at.slip[held], rcond=1e-10)[0]
         x[n_q:n_q + n_u] += at.speeds[:, held] @ stop
         return x
@@ -429,12 +452,13 @@ class _Phases:
             rows = tuple(range(first, first + self.records[k].rows))
             first += len(rows)
             slip = None
-            v = at.slip[list(self.rows[k][1:])]
+            v = at.slip[self.tangents[k]]
             if not impact and not self.still[k] and len(v):
                 size = np.linalg.norm(v)
                 slip = v / size if size > 0 else self.directions[k] if self.directions[k].any() else None
             sites.append(Site(rows, float(at.static[k]), float(at.kinetic[k]), slip,
-                              excluded=() if impact else tuple(self.ruled_out.get(k, ()))))
+                              excluded=() if impact else tuple(self.ruled_out.get(k, ())),
+                              bounded=not self.records[k].normal))
         return sites
 
     def _choose(self, t: float, at: Numbers, closed: Sequence[int]) -> None:
@@ -463,8 +487,8 @@ class _Phases:
         self.shared = bool(found) and found[0].shared
         for k, mode in zip(closed, found[0].modes if found else (), strict=True):
             self.modes[k] = mode.kind
-            self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].rows - 1)
-            self.fresh[k] = self.still[k] and mode.kind == SLIDING and self.records[k].rows > 1
+            self.directions[k] = mode.direction if mode.kind == SLIDING else np.zeros(self.records[k].tangents)
+            self.fresh[k] = self.still[k] and mode.kind == SLIDING and self.records[k].tangents > 0
             self.still[k] = mode.kind == STICKING
             if self.fresh[k]:  # its slip is zero, and so are what these events look at
                 self.unlooked |= {self.events[k][what] for what in ("sticks", "turns") if what in self.events[k]}
@@ -481,7 +505,7 @@ class _Phases:
             return []
         at = self._numbers(t, x)
         return [(k, "sticks") for k in range(len(self.records))
-                if self.fresh[k] and at.slip[list(self.rows[k][1:])] @ self.directions[k] < 0]
+                if self.fresh[k] and at.slip[self.tangents[k]] @ self.directions[k] < 0]
 
     def _named(self, chosen: Sequence[int], one: Solved) -> str:
         return ", ".join(f"{self.records[k].name} {mode.kind}" for k, mode in zip(chosen, one.modes, strict=True))
@@ -501,7 +525,7 @@ class _Phases:
         resting = []
         for k in rebound:
             row, e = self.normal[k], float(at.restitution[k])
-            if w[row] >= 0 or e >= 1:
+            if w[row] >= 0 or e >= 1 or k in self.clutches:
                 continue
             flight = -2 * float(at.slip[row]) / float(w[row])
             if flight < shortest or flight * float(at.slip[row]) / 4 < LOWEST_FLIGHT * self.size:

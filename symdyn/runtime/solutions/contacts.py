@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from symdyn.backend.metadata import ContactRecord
+from symdyn.contact_kinds import CLUTCH, STOP
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
 from symdyn.runtime.integrating.outcome import Impact, Phase
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
 COMPLIANT = "compliant_contacts"
+CLOSED = "closed"
 
 
 class Impacts(NamedTuple):
@@ -30,9 +33,11 @@ class Impacts(NamedTuple):
 class ContactMotion(NamedTuple):
     """A contact along a motion.
 
-    mode      "open", "sticking" or "sliding" at every time, (n_t,); a compliant one sticks where its slip is at most slip_speed
-    gap       m, (n_t,)
-    force     on body a along the normal, then along the tangents, N, (n_t, 1 + n_tangents); zero where it is open
+    mode      "open", "sticking" or "sliding" at every time, (n_t,); a compliant one sticks where its slip is at most slip_speed;
+              stops, ropes and clutches are "open" or "closed", friction of joints is never open
+    gap       m, (n_t,), of a stop what is left to it, rad or m, of a clutch its speed
+    force     on body a along the normal, then along the tangents, N, (n_t, 1 + n_tangents); zero where it is open; of a joint the
+              torque, N m, or force, N, of friction without a normal one
     slip      velocity of body a against body b along the tangents, m/s, (n_t, n_tangents)
     impulse   sum of the impulses since the start, N s, (n_t, 1 + n_tangents)
     impacts   one by one, see Impacts
@@ -89,12 +94,17 @@ def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
         t = np.array([one.t for one in hits])
         of_hits = Impacts(t, *[np.array([getattr(one, what)[own] for one in hits]).reshape(-1, len(own))
                                for what in ("impulses", "before", "after")])
-        modes = [phase.modes[place] for phase in phases]
+        modes = [_called(phase.modes[place], record) for phase in phases]
         changes = [(phase.t, mode) for i, (phase, mode) in enumerate(zip(phases, modes, strict=True))
                    if i == 0 or modes[i - 1] != mode]
         summed = np.vstack([np.zeros(len(own)), np.cumsum(of_hits.impulse, axis=0)])
         found[record.name] = ContactMotion(
             np.array(modes, dtype=object)[row_phases] if modes else np.zeros(0, dtype=object), values[:, 4 * place],
-            forces[:, own], slips[:, own[1:]], summed[np.searchsorted(t, solution.t, side="left")], of_hits,
+            forces[:, own], slips[:, own[record.normal:]], summed[np.searchsorted(t, solution.t, side="left")], of_hits,
             np.array([one.rest[place] for one in impacts if place in one.rest]), tuple(changes))
     return found
+
+
+def _called(mode: str, record: ContactRecord) -> str:
+    """The mode of a contact, or of an element of joints, which does not slide where it has no friction."""
+    return CLOSED if record.kind in (STOP, CLUTCH) and mode != OPEN else mode
