@@ -718,9 +718,9 @@ class Module:
 
         They are the derivatives of what these steps compute, exact to rounding at given lengths of the steps; with constraints
         as far as the corrections are small. The cost is that of some simulations, however many numbers there are; memory grows
-        with the square root of the number of steps; across events with that of steps. Across events, resets and instants of
-        sampled controllers (which need their gradient) the motion is cut, and the derivatives are as exact as the tolerances; a
-        loss at an end by an event moves with the time of it.
+        with the square root of the number of steps; across events with that of steps. Across events, resets, switches of rigid
+        contacts (not across both) and instants of sampled controllers (which need their gradient) the motion is cut, and the
+        derivatives are as exact as the tolerances; a loss at an end by an event moves with the time of it.
         Returns a Gradient. Raises ArgumentError for what does not fit, EvaluationError where the motion stops early or the loss
         is not finite.
 
@@ -731,7 +731,6 @@ class Module:
         """
         from symdyn.runtime.integrating.gradient import gradient
 
-        self._demand_no_rigid_contacts("gradients")
         return gradient(self, loss, by, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method,
                         max_step=max_step, first_step=first_step, stabilization=stabilization, events=events,
                         interpolation=interpolation, extend=extend)

@@ -61,7 +61,7 @@ def of_kane(kane: Any, options: Options) -> GivenMatrices:
                                                        "forces"]
     found = GivenMatrices(
         name, "kane", symbols, taken.same, mass, forcing, kinematics, (active, inertial), n_d if n_d else None, tuple(rows),
-        given, None, options.rates(taken), options.outputs_of(taken),
+        given, None, options.rates(taken), options.outputs_of(),
         auxiliary if unknown else None, _homogeneous(kane), unknown, tuple(remarks))
     _compare_angular_velocities(kane, found)
     return found

@@ -40,7 +40,7 @@ def of_lagrange(lagrange: Any, options: Options) -> GivenMatrices:
     taken.use("the forcing", forcing)
     options.use(taken)
     return GivenMatrices(name, "lagrange", options.symbols(taken), taken.same, mass, forcing, None, None, None, tuple(rows), None,
-                         _energy(lagrange, rates, taken.t), options.rates(taken), options.outputs_of(taken))
+                         _energy(lagrange, rates, taken.t), options.rates(taken), options.outputs_of())
 
 
 def _energy(lagrange: Any, rates: list[sp.Expr], t: sp.Symbol) -> tuple[sp.Expr, sp.Expr, sp.Expr] | None:

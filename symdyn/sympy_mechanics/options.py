@@ -42,14 +42,16 @@ class Options:
         """The extra states with their rates."""
         return tuple((taken.same[z], sp.sympify(rate, strict=True)) for z, rate in self.states.items())
 
-    def outputs_of(self, taken: Taken) -> tuple[tuple[str, Any], ...]:
+    def outputs_of(self) -> tuple[tuple[str, Any], ...]:
         """Outputs by name."""
-        def taken(value: Any) -> Any:
-            if isinstance(value, (list, tuple, sp.MatrixBase)):
-                return tuple(map(taken, value))
-            return sp.sympify(value, strict=True)
+        return tuple((name, _expressions(value)) for name, value in self.outputs.items())
 
-        return tuple((name, taken(value)) for name, value in self.outputs.items())
+
+def _expressions(value: Any) -> Any:
+    """An expression, or a tuple of them."""
+    if isinstance(value, (list, tuple, sp.MatrixBase)):
+        return tuple(map(_expressions, value))
+    return sp.sympify(value, strict=True)
 
 
 def _entries(value: Any) -> list[Any]:

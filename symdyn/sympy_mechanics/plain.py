@@ -48,7 +48,7 @@ def of_matrices(q: Any, u: Any, mass: Any, forcing: Any, kinematics: Any, option
     taken.use("the forcing", *forcing)
     options.use(taken)
     return GivenMatrices(options.name, "matrices", options.symbols(taken), taken.same, sp.ImmutableMatrix(M), sp.Matrix(forcing),
-                         matrices, states=options.rates(taken), outputs=options.outputs_of(taken))
+                         matrices, states=options.rates(taken), outputs=options.outputs_of())
 
 
 def _linear(kinematics: Any, q: Sequence[Any], u: Sequence[Any], taken: Taken) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix] | None:

@@ -8,8 +8,10 @@ accelerations.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +21,7 @@ from symdyn.backend.metadata import ContactRecord
 from symdyn.contact_kinds import BODIES, CLUTCH
 from symdyn.errors import ArgumentError, EvaluationError
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING, Site, Solved, degenerate, impact, solutions
+from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.stops import describe_stop
@@ -48,6 +51,9 @@ SOFTNESS = 1e-8
 GRACE = 1e-9
 # The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
 SLIP_GRACE = 1e-5
+# Part of a phase of sliding in space before its end in which errors of sensitivities are not controlled, and a tolerance that no
+# error comes near.
+LAST_STRETCH, ANY = 1e-4, 1e300
 
 
 class Numbers(NamedTuple):
@@ -111,11 +117,13 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
     raise ArgumentError(f"{module.name}: contacts overlap at the start: {told}; {remedy}")
 
 
-def run_contacts(module: Module, request: Request, part: Part, method: object = None) -> Outcome:
+def run_contacts(module: Module, request: Request, part: Part, method: object = None,
+                 crossed: list[Switch] | None = None) -> Outcome:
     """Integrate with rigid contacts.
 
     part     integrates a request in one mode; by an implicit method, and with all contacts open, if so told
     method   the one that it integrates by else
+    crossed  takes the switches, for a way back
 
     Raises ArgumentError for what contacts do not take.
     """
@@ -126,12 +134,21 @@ def run_contacts(module: Module, request: Request, part: Part, method: object = 
     if method == "ggl":
         raise ArgumentError(f"{module.name}: method='ggl' does not locate the switches of rigid contacts; pass 'dop853' or "
                             "another")
-    if request.columns:
-        raise ArgumentError(f"{module.name}: sensitivities do not go across the switches of rigid contacts; leave them out")
     if request.inputs.are_held:
         raise ArgumentError(f"{module.name}: controllers whose values are held between instants do not go with rigid contacts; "
                             "pass their law as an expression of the system, or as a function of (t, x)")
-    return _Phases(module, request, part).through()
+    phases = _Phases(module, request, part, keeps=crossed is not None, crossed=[] if crossed is None else crossed)
+    return phases.through()
+
+
+class Made(NamedTuple):
+    """What was done to the state at a switch: put onto the surfaces of contacts by modes and whether they slip, or, where
+    contacts are hit, an impact."""
+
+    modes: tuple[str, ...]
+    still: tuple[bool, ...]
+    touching: tuple[int, ...] = ()
+    hit: tuple[int, ...] = ()
 
 
 class _Stop(Exception):
@@ -150,6 +167,9 @@ class _Phases:
     impacts: list[Impact] = field(default_factory=list)
     happened: list[Happened] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
+    keeps: bool = False  # whether switches are kept for a way back
+    crossed: list[Switch] = field(default_factory=list)
+    made: list[Made] = field(default_factory=list)  # at the latest switch
 
     def __post_init__(self) -> None:
         metadata = self.module.metadata
@@ -183,6 +203,8 @@ class _Phases:
         self.ruled_out: dict[int, set[str]] = {}  # modes at this time
         self.unlooked: set[int] = set()
         self.until = np.inf  # and until when these events are not looked for
+        self.closing: set[int] = set()  # at the latest switch
+        self.last_stretch = np.inf  # when the last part of a phase begins, see _towards_sticking
 
     # -- the run
 
@@ -193,11 +215,11 @@ class _Phases:
         last = end if request.times is None else float(request.times[-1])
         x, message, cause, interrupted, over = request.x0.copy(), "", None, False, False
         fired: list[tuple[int, str]] = []
-        begun = True
+        begun, located = True, False
         try:
             while True:
                 if begun or fired:
-                    x = self._switch(t, x, fired, begun)
+                    x = self._switched(t, x, fired, begun, located)
                 begun = False
                 outcome = self._phase(t, x)
                 if not outcome.success:
@@ -211,6 +233,7 @@ class _Phases:
                     message = outcome.message
                     break
                 until = float(latest[-1].t) if fired else min(self.until, end)
+                located = bool(fired)
                 if fired:
                     x = latest[-1].before.copy()
                 elif until >= last:
@@ -264,6 +287,8 @@ class _Phases:
         self.phases.append(Phase(float(t), p, tuple(self.modes)))
         part = replace(request, span=(t, end), times=times, x0=x, p=p, max_steps=left, look=self._looked_for())
         stiff = self._stiff()
+        if request.columns and self._in_space():
+            part = self._towards_sticking(t, part)
         outcome = self.part(replace(part, first_step=GRACE * (request.span[1] - request.span[0])) if stiff else part, stiff,
                             all(mode == OPEN for mode in self.modes))
         rows = np.ones(len(outcome.t), dtype=bool)
@@ -279,6 +304,27 @@ class _Phases:
         self.happened += outcome.happened
         self.n_steps += outcome.n_steps
         return outcome
+
+    def _in_space(self) -> bool:
+        """Whether the direction of a slip changes with the state."""
+        return any(mode == SLIDING and record.tangents == 2 for mode, record in zip(self.modes, self.records, strict=True))
+
+    def _towards_sticking(self, t: float, part: Request) -> Request:
+        """A phase of sensitivities in which a contact slips in space. Where it comes to stick derivatives of the direction of
+        friction have no bound: before that a last stretch begins, in which errors of the columns are not controlled. What these
+        do to velocities there is undone when the contact sticks."""
+        n = part.n_state
+        if t >= self.last_stretch:
+            return replace(part, atol=np.append(part.atol[:n], np.full(len(part.x0) - n, ANY)))
+        alone = replace(part, times=None, x0=part.x0[:n], atol=part.atol[:n], columns=(), held=(), followed=())
+        ahead = self.part(alone, False, False)
+        ends = [self.of_event.get(one.event, (0, ""))[1] for one in ahead.happened[-1:]]
+        if not ahead.success or not {"sticks", "turns"}.intersection(ends):
+            return part
+        self.last_stretch = float(ahead.t[-1]) - LAST_STRETCH * (float(ahead.t[-1]) - t)
+        self.until = min(self.until, self.last_stretch)
+        wanted = None if part.times is None else part.times[part.times < self.until]
+        return replace(part, span=(t, self.until), times=None if wanted is None else np.append(wanted, self.until))
 
     def _stiff(self) -> bool:
         """Whether the direction of friction is all but free: a contact in space begins to slip."""
@@ -315,6 +361,53 @@ class _Phases:
 
     # -- switches
 
+    def _switched(self, t: float, x: np.ndarray, fired: Sequence[tuple[int, str]], start: bool, located: bool) -> np.ndarray:
+        """The state after a switch with its sensitivities; located: whether it is where an event happens."""
+        if not self.request.columns and not self.keeps:
+            return self._switch(t, x, fired, start)
+        p, n, self.last_stretch = self._parameters(), self.request.n_state, np.inf
+        after = self._switch(t, x, fired, start)
+        if start:  # changes of the start keep contacts that are closed there on their surfaces
+            self.made.append(Made(tuple(self.modes), tuple(self.still)))
+        since = t - self.phases[-1].t if self.phases else self.request.span[1] - t
+        events = [(self.events[k][what], f"{self.records[k].name}_{what}")
+                  for k, what in self._timed(fired).items()] if located else []
+        switch = Switch(self.module, t, x[:n].copy(), after[:n].copy(), p, self._parameters(), tuple(events),
+                        partial(self._made_again, tuple(self.made)), since, self.request.inputs)
+        if self.keeps:
+            self.crossed.append(switch)
+        if self.request.columns:
+            try:
+                after[n:] = switch.along(switch.moves(x[n:].reshape(-1, n), self.request.columns))[1].ravel()
+            except EvaluationError as error:
+                raise _Stop(str(error)) from None
+        return after
+
+    def _timed(self, fired: Sequence[tuple[int, str]]) -> dict[int, str]:
+        """The contacts whose events set the time of the latest switch, with the event. A slip that only turns changes nothing."""
+        found = {}
+        for k, what in sorted(fired, key=lambda one: FIRST.index(one[1]), reverse=True):
+            if what != "turns":
+                found[k] = what
+            elif self.modes[k] == STICKING:
+                found[k] = "sticks"
+        return {**found, **dict.fromkeys(sorted(self.closing), "closes")}
+
+    def _made_again(self, made: Sequence[Made], t: float, x: np.ndarray, p: np.ndarray, inputs: Any) -> tuple[np.ndarray, Any]:
+        """The state that a switch makes of another one, and what the contacts that are hit do there."""
+        other = copy.copy(self)
+        other.request = replace(self.request, p=p, inputs=inputs)
+        other.impacts, other.happened, other.doubts = [], [], []
+        x, decided = x.copy(), []
+        for one in made:
+            other.modes, other.still = list(one.modes), list(one.still)
+            if one.hit:
+                x, rebound = other._impact(t, x, other._numbers(t, x), one.touching, one.hit)
+                decided.append((tuple(rebound), tuple(other.still)))
+            else:
+                x = other._onto_surfaces(t, x)
+        return x, decided
+
     def _numbers(self, t: float, x: np.ndarray) -> Numbers:
         request = self.request
         inputs = request.inputs.at(t, x[:request.n_state])
@@ -328,9 +421,10 @@ class _Phases:
                 self.still[k] = True
             elif what == "turns":  # a slip within the tolerances has no direction
                 v = self._numbers(t, x).slip[self.tangents[k]]
-                self.still[k] = bool(np.linalg.norm(v) <= 10 * self.request.atol.max(initial=0.0))
+                self.still[k] = bool(np.linalg.norm(v) <= 10 * self.request.atol[:self.request.n_state].max(initial=0.0))
             elif what in ("opens", "slips"):
                 self.ruled_out.setdefault(k, set()).update((STICKING, SLIDING) if what == "opens" else (STICKING,))
+        self.made = [Made(tuple(self.modes), tuple(self.still))]
         x = self._onto_surfaces(t, x)
         at = self._numbers(t, x)
         self.size = max(self.size, np.abs(x[:self.module.metadata.sizes.q]).max(initial=0.0),
@@ -350,7 +444,9 @@ class _Phases:
         touching = [k for k, mode in enumerate(self.modes) if self.records[k].normal and (
             mode != OPEN or k in closing or (hit and k in self.clutches))]
         rebound: list[int] = []
+        self.closing = closing
         if hit:
+            self.made.append(Made(tuple(self.modes), tuple(self.still), tuple(touching), tuple(hit)))
             x, rebound = self._impact(t, x, at, touching, hit)
             at = self._numbers(t, x)
         else:
@@ -365,6 +461,7 @@ class _Phases:
             closed = sorted({*closed, *resting})
             for k in resting:
                 self.modes[k], self.still[k] = SLIDING, self._slow(at, k)
+            self.made.append(Made(tuple(self.modes), tuple(self.still)))
             x = self._onto_surfaces(t, x)
             self._choose(t, self._numbers(t, x), closed)
         return x

@@ -19,15 +19,19 @@ from symdyn.runtime.inputs.inputs import take_inputs
 from symdyn.runtime.inputs.sampled import check_span
 from symdyn.runtime.integrating.across import Chain
 from symdyn.runtime.integrating.at_kinks import ending, staying
-from symdyn.runtime.integrating.events import not_seen, wanted
+from symdyn.runtime.integrating.contact_chain import ContactChain
+from symdyn.runtime.integrating.contact_columns import Switch
+from symdyn.runtime.integrating.contacts import check_overlap
+from symdyn.runtime.integrating.events import not_seen
 from symdyn.runtime.integrating.methods import DEFAULT, check_compiled
-from symdyn.runtime.integrating.outcome import Request
+from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.sensitivities import Asked, unseen_jumps
 from symdyn.runtime.integrating.simulate import (
     checked_positive,
     checked_times,
     checked_tolerances,
     integrate,
+    looked_for,
     stabilization_of,
     start_of,
 )
@@ -95,12 +99,15 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
     free = take_inputs(inputs, metadata.inputs, metadata.initial, module.name, span, interpolation, extend, metadata.motions)
     module = module.following(free)
     check_span(free.samplers, span, module.name)
+    look = looked_for(module, events)
     request = Request(span, None, start, p, free, *checked_tolerances(module, rtol, atol),
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
-                      None, len(start), look=wanted(module, events))
+                      None, len(start), look=look)
     asked = Asked.of(module, by, p, free)
     method = _checked(module, request, asked, method or DEFAULT)
     check_start(module, span[0], start, p)
+    if metadata.contacts:
+        check_overlap(module, span[0], start, p, free.at(span[0], start))
     request = replace(request, stabilization=stabilization_of(module, request, method, stabilization))
     asked.check(module, request, method, False)
     followed = Feedback(module, free, ()).names
@@ -118,7 +125,7 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
             weights[len(x):] = at.by[0]
         value = float(at.values[0])
     Feedback(module, free, names).fold(t, x, weights)
-    if isinstance(way, Chain):
+    if not isinstance(way, Way):
         value += way.back(integral, weights, lambda: 0.0 if end is None else _by_time(end, request, t, x))
     else:
         value += way.back(integral, weights)
@@ -131,12 +138,20 @@ def gradient(module: Module, loss: Any, by: Any, t: Any = None, q: Any = None, u
                     clock.perf_counter() - begun)
 
 
-def _way(module: Module, request: Request, method: str, carried: Sequence[str]) -> Way | Chain:
-    """What goes forth and back; in pieces where events are looked for or controllers hold inputs."""
+def _way(module: Module, request: Request, method: str, carried: Sequence[str]) -> Way | Chain | ContactChain:
+    """What goes forth and back; in pieces where events are looked for, controllers hold inputs, or contacts switch."""
+    if module.metadata.contacts:
+        switches: list[Switch] = []
+        return ContactChain(module, request, method, carried, _checked_run(module, request, method, switches), switches, KEPT)
     looked = request.look is not None and request.look.any()
     if not looked and not request.inputs.samplers and not module.metadata.switches:
         return Way(module, request, method, carried, KEPT)
-    outcome = integrate(module, request, method)
+    return Chain(module, request, method, carried, _checked_run(module, request, method), KEPT)
+
+
+def _checked_run(module: Module, request: Request, method: str, switches: list[Switch] | None = None) -> Outcome:
+    """The motion, which must come to its end; what it warns of is warned of. switches: takes those of contacts."""
+    outcome = integrate(module, request, method, crossed=switches)
     if outcome.interrupted:
         raise KeyboardInterrupt
     if not outcome.success:
@@ -144,8 +159,8 @@ def _way(module: Module, request: Request, method: str, carried: Sequence[str]) 
     unseen = not_seen(module, request.look, request.inputs.by_function(module.metadata.inputs), request.event_spacing)
     recorded = replace(request, inputs=request.inputs.recorded(outcome.record))
     for doubt in (*outcome.doubts, *filter(None, [unseen]), *unseen_jumps(module, recorded, outcome)):
-        warnings.warn(doubt, SimulationWarning, stacklevel=5)
-    return Chain(module, request, method, carried, outcome, KEPT)
+        warnings.warn(doubt, SimulationWarning, stacklevel=6)
+    return outcome
 
 
 def _cost(cost: Cost, request: Request, t: float, x: np.ndarray) -> Costs:

@@ -52,6 +52,9 @@ class Asked:
         faults += [f"a sensitivity by the input {name} was asked for, which varies over time here; only constant inputs "
                    "have one. Make what it follows a parameter of the system"
                    for name in by if name in metadata.inputs and name in inputs.varying(metadata.inputs)]
+        faults += [f"a sensitivity by {name} was asked for, but {name} says in which mode the contact {record.name} is, which "
+                   "follows from the motion; leave it out"
+                   for record in metadata.contacts for name in by if name in record.parameters]
         if faults:
             raise ArgumentError(f"{module.name}: {'; '.join(faults)}")
         values = {**dict(zip(metadata.inputs, inputs.constant, strict=True)), **dict(zip(metadata.parameters, p, strict=True))}

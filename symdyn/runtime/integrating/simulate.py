@@ -41,6 +41,7 @@ from symdyn.runtime.solutions.validity import WATCHES, warn
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    from symdyn.runtime.integrating.contact_columns import Switch
     from symdyn.runtime.module import Module
 
 N_POINTS = 1001
@@ -78,12 +79,9 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                             f"found {shown(max_steps)}")
     request = Request(span, None if every else times, start, p, free, *checked_tolerances(module, rtol, atol),
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
-                      max_steps, len(start), look=wanted(module, events),
+                      max_steps, len(start), look=looked_for(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
     asked, controlled = Asked.of(module, sensitivities, p, free), flag(sensitivity_control, f"{module.name}: sensitivity_control")
-    if metadata.contacts and request.look is not None:  # theirs are looked for as their modes say
-        own = {f"{c.name}_{what}" for c in metadata.contacts for what in c.events}
-        request = replace(request, look=request.look & np.array([e.name not in own for e in metadata.events]))
     if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
     method = method or (DEFAULT if module.backend == "c" else "DOP853")
@@ -139,12 +137,18 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
         return solution
 
 
-def integrate(module: Module, request: Request, method: Any, bar: Any = None) -> Outcome:
-    """A request, checked, by any method."""
+def looked_for(module: Module, events: Any) -> np.ndarray:
+    """Events that are looked for all along, (n_e,) of bool: those of rigid contacts are as their modes say."""
+    own = {f"{c.name}_{what}" for c in module.metadata.contacts for what in c.events}
+    return wanted(module, events) & np.array([e.name not in own for e in module.metadata.events], dtype=bool)
+
+
+def integrate(module: Module, request: Request, method: Any, bar: Any = None, crossed: list[Switch] | None = None) -> Outcome:
+    """A request, checked, by any method; crossed: takes the switches of rigid contacts, for a way back."""
     if module.metadata.contacts:
         stiff = "radau" if is_compiled(method) else "Radau"
         return run_contacts(module, request, lambda part, slow, parted: _run_smooth(
-            module, part, stiff if slow else method, bar, parted), method)
+            module, part, stiff if slow else method, bar, parted), method, crossed)
     return _run_smooth(module, request, method, bar)
 
 
