@@ -7,19 +7,34 @@ import functools
 import hashlib
 import json
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from symdyn.backend.metadata import ModuleMetadata
-from symdyn.backend.right_side import RightSide
+from symdyn.backend.right_side import METHOD, RightSide
 from symdyn.errors import SymdynError
 from symdyn.runtime.building.library import Unit
 from symdyn.runtime.building.texts import Texts
+from symdyn.runtime.integrating.methods import is_compiled
 from symdyn.runtime.module import Module
 
 
 class NotSent(SymdynError):
     """A function is not among those that came along."""
+
+
+def of_contacts(module: Module, options: Mapping[str, Any]) -> list[str | RightSide]:
+    """What members with rigid contacts call, whichever modes they come to; options: of `simulate`."""
+    contacts, method = module.metadata.contacts, options.get("method", METHOD)
+    if not contacts:
+        return []
+    functions: list[str | RightSide] = ["rhs", "contacts", "events"]
+    if module.backend != "c" or not isinstance(method, str) or not is_compiled(method):
+        return functions
+    columns = tuple("" if name.endswith("(0)") else name for name in options.get("sensitivities", ()))
+    methods = [method, *["radau"] * any(contact.rows == 3 for contact in contacts)]
+    return functions + [RightSide(method=one, sensitivities=by, open_contacts=parted)
+                        for one in dict.fromkeys(methods) for by in dict.fromkeys([columns, ()]) for parted in (False, True)]
 
 
 class PortableModule:
@@ -29,7 +44,7 @@ class PortableModule:
     functions   what is sent along with all that was used here already
     """
 
-    def __init__(self, module: Module, functions: Sequence[str]) -> None:
+    def __init__(self, module: Module, functions: Sequence[str | RightSide]) -> None:
         self._texts = Texts(module.backend)
         self._given = module
         self._functions = tuple(functions)

@@ -21,7 +21,7 @@ from symdyn.ensembles.code import fingerprint
 from symdyn.ensembles.dispatch import ExecutorFailed, run_chunks
 from symdyn.ensembles.lock import OneRun
 from symdyn.ensembles.measures import Measure, functions_of, output_times, take_measures
-from symdyn.ensembles.portable import PortableModule
+from symdyn.ensembles.portable import PortableModule, of_contacts
 from symdyn.ensembles.result import Ensemble
 from symdyn.ensembles.samples import Samples
 from symdyn.ensembles.store import Store, check_folder, check_same, write_manifest
@@ -108,7 +108,8 @@ def ensemble(system: Module | System, samples: Samples | SampleValues, t: Times 
     options |= _derivatives(module, drawn, measures, sensitivities)
     times = output_times(t, measures, module)
     vectors = drawn.count >= VECTORS_FROM and vectors_serve(module, consistent, options)
-    portable = PortableModule(module, [*functions_of(module, measures), *functions, *[UNIT] * vectors])
+    portable = PortableModule(module, [*functions_of(module, measures), *of_contacts(module, options), *functions,
+                                       *[UNIT] * vectors])
     given = {"q": q, "u": u, "z": z, "parameters": params, "inputs": inputs}
     if varies_over_time(inputs):
         raise ArgumentError(f"{module.name}: an ensemble takes numbers as inputs, found {shown(inputs, 80)}; write what goes "
