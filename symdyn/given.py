@@ -56,3 +56,5 @@ if TYPE_CHECKING:
     # Symbols or names.
     Names: TypeAlias = Sequence[str] | Sequence[sp.Symbol] | Sequence[Key] | Key
     PathName: TypeAlias = str | PathLike[str]
+    # The mode of a rigid contact, with a direction of slip where it has none.
+    ContactMode: TypeAlias = str | tuple[str, float | Row]

@@ -28,7 +28,7 @@ from symdyn.runtime.paths import as_path, writing
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
-    from symdyn.given import Key, Named, Names, Numbers, PathName, Row, States, Times, Values
+    from symdyn.given import ContactMode, Key, Named, Names, Numbers, PathName, Row, States, Times, Values
     from symdyn.report.text import Report
     from symdyn.runtime.batches.solution import BatchSolution
     from symdyn.runtime.inputs.inputs import Inputs
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
     from symdyn.statics.actuation import Actuation
     from symdyn.statics.campbell import Campbell
+    from symdyn.statics.contact_rest import Rest
     from symdyn.statics.equilibria import Equilibria
     from symdyn.statics.equilibrium import Equilibrium
     from symdyn.statics.linearize import Linearization
@@ -837,20 +838,50 @@ class Module:
         self._demand_no_rigid_contacts("equilibria")
         return equilibria(self, starts, ranges, seed, start, free, fixed, params, t, inputs, unknown_params, max_iterations)
 
-    def linearize(self, at: Start | None = None, params: States | None = None, t: float | None = None,
+    def rest(self, start: Start | None = None, params: Values | None = None, inputs: Values | None = None, t: float = 0.0,
+             contacts: Mapping[str, ContactMode] | None = None) -> Rest:
+        """A state of rest on rigid contacts near a start: where forces balance, with normal forces that push and friction within
+        its cones.
+
+        start      coordinates by name or symbol, in order, or x; default: the system's initial values
+        params, inputs, t   as for `equilibrium`
+        contacts   modes by name, "open", "sticking" or "sliding" (without friction); what is left out is open. Default: contacts
+                   that touch at the start stick, or slide where they have no friction
+
+        Contacts that stick stay where they are; all else moves until it balances. Raises NoEquilibrium where nothing does, or
+        where the contacts would have to pull or rub more than they can; ArgumentError for what does not fit. See
+        symdyn.statics.contact_rest.Rest for the forces, which contacts carry, and the range over which the state stays.
+
+        >>> y = sd.coordinates("y")
+        >>> system = sd.System("ball", gravity=[0, -9.81])
+        >>> ball = system.add_body("ball", mass=1.0)
+        >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, axis=[0, 1], coordinate=y))
+        >>> system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> system.compile(backend="numpy").rest().contacts["floor"].force
+        array([9.81])
+        """
+        from symdyn.statics.contact_rest import rest
+
+        return rest(self, start, params, inputs, t, contacts)
+
+    def linearize(self, at: Start | Rest | None = None, params: States | None = None, t: float | None = None,
                   inputs: States | None = None, free: Names | None = None, fixed: Numbers | None = None,
-                  coordinates: Names | None = None, hold: Names | None = None) -> Linearization:
+                  coordinates: Names | None = None, hold: Names | None = None,
+                  contacts: Mapping[str, ContactMode] | None = None) -> Linearization:
         """The linear equations about a state on the manifold of the constraints, by exact derivatives.
 
-        at            an Equilibrium, with all that belongs to it; a Solution, at its time nearest to t; x in order; (q, u); or by
-                      name or symbol. Default: the system's initial values
+        at            an Equilibrium or a Rest, with all that belongs to it; a Solution, at its time nearest to t; x in order;
+                      (q, u); or by name or symbol. Default: the system's initial values
         free, fixed   as for `equilibrium`; what stays is left out
         coordinates   which changes are independent, where constraints leave a choice; default: the best conditioned
         hold          coordinates and speeds that are held when the state is disturbed, by name or symbol; default: what `fixed`
                       names or the equilibrium kept, but for the conditions of a trim; () holds nothing
+        contacts      modes of rigid contacts by name: "open", "sticking", "sliding", or ("sliding", direction) where nothing
+                      slips; what is left out is open. Changes keep closed contacts closed, and sticking ones where they stick
 
         See symdyn.statics.linearize.Linearization for M, C, K, A, B, C_out, D, modes() and derivative().
-        Raises ArgumentError for states off the constraints, and for those where the equations have a kink or a jump.
+        Raises ArgumentError for states off the constraints, for those where the equations have a kink or a jump, and where
+        contacts touch whose modes are not given.
 
         >>> module = sd.systems.pendulum().compile(backend="numpy")
         >>> module.linearize({"q1": 0.0}).A.round(4) + 0.0
@@ -859,7 +890,7 @@ class Module:
         """
         from symdyn.statics.linearize import linearize
 
-        return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold)
+        return linearize(self, at, params, t, inputs, free, fixed, coordinates, hold, contacts)
 
     def stability(self, at: Start | None = None, params: States | None = None, t: float = 0.0, inputs: States | None = None,
                   free: Names | None = None, fixed: Numbers | None = None, hold: Names | None = None,
@@ -945,7 +976,8 @@ class Module:
         names = ", ".join(contact.name for contact in self.metadata.contacts)
         if names:
             raise ArgumentError(f"{self.name}: {what} are not known with the rigid contacts {names}, whose modes follow from a "
-                                "motion; run simulate until the motion comes to rest, or replace the contacts by constraints")
+                                "motion; take module.rest(...) for states of rest on them, run simulate until the motion comes "
+                                "to rest, or replace the contacts by constraints")
 
     # -- about the module
 

@@ -14,6 +14,8 @@ from symdyn.runtime.consistent import NotConsistent, check_start, consistent, no
 from symdyn.runtime.masses import real_parameters
 from symdyn.shown import shown
 from symdyn.statics.analysis import WORDS, Analysis, held_note
+from symdyn.statics.contact_modes import demand_modes, with_modes
+from symdyn.statics.contact_rest import Rest
 from symdyn.statics.equilibrium import Equilibrium, given_inputs
 from symdyn.statics.gimbal import demand_no_lock
 from symdyn.statics.kinks import kink, no_linear_equations
@@ -329,8 +331,14 @@ def _table(name: str, matrix: np.ndarray, rows: Sequence[str], columns: Sequence
 
 
 def linearize(module: Module, at: Any = None, params: Any = None, t: float | None = None, inputs: Any = None, free: Any = None,
-              fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None) -> Linearization:
+              fixed: Any = None, coordinates: Sequence[Any] | None = None, hold: Any = None,
+              contacts: Any = None) -> Linearization:
     """See Module.linearize."""
+    if isinstance(at, Rest):
+        if any(v is not None for v in (params, t, inputs, contacts)) or at.module is not module:
+            raise ArgumentError(f"{module.name}: a state of rest on contacts has its own parameters, time, inputs and modes, and "
+                                "belongs to one module; leave them out, or pass at=rest.x")
+        at, params, t, inputs = at.x, at.params, at.t, at.inputs
     if isinstance(at, Equilibrium):
         passed = [n for n, v in (("params", params), ("t", t), ("inputs", inputs), ("free", free), ("fixed", fixed))
                  if v is not None]
@@ -343,7 +351,9 @@ def linearize(module: Module, at: Any = None, params: Any = None, t: float | Non
         point = at.point if hold is None else in_motion(at.point, selection)
         _demand_smooth(point, selection)
         return Linearization(Manifold(point, selection, _independent(module, coordinates)), at)
-    point, selection = state_of(module, at, params, t, inputs, free, fixed, hold)
+    point, selection = state_of(module, at, params, t, inputs, free, fixed, hold, contacts=contacts)
+    if contacts is None:
+        demand_modes(module, point.t, point.x, point.p, point.inputs)
     _demand_smooth(point, selection)
     return Linearization(Manifold(point, selection, _independent(module, coordinates)), None)
 
@@ -356,12 +366,14 @@ def _demand_smooth(point: OperatingPoint, selection: Selection) -> None:
 
 
 def state_of(module: Module, at: Any, params: Any, t: float | None, inputs: Any, free: Any, fixed: Any,
-             hold: Any, guess: bool = False) -> tuple[OperatingPoint, Selection]:
+             hold: Any, guess: bool = False, contacts: Any = None) -> tuple[OperatingPoint, Selection]:
     """A state with its accelerations, and what is held there. Raises ArgumentError for one that violates the constraints.
 
-    guess   the state may be moved onto the constraints
+    guess   the state may be moved onto the constraints; contacts: modes of rigid ones
     """
     point = _place(module, at, params, t, inputs)
+    if contacts is not None:
+        point = point.at(p=with_modes(module, contacts, point.t, point.x, point.p, point.inputs))
     selection = holding(select(module, free, fixed, None), hold)
     x = selection.apply(point.x)
     if guess and point.sizes[3]:

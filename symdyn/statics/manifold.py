@@ -20,7 +20,7 @@ Nonholonomic Systems, chapter V (velocity constraints near steady motion).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ import scipy.linalg
 
 from symdyn.errors import ArgumentError
 from symdyn.runtime.constraints import turning
+from symdyn.statics.contact_modes import contact_rows
 from symdyn.statics.gimbal import REMEDY
 from symdyn.statics.selection import Selection
 from symdyn.statics.terms import OperatingPoint, coordinate_names, null_space
@@ -48,7 +49,7 @@ CONDITION = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Rows of what is held besides the constraints.
+    """Rows of what is held besides the constraints, by a selection and by closed contacts.
 
     positions   (k, n_u) in v; speeds (l, n_u) in u'; the derivatives of the latter's rates and accelerations by x and inputs:
     rates (l, n_x), accelerations (l, n_x), rates_in (l, n_in), accelerations_in (l, n_in)
@@ -63,7 +64,7 @@ class Held:
 
 
 def held_rows(point: OperatingPoint, selection: Selection) -> Held:
-    """The rows of what a selection holds."""
+    """The rows of what a selection and closed contacts hold."""
     metadata = point.module.metadata
     n_u = point.sizes[1]
     coordinates, speeds = held_indices(point, selection)
@@ -71,9 +72,14 @@ def held_rows(point: OperatingPoint, selection: Selection) -> Held:
     first, second = (np.arange(s.start, s.stop)[coordinates] for s in (parts["q_dot"], parts["q_ddot"]))
     positions = point.N[coordinates]
     by_x, by_in = (np.zeros((len(speeds), n)) for n in (n_x, n_in))
-    return Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]),
+    held = Held(positions, np.vstack([positions, np.eye(n_u)[speeds]]),
                 *(np.vstack([whole[rows], still]) for whole, still in ((point.whole_x, by_x), (point.whole_inputs, by_in))
                   for rows in (first, second)))
+    rows = contact_rows(point)
+    if rows is None:
+        return held
+    more = (rows.by_u, rows.by_u, rows.rates, rows.accelerations, rows.rates_in, rows.accelerations_in)
+    return Held(*(np.vstack([getattr(held, f.name), part]) for f, part in zip(fields(Held), more, strict=True)))
 
 
 def held_indices(point: OperatingPoint, selection: Selection) -> tuple[list[int], list[int]]:
