@@ -56,11 +56,17 @@ def steps(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
                      "the end does not depend on what was asked of the steps", "the end is another")
         if options and "first_step" in options:
             # Lengths of steps change by factors from 0.2 to 6; from the shortest that time resolves to the usual one.
-            most = usual.n_steps + usual.n_rejected + math.log(1e16) / math.log(5) * 2 + 20
+            most = usual.n_steps + usual.n_rejected + _phases(usual) * (math.log(1e16) / math.log(5) * 2 + 20)
             yield within("step extremes", tested.name, f"{what}: attempted steps", sol.n_steps + sol.n_rejected, 1.2 * most,
                          "those of the usual run, and what it takes at factors of 0.2 to 6 from the shortest step that time "
-                         "resolves or the longest to the usual ones; a fifth more for another grid", "few steps are wasted",
-                         "steps are wasted")
+                         "resolves or the longest to the usual ones, in every mode of contacts; a fifth more for another grid",
+                         "few steps are wasted", "steps are wasted")
+
+
+def _phases(sol: Any) -> int:
+    """How often a motion begins: once, and after every switch of rigid contacts."""
+    times = [t for one in sol.contacts.values() for t in (*(when for when, _ in one.switches), *one.impacts.t.tolist())]
+    return max(1, len({float(t) for t in times} | {float(sol.t[0])})) if sol.module.metadata.contacts else 1
 
 
 def _to(tested: SystemUnderTest, motion: Path, end: float, rtol: float = RTOL, **options: Any) -> Any:

@@ -92,6 +92,8 @@ def constraints(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
 
 def reversal(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     """Forward and back to the start."""
+    if tested.module.metadata.contacts:
+        raise NotApplicable("rigid contacts lose energy, so that its motion does not run backward")
     motion, back, k = reversible(tested, short)
     if motion.sol.inputs.shape[1] and not np.isfinite(motion.sol.inputs).all():
         raise NotApplicable("inputs are not finite")
@@ -114,6 +116,8 @@ def reversal(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
 
 def divergence(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
     """A small change of the start against the variational equations: a test of the exact Jacobian, too."""
+    if tested.module.metadata.contacts:
+        raise NotApplicable("the variational equations do not go across the switches of its rigid contacts")
     motion, _, _ = reversible(tested, short, both=False)
     sol = motion.sol
     phi = flow(tested, motion)

@@ -19,7 +19,7 @@ from symdyn.errors import ArgumentError
 from symdyn.formulation.equations import Equations
 from symdyn.model.system import System
 from symdyn.progress import bar as progress_bar
-from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, units
+from symdyn.stress import attitude, chains, extremes, long_runs, motion, rounding, singular, touching, units
 from symdyn.stress.record import DEGRADE, FAIL, Interrupted, NotApplicable, NoUsualMotion, Row, StressReport
 from symdyn.stress.start import start
 from symdyn.stress.system_under_test import SystemUnderTest, named
@@ -60,7 +60,7 @@ CHECKS = {check.name: check for check in (
     Check("stiffness", long_runs.stiffness), Check("massless", singular.massless),
     Check("singular", singular.configurations, short=False), Check("redundant", singular.redundant, short=False),
     Check("user_forces", singular.user_forces), Check("chaos", chains.chaos),
-    Check("long_chains", chains.long_chains, short=False),
+    Check("long_chains", chains.long_chains, short=False), Check("contacts", touching.contacts, short=False),
 )}
 
 
