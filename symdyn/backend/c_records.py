@@ -37,7 +37,7 @@ def fields_of(file: str) -> list[tuple[str, Any]]:
         if function:
             kinds = [_argument(a.strip()) for a in function["arguments"].split(",")]
             fields.append((function["name"], ctypes.CFUNCTYPE(_NUMBERS[function["result"]], *kinds)))
-        elif members and members["kind"] in _NUMBERS:
+        elif members and (members["kind"] in _NUMBERS or members["names"].startswith("*")):
             for name in (n.strip() for n in members["names"].split(",")):
                 fields.append((name.lstrip("*"), ctypes.c_void_p if name.startswith("*") else _NUMBERS[members["kind"]]))
         else:
@@ -51,5 +51,7 @@ def codes_of(file: str) -> dict[str, int]:
 
 
 def _argument(text: str) -> Any:
+    if text.startswith("void *"):
+        return ctypes.c_void_p
     kind = _NUMBERS[text.removeprefix("const ").split()[0]]
     return ctypes.POINTER(kind) if "*" in text else kind

@@ -17,6 +17,8 @@ from symdyn.shown import shown
 
 # What constraints add to the standard functions; with the corrections the integrator keeps a motion on its manifold.
 OF_CONSTRAINTS = ("C", "C_r", "F_d", "lam", *CORRECTIONS)
+# What time stepping with contacts takes, compiled together.
+OF_CONTACTS = ("contact_gaps", "contact_directions", "contact_spheres")
 _OF_EVENTS = ("events", "event_resets", "reset_directions", BOUNDS, RANGES)
 
 
@@ -58,6 +60,8 @@ def with_function(equations: Equations, name: str) -> tuple[str, ...]:
     """The functions in the library that is made when a function is first called."""
     if name == BATCH:
         return ("rhs",)
+    if name in OF_CONTACTS:
+        return tuple(n for n in OF_CONTACTS if has_function(equations, n))
     if name in STATICS:
         return (*STATICS, "mass_matrix", "N", *(("C_r", "C_scale") if equations.constraints else ()))
     return CONSISTENCY if equations.constraints and name in CONSISTENCY else (name,)

@@ -650,7 +650,8 @@ class Module:
                  steps: bool = False, max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
                  progress: bool = False, work: bool = False, stabilization: str | tuple[str, float] | None = None,
                  events: bool | str | Sequence[str] = True, event_spacing: float = 0.0, interpolation: str = "linear",
-                 extend: str = "error", sensitivities: Names | None = None, sensitivity_control: bool = True) -> Solution:
+                 extend: str = "error", sensitivities: Names | None = None, sensitivity_control: bool = True,
+                 step: float = 0.0) -> Solution:
         """Integrate the motion.
 
         t           (start, end): 1001 points between, or with steps=True every step the integrator took; or an array of
@@ -670,7 +671,8 @@ class Module:
                     conservative motion (with first_step its steps have that length, but for some that a warning counts); or one
                     of SciPy's RK23 RK45 DOP853 Radau BDF LSODA, or an OdeSolver class; Radau, BDF and LSODA get the exact
                     Jacobian. With constraints also "ggl": the stabilized index-2 form of Gear, Gupta and Leimkuhler by an
-                    implicit method (pip install 'symdyn[dae]'). "auto": by tolerance, stiffness (short trial runs) and
+                    implicit method (pip install 'symdyn[dae]'). With rigid contacts also "moreau": time stepping, for very many
+                    impacts, see docs/contact.md. "auto": by tolerance, stiffness (short trial runs) and
                     constraints; `Solution.why` gives the reason
         max_step, first_step   s, 0: chosen by the integrator;  max_steps: stop after so many
         progress    show a bar (needs tqdm), which also reports what is derived and compiled at the first use of a method
@@ -687,6 +689,7 @@ class Module:
                     initial values, as "q1(0)"; see `Solution.sensitivity` and docs/derivatives.md. Compiled methods only
         sensitivity_control   whether the steps keep the errors of the sensitivities within the tolerances, too; False: those of
                     the state alone
+        step        length of the steps of method="moreau", s; 0: it is halved until the coordinates agree within the tolerances
 
         Returns a Solution. A run that stops early keeps what was computed: `success` is False, `message` reports when, where
         and why, and a SimulationWarning is given. A motion that slides along a jump of the right-hand side is stopped like that,
@@ -704,7 +707,7 @@ class Module:
         return simulate(self, t, q, u, params, z=z, inputs=inputs, rtol=rtol, atol=atol, method=method, steps=steps,
                         max_step=max_step, first_step=first_step, max_steps=max_steps, progress=progress, work=work,
                         stabilization=stabilization, events=events, event_spacing=event_spacing, interpolation=interpolation,
-                        extend=extend, sensitivities=sensitivities, sensitivity_control=sensitivity_control)
+                        extend=extend, sensitivities=sensitivities, sensitivity_control=sensitivity_control, step=step)
 
     def gradient(self, loss: Loss, by: Names, t: Row | None = None, q: Values | None = None, u: Values | None = None,
                  params: Values | None = None, *, z: Values | None = None, inputs: InputValues | None = None, rtol: float = 1e-8,

@@ -13,6 +13,7 @@ Complementarity Problem, section 3.3.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,15 @@ class ContactRows:
             self.slips = vector(*[algebra.expression(e) for c in contacts for e in c.rows])
             relative = list(rate(self.slips.tolist()))
             self.free = vector(*substitute(tuple(relative), dict.fromkeys(unknown, 0), recorder))
-            self.D = jacobian(recorder, relative, unknown, "forward").reshape(n, n)
+            self._relative, self._unknown = relative, unknown
             self.directions = jacobian(recorder, accelerations.tolist(), unknown, "forward").reshape(-1, n)
+
+    @cached_property
+    def D(self) -> np.ndarray:
+        """Derivative of the relative accelerations by the forces, (n, n)."""
+        n = len(self._unknown)
+        with self.algebra.section("contacts: relative velocities and accelerations"):
+            return jacobian(self.algebra.recorder, self._relative, self._unknown, "forward").reshape(n, n)
 
     def solved(self) -> dict[Quantity, Any]:
         """The forces in the mode that the parameters say."""
@@ -80,6 +88,17 @@ class ContactRows:
             if n > 1:  # rows that depend on each other are softened, which a second step undoes in what the rows determine
                 x = x + factors.solve(b - A @ x)
             return dict(zip(self.forces, a.name("contact_force", H @ x + fixed), strict=True))
+
+    def gaps(self) -> np.ndarray:
+        """[gap, static, kinetic, restitution of each contact; slips], as time stepping takes them."""
+        a = self.algebra
+        with a.section("contacts: gaps and relative velocities"):
+            return vector(*[a.expression(e) for c in self.contacts for e in (c.gap, *c.constants)], *self.slips)
+
+    def steps(self, speeds: Sequence[Any]) -> np.ndarray:
+        """[J; M^-1 J^T] row by row, as time stepping takes them; speeds: leaves."""
+        J = jacobian(self.algebra.recorder, self.slips.tolist(), speeds, "forward")
+        return vector(*J.ravel(), *self.directions.ravel())
 
     def numbers(self, forces: Mapping[Quantity, Any], rates_along: Callable[[np.ndarray], Sequence[Any]]) -> np.ndarray:
         """[gap, static, kinetic, restitution of each contact; slips; free accelerations; forces; D; M^-1 J^T; N M^-1 J^T] row by

@@ -79,6 +79,14 @@ class TreeQuantities(Motion):
         return self.recall("contact_rows").numbers(self.loads.contact_forces, lambda change: forward(  # type: ignore[no-any-return]
             self.algebra.recorder, self.rates, dict(zip(leaves, change, strict=True))))
 
+    def contact_gaps(self) -> np.ndarray:
+        """Gaps, coefficients and relative velocities of rigid contacts, see ContactRows.gaps."""
+        return self.recall("contact_rows").gaps()  # type: ignore[no-any-return]
+
+    def contact_directions(self) -> np.ndarray:
+        """Relative velocities by speeds, and speeds by impulses, see ContactRows.steps."""
+        return self.recall("contact_rows").steps(self._leaves(self.speeds))  # type: ignore[no-any-return]
+
     def compliant_contacts(self) -> np.ndarray:
         """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
         return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
@@ -121,7 +129,7 @@ class TreeQuantities(Motion):
         if self.model.ground_motion is not None:
             own["ground_rotation"] = self.ground_rotation
         if self.model.contacts:
-            own["contacts"] = self.contacts
+            own |= {"contacts": self.contacts, "contact_gaps": self.contact_gaps, "contact_directions": self.contact_directions}
         if self.model.events:
             own["events"] = self.events
         if any(event.reset for event in self.model.events):

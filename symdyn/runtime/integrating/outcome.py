@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -13,6 +14,39 @@ from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.inputs.sampled import Record
 from symdyn.runtime.integrating.events import Carried, Happened
 from symdyn.runtime.integrating.stabilization import Corrections, Stabilization
+
+
+class Touched(NamedTuple):
+    """What contacts did in steps, one row for each contact and step: index of the step, places of the contact, state (0 open, 1
+    sticking, 2 sliding), values: gap and velocities (3) at its end, impulses (3), velocities (3) at its begin."""
+
+    step: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    state: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """A motion by time stepping.
+
+    t, h       begin and length of every step, (n,)
+    row        number of steps done at every stored row, (n_t,)
+    touched    see Touched
+    losses     energy that contacts have taken up to every stored row, J, (n_t, n_contacts)
+    residual   the largest velocity by which a law was missed, m/s; depth: the largest overlap, m
+    estimate   largest difference of the coordinates from the run with twice the steps' length; NaN: there was no such run
+    """
+
+    t: np.ndarray
+    h: np.ndarray
+    row: np.ndarray
+    touched: Touched
+    losses: np.ndarray
+    residual: float
+    depth: float
+    estimate: float = math.nan
 
 
 class Phase(NamedTuple):
@@ -44,6 +78,7 @@ class Request:
     carried   of events, where the run goes on from the end of another one
     event_spacing   of the samples of events at the most, s; 0: as they vary
     input_columns   derivatives of inputs that are held along the columns, (n_held, n_columns)
+    step      of time stepping, s; 0: halved until the tolerances are met
     columns, held, followed   of sensitivities behind the state in x0, see symdyn.backend.right_side.RightSide
     """
 
@@ -66,6 +101,7 @@ class Request:
     held: tuple[str, ...] = ()
     followed: tuple[str, ...] = ()
     input_columns: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    step: float = 0.0
 
     @property
     def works(self) -> bool:
@@ -95,6 +131,7 @@ class Outcome:
     next_step  length of the step that would be tried next, s; 0: not known
     record     inputs as controllers held them; None: without controllers
     phases, impacts   of rigid contacts; row_phases: index of the phase of every row, (n_t,)
+    stepped    what contacts did in a run by time stepping
     """
 
     t: np.ndarray
@@ -119,6 +156,7 @@ class Outcome:
     phases: Sequence[Phase] = ()
     impacts: Sequence[Impact] = ()
     row_phases: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    stepped: Stepped | None = None
 
 
 def of_pieces(done: Sequence[Outcome], t: np.ndarray, x: np.ndarray, n_steps: int, message: str, cause: BaseException | None,

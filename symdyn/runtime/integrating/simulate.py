@@ -29,6 +29,7 @@ from symdyn.runtime.integrating.events import not_seen, wanted
 from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
 from symdyn.runtime.integrating.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
+from symdyn.runtime.integrating.moreau import MOREAU, check_moreau, run_moreau
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.integrating.sensitivities import Asked
@@ -61,7 +62,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
              max_step: float = 0.0, first_step: float = 0.0, max_steps: int | None = None,
              progress: bool = False, work: bool = False, stabilization: Any = None, events: Any = True,
              event_spacing: float = 0.0, interpolation: str = "linear", extend: str = "error", sensitivities: Any = None,
-             sensitivity_control: bool = True) -> Solution:
+             sensitivity_control: bool = True, step: float = 0.0) -> Solution:
     """See Module.simulate."""
     metadata = module.metadata
     p = real_parameters(module, params)
@@ -69,7 +70,7 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
     steps, progress, work = (flag(v, f"{module.name}: {what}")
                              for v, what in ((steps, "steps"), (progress, "progress"), (work, "work")))
     method = checked_method(module, method)
-    times, span, every = checked_times(module, t, steps)
+    times, span, every = checked_times(module, t, steps or method == MOREAU)
     free = take_inputs(inputs, metadata.inputs, metadata.initial, module.name, span, interpolation, extend,
                        metadata.motions)
     module = module.following(free)
@@ -81,6 +82,10 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
                       checked_positive(module, max_step, "max_step"), checked_positive(module, first_step, "first_step"),
                       max_steps, len(start), look=looked_for(module, events),
                       event_spacing=checked_spacing(module, event_spacing, span))
+    request = replace(request, step=checked_positive(module, step, "step"))
+    if request.step and method != MOREAU:
+        raise ArgumentError(f"{module.name}: step is the length of the steps of method='moreau'; other methods choose theirs by "
+                            "rtol and atol, and take max_step")
     asked, controlled = Asked.of(module, sensitivities, p, free), flag(sensitivity_control, f"{module.name}: sensitivity_control")
     if work and "power" not in metadata.functions:
         raise ArgumentError(f"{module.name}: the work of the loads is not known to these equations; leave out work=True")
@@ -100,6 +105,8 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             method, why = automatic(module, blind, lambda asked, name: _trial(module, asked, name))
         if is_compiled(method):
             check_compiled(module, request, method)
+        if method == MOREAU:
+            check_moreau(module, request, stabilization)
         if method == "ggl":
             from symdyn.runtime.integrating.dae_run import check_ggl
 
@@ -145,6 +152,8 @@ def looked_for(module: Module, events: Any) -> np.ndarray:
 
 def integrate(module: Module, request: Request, method: Any, bar: Any = None, crossed: list[Switch] | None = None) -> Outcome:
     """A request, checked, by any method; crossed: takes the switches of rigid contacts, for a way back."""
+    if method == MOREAU:
+        return run_moreau(module, request, bar)
     if module.metadata.contacts:
         stiff = "radau" if is_compiled(method) else "Radau"
         return run_contacts(module, request, lambda part, slow, parted: _run_smooth(
@@ -171,6 +180,9 @@ def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) 
 
     Raises EvaluationError where the run does not get as far again, as with inputs that depend on more than t and x.
     """
+    if method == MOREAU:
+        raise ArgumentError(f"{module.name}: a motion by method='moreau' has states at the ends of its steps, in sol.t; pass "
+                            "other times to simulate")
     begin, end = request.span
     ahead = times if end >= begin else times[::-1]
     whole = ahead if len(ahead) and ahead[0] == begin else np.append(begin, ahead)
@@ -186,7 +198,7 @@ def _repeated(module: Module, request: Request, method: Any, times: np.ndarray) 
 
 def stabilization_of(module: Module, request: Request, method: Any, asked: Any) -> Stabilization:
     """What keeps the constraints; Baumgarte's gain is chosen by a short trial run."""
-    one_step = is_compiled(method) or takes_changed_states(solver_class_of(module, method))
+    one_step = method == MOREAU or is_compiled(method) or takes_changed_states(solver_class_of(module, method))
     chosen = choose(module, asked, one_step, str(getattr(method, "__name__", method)), request.p)
     if chosen.way != "baumgarte":
         return chosen

@@ -11,7 +11,8 @@ from symdyn.backend.metadata import ContactRecord
 from symdyn.contact_kinds import CLUTCH, STOP
 from symdyn.runtime.contact_laws import OPEN, SLIDING, STICKING
 from symdyn.runtime.integrating.contacts import CONTACTS, rows_of
-from symdyn.runtime.integrating.outcome import Impact, Phase
+from symdyn.runtime.integrating.moreau import GAPS, MODES, modes_of
+from symdyn.runtime.integrating.outcome import Impact, Phase, Stepped
 
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
@@ -56,8 +57,10 @@ class ContactMotion(NamedTuple):
 
 
 def contact_motions(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
-                    impacts: Sequence[Impact]) -> Mapping[str, ContactMotion]:
+                    impacts: Sequence[Impact], stepped: Stepped | None = None) -> Mapping[str, ContactMotion]:
     """Every contact of a motion by name, one for each place where a shape touches."""
+    if stepped is not None:
+        return {**stepped_contacts(solution, stepped), **_compliant(solution)}
     return {**_rigid(solution, phases, row_phases, impacts), **_compliant(solution)}
 
 
@@ -102,6 +105,32 @@ def _rigid(solution: Solution, phases: Sequence[Phase], row_phases: np.ndarray,
             np.array(modes, dtype=object)[row_phases] if modes else np.zeros(0, dtype=object), values[:, 4 * place],
             forces[:, own], slips[:, own[record.normal:]], summed[np.searchsorted(t, solution.t, side="left")], of_hits,
             np.array([one.rest[place] for one in impacts if place in one.rest]), tuple(changes))
+    return found
+
+
+def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactMotion]:
+    """Contacts with a name in a motion by time stepping: modes and forces are those of the step before every time."""
+    records = solution.module.metadata.contacts
+    n_steps, n = len(stepped.h), len(records)
+    values = solution.rows(GAPS).reshape(len(solution.t), -1)
+    modes, touched = modes_of(stepped, n), stepped.touched
+    before = np.maximum(stepped.row - 1, 0)
+    found = {}
+    for place, (record, rows) in enumerate(zip(records, rows_of(records), strict=True)):
+        own = np.flatnonzero((touched.b < 0) & (touched.a == place))
+        impulses = np.zeros((n_steps, record.rows))
+        impulses[touched.step[own]] = touched.values[own, 4:4 + record.rows]
+        summed = np.vstack([np.zeros(record.rows), np.cumsum(impulses, axis=0)])
+        mode, none = modes[:, place], np.zeros((len(solution.t), record.rows))
+        fresh = own[(touched.values[own, 4] > 0) & (np.append(0, mode)[touched.step[own]] == 0)]
+        after, of_hits, before_hits = (touched.values[fresh, k:k + record.rows] for k in (1, 4, 7))
+        hits = Impacts(stepped.t[touched.step[fresh]], of_hits, before_hits, after)
+        changes = [k for k in range(n_steps) if k == 0 or mode[k] != mode[k - 1]]
+        names = np.array(MODES, dtype=object)
+        found[record.name] = ContactMotion(
+            names[mode][before] if n_steps else np.array([MODES[0]] * len(solution.t), dtype=object), values[:, 4 * place],
+            (impulses / stepped.h[:, None])[before] if n_steps else none, values[:, [4 * n + r for r in rows[1:]]],
+            summed[stepped.row], hits, np.zeros(0), tuple((float(stepped.t[k]), MODES[mode[k]]) for k in changes))
     return found
 
 

@@ -22,7 +22,7 @@ from symdyn.runtime.constraints import names, position_residual, rank, unique, v
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.inputs.sampled import SampleRows
 from symdyn.runtime.integrating.events import EventRows, rows_of
-from symdyn.runtime.integrating.outcome import Outcome
+from symdyn.runtime.integrating.outcome import Outcome, Stepped
 from symdyn.runtime.paths import as_path, writing
 from symdyn.runtime.solutions.contacts import ContactMotion, contact_motions
 from symdyn.runtime.solutions.energy_balance import reset_energy
@@ -90,6 +90,7 @@ class Solution:
         self._happened = list(outcome.happened)
         self._phases, self._impacts = outcome.phases, outcome.impacts
         self._row_phases = outcome.row_phases
+        self._stepped = outcome.stepped
         self._n_c = len(names(module))
 
     def __call__(self, t: Times) -> np.ndarray:
@@ -250,12 +251,24 @@ class Solution:
         >>> dict(solution.contacts)
         {}
         """
-        return contact_motions(self, self._phases, self._row_phases, self._impacts)
+        return contact_motions(self, self._phases, self._row_phases, self._impacts, self._stepped)
+
+    @property
+    def stepped(self) -> Stepped | None:
+        """Of a motion by method="moreau" its steps, what is left of the laws of contact (residual, m/s; depth, m), and the
+        estimate of its error, see Stepped; None of other motions.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> solution.stepped is None
+        True
+        """
+        return self._stepped
 
     @property
     def energy_balance(self) -> dict[str, np.ndarray]:
         """Parts of the energy balance since the start, each (n_t,), J: "change" of kinetic and potential energy; "work" of the
-        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "impact of NAME" for every rigid contact;
+        loads; "reset of NAME" for every event that reset the state, see `reset_energy`; "impact of NAME" for every rigid contact,
+        by method="moreau" "contact NAME" with its friction;
         "error", the change less all others.
 
         Raises ArgumentError as `work` does.
@@ -269,6 +282,9 @@ class Solution:
         parts = {"work": self.work}
         for name, rows in self.reset_energy.items():
             parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
+        if self._stepped is not None:
+            names = [contact.name for contact in self.module.metadata.contacts]
+            parts |= {f"contact {name}": -rows for name, rows in zip(names, self._stepped.losses.T, strict=False)}
         return {"change": change, **parts, "error": change - sum(parts.values())}
 
     @property

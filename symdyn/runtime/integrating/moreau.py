@@ -1,0 +1,361 @@
+"""Time stepping with contacts: steps of one length, in C, with the laws of contact and friction solved for impulses in each."""
+
+from __future__ import annotations
+
+import ctypes
+import time as clock
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.backend.c_records import codes_of
+from symdyn.backend.right_side import RightSide
+from symdyn.errors import ArgumentError
+from symdyn.runtime import contact_laws as laws
+from symdyn.runtime.building.compiler import require_compiler
+from symdyn.runtime.building.shared import shared
+from symdyn.runtime.inputs.inputs import Inputs
+from symdyn.runtime.integrating.contacts import SHARED, SOFTNESS
+from symdyn.runtime.integrating.moreau_memory import MOST_DENSE, Cones, Memory, Moreau, cones
+from symdyn.runtime.integrating.outcome import Outcome, Phase, Request, Stepped, Touched
+from symdyn.runtime.integrating.stops import describe_stop
+from symdyn.runtime.memory import demand
+from symdyn.shown import shown
+
+if TYPE_CHECKING:
+    from symdyn.runtime.building.library import CUnit
+    from symdyn.runtime.module import Module
+
+MOREAU = "moreau"
+GAPS, DIRECTIONS = "contact_gaps", "contact_directions"
+MODES = (laws.OPEN, laws.STICKING, laws.SLIDING)
+STICKING, SLIDING = 1, 2
+STATUS = SimpleNamespace(**codes_of("runtime/moreau.h"))
+# Tolerances below this part are out of reach of a method whose impacts are of first order.
+FINEST = 1e-7
+# Steps of the first of the runs whose steps are halved, and at most.
+FIRST, MOST = 64, 2**21
+# Steps in one call.
+PIECE = 512
+# Velocities by which the laws are missed, m/s, per m/s of the start; gaps, m.
+TOLERANCE, DEPTH = 1e-12, 1e-12
+MOST_SWEEPS, MOST_ROUNDS = 20_000, 60
+# Residuals above this many tolerances are reported.
+REPORTED = 1e3
+
+
+def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
+    """Raise ArgumentError for what time stepping does not take; stabilization: as it was given."""
+    name, metadata = module.name, module.metadata
+    if module.backend != "c":
+        raise ArgumentError(f"{name}: method='moreau' steps in compiled C; this module runs on {module.backend}. Compile with "
+                            "backend='c', or leave out the method, which locates every switch of the contacts")
+    if not metadata.contacts:
+        raise ArgumentError(f"{name}: method='moreau' is for rigid contacts, of which there are none; pass another method, or "
+                            "add_contact")
+    if request.span[1] < request.span[0]:
+        raise ArgumentError(f"{name}: rigid contacts lose energy, so that motions with them do not run backward in time; pass an "
+                            "end after the start")
+    if not request.step and request.rtol < FINEST:
+        raise ArgumentError(f"{name}: method='moreau' has steps of one length; pass step=1e-3 (in s), or a tolerance such as "
+                            f"rtol=1e-3, by which steps are halved; found rtol = {request.rtol:g}, and impacts are of first "
+                            f"order in the step, so that {FINEST:g} is the finest")
+    if request.inputs.are_held:
+        raise ArgumentError(f"{name}: controllers whose values are held between instants do not go with method='moreau'; pass "
+                            "their law as an expression of the system, or as a function of (t, x)")
+    if request.columns:
+        raise ArgumentError(f"{name}: sensitivities do not go across the impacts of rigid contacts; leave them out")
+    if stabilization not in (None, "projection"):
+        raise ArgumentError(f"{name}: method='moreau' projects onto the constraints; leave out stabilization, found "
+                            f"{shown(stabilization)}")
+    if request.max_step or request.first_step:
+        raise ArgumentError(f"{name}: method='moreau' has steps of one length; pass it as step, not as max_step or first_step")
+    wanted = [e.name for e, look in zip(metadata.events, request.look if request.look is not None else (), strict=False) if look]
+    if wanted:
+        raise ArgumentError(f"{name}: method='moreau' does not locate events, such as {wanted[0]}; pass events=False, or another "
+                            "method")
+
+
+def run_moreau(module: Module, request: Request, bar: Any = None) -> Outcome:
+    """Integrate by time stepping, with steps of a given length, or halved until the coordinates agree within the tolerances."""
+    if request.step:
+        return _run(module, request, request.step, bar)
+    begin, end = request.span
+    before: Outcome | None = None
+    n = FIRST
+    while True:
+        now = _run(module, request, (end - begin) / n, bar)
+        if before is not None and now.success and before.success:
+            off, part = _difference(module, request, before, now)
+            assert now.stepped is not None
+            now = replace(now, stepped=replace(now.stepped, estimate=off), n_steps=now.n_steps + before.n_steps)
+            if part <= 1:
+                return now
+            if 2 * n > (request.max_steps or MOST):
+                doubt = (f"{module.name}: with steps of {(end - begin) / n:.3g} s the coordinates differ by {off:.3g} from those "
+                         f"with twice the step, above rtol = {request.rtol:g}; pass a larger rtol, more max_steps, or a method "
+                         "that locates the impacts")
+                return replace(now, doubts=(*now.doubts, doubt))
+        elif before is not None and not now.success and 2 * n > (request.max_steps or MOST):
+            return now
+        if now.interrupted:
+            return now
+        before, n = now, 2 * n
+
+
+def _difference(module: Module, request: Request, coarse: Outcome, fine: Outcome) -> tuple[float, float]:
+    """Largest difference of the coordinates at common times, and that by the tolerances."""
+    n_q = module.metadata.sizes.q
+    rows = fine.x[:, :n_q] if len(fine.t) == len(coarse.t) else fine.x[::2, :n_q]
+    off = np.abs(rows - coarse.x[:, :n_q]).max(axis=0, initial=0.0)
+    size = np.abs(rows).max(axis=0, initial=0.0)
+    allowed = request.atol[:n_q] + request.rtol * size
+    return float(off.max(initial=0.0)), float((off / np.maximum(allowed, 1e-300)).max(initial=0.0))
+
+
+def _steps(request: Request, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Begins and ends (n_parts,) of parts between which output times lie, and the number of steps in each."""
+    begin, end = request.span
+    marks = np.array([begin, end]) if request.times is None else np.unique(np.append(begin, request.times))
+    lengths = np.diff(marks)
+    counts = np.maximum(1, np.ceil(lengths / step * (1 - 1e-12))).astype(int)
+    return marks[:-1], lengths / counts, counts
+
+
+def _run(module: Module, request: Request, step: float, bar: Any) -> Outcome:
+    """One run with steps of one length, a little shorter where output times want it."""
+    starts, lengths, counts = _steps(request, step)
+    total = int(counts.sum())
+    demand(total * (len(request.x0) + 3), module.name, f"{total} steps of {step:g} s with {len(request.x0)} numbers at each",
+           "pass a longer step")
+    stepper = Stepper(module, request)
+    every = request.times is None
+    rows, times, done_at = [request.x0.copy()], [request.span[0]], [0]
+    losses = [stepper.losses.copy()]
+    message, interrupted, status, ended = "reached the end", False, 0, ""
+    limit = request.max_steps if request.step and request.max_steps is not None else total + 1
+    begun = clock.perf_counter()
+    try:
+        for start, h, count in zip(starts, lengths, counts, strict=True):
+            done = 0
+            while done < count and not status:
+                many = min(PIECE, int(count) - done, limit - len(stepper.h))
+                if not many:
+                    status, ended = 1, f"{limit} steps were done, as asked"
+                    break
+                status, part = stepper.go(start + done * h, h, many)
+                if every:
+                    rows += list(part)
+                    times += [start + (done + k + 1) * h for k in range(len(part))]
+                    done_at += [len(stepper.h) - len(part) + k + 1 for k in range(len(part))]
+                    losses += [stepper.losses.copy()] * len(part)
+                done += len(part)
+                if bar is not None:
+                    bar.update(len(part) * h)
+            if not every and not status:
+                rows.append(stepper.x.copy())
+                times.append(start + count * h)
+                done_at.append(len(stepper.h))
+                losses.append(stepper.losses.copy())
+            if status:
+                break
+    except KeyboardInterrupt:
+        interrupted, status, ended = True, 1, "interrupted"
+    if status:
+        why = stepper.why(status) if status < 0 else ended
+        message = describe_stop(module.metadata, stepper.now, stepper.x[:request.n_state], why)
+    if request.times is not None:
+        times = [request.span[0], *request.times[request.times > request.span[0]][:len(rows) - 1]]
+        if request.times[0] > request.span[0]:
+            rows, times, done_at, losses = rows[1:], times[1:], done_at[1:], losses[1:]
+    record = stepper.record
+    stepped = Stepped(np.array(stepper.t), np.array(stepper.h), np.array(done_at, dtype=int), stepper.touched(), np.array(losses),
+                      record.worst_residual, record.worst_depth)
+    doubts = [stepper.doubt()] if status >= 0 else []
+    phases, row_phases = _phases(module, request, stepped)
+    return Outcome(np.array(times), np.array(rows), not status, message, interrupted, len(stepper.h), 0, record.n_evaluations,
+                   clock.perf_counter() - begun, doubts=tuple(filter(None, doubts)), cause=stepper.cause, stepped=stepped,
+                   phases=phases, row_phases=row_phases)
+
+
+def modes_of(stepped: Stepped, n: int) -> np.ndarray:
+    """Whether contacts with a name are open, sticking or sliding in every step, (n_steps, n)."""
+    found = np.zeros((len(stepped.h), n), dtype=int)
+    touched = stepped.touched
+    named = touched.b < 0
+    found[touched.step[named], touched.a[named]] = touched.state[named]
+    return found
+
+
+def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Phase], np.ndarray]:
+    """The modes of all contacts, and the parameters that say so, of the step before every row; of the first row that after it."""
+    records, names = module.metadata.contacts, module.metadata.parameters
+    n = len(records)
+    steps = np.maximum(stepped.row - 1, 0)
+    modes, slips = modes_of(stepped, n), np.zeros((len(stepped.h), n, 2))
+    touched = stepped.touched
+    named = touched.b < 0
+    slips[touched.step[named], touched.a[named]] = touched.values[named, 2:4]
+    sizes = np.linalg.norm(slips, axis=2, keepdims=True)
+    along = np.where((modes == SLIDING)[:, :, None] & (sizes > 0), slips / np.where(sizes > 0, sizes, 1.0), 0.0)
+    phases: list[Phase] = []
+    places, latest = [], None
+    for k in steps.tolist() if len(stepped.h) else []:
+        here = (modes[k].tobytes(), along[k].tobytes())
+        if here != latest:
+            p = request.p.copy()
+            for record, mode, direction in zip(records, modes[k].tolist(), along[k], strict=True):
+                values = [mode != 0, *([mode == STICKING] if record.sticking else []), *direction[:record.rows - 1]]
+                for name, value in zip(record.parameters, values, strict=True):
+                    p[names.index(name)] = value
+            p[names.index(SHARED)] = SOFTNESS * (np.count_nonzero(modes[k]) > 1)
+            phases.append(Phase(float(stepped.t[k]), p, tuple(MODES[mode] for mode in modes[k].tolist())))
+            latest = here
+        places.append(len(phases) - 1)
+    return phases, np.array(places, dtype=int)
+
+
+class Stepper:
+    """The records in C of one run, and what it has done so far."""
+
+    def __init__(self, module: Module, request: Request) -> None:
+        self.module, self.request = module, request
+        metadata = module.metadata
+        sizes = metadata.sizes
+        self.x = request.x0.copy()
+        self.now, self.step = request.span[0], 0.0
+        self.t: list[float] = []
+        self.h: list[float] = []
+        self.parts: list[Touched] = []
+        self.raised: list[BaseException] = []
+        self.memory = memory = Memory()
+        n_x, n_in = len(request.x0), sizes.inputs
+        first = np.cumsum([0, *[c.rows for c in metadata.contacts]])
+        n_given, n_rows = len(metadata.contacts), int(first[-1])
+        self.n_contacts = n_given
+        self.record = record = Moreau(n_q=sizes.q, n_u=sizes.u, n_x=n_x, n_in=n_in, n_given=n_given, n_rows=n_rows)
+        self._frames(n_x, n_in)
+        most, entries = n_given, n_rows * sizes.u
+        self.cones: Cones = cones(memory, sizes.u, most, entries, min(MOST_DENSE, 3 * most))
+        self.library = shared("moreau", require_compiler())
+        places = np.dtype("long")
+        memory.take(record, "given_first", first.astype(places))
+        coordinates = metadata.names("q")
+        groups = [[coordinates.index(q) for q in group] for group in metadata.unit_groups]
+        record.n_units = len(groups)
+        memory.take(record, "unit_first", np.cumsum([0, *map(len, groups)]).astype(places))
+        memory.take(record, "unit_index", np.array([k for group in groups for k in group] or [0], dtype=places))
+        memory.put(record, places, a=most, b=most, old_a=most, old_b=most, old_from=1)
+        memory.put(record, np.intc, old_state=most, broken=most)
+        memory.put(record, float, work=8 * n_x, P_old=3 * most, basis=9 * most, incoming=3 * most, at_end=4 * most)
+        self.losses = memory.take(record, "loss_of", np.zeros(n_given))
+        record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
+        record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
+        record.length = request.stabilization.length or 1.0
+        record.most_sweeps, record.most_rounds = MOST_SWEEPS, MOST_ROUNDS
+
+    def _frames(self, n_x: int, n_in: int) -> None:
+        """What the record calls."""
+        record, memory, request, module = self.record, self.memory, self.request, self.module
+        t, x, inputs = np.zeros(1), np.zeros(max(1, n_x)), np.zeros(max(1, n_in))
+        for name, values in (("t", t), ("x", x), ("inputs", inputs)):
+            memory.take(record, name, values)
+        inputs[:n_in] = request.inputs.constant
+        field: Any = module.unit(RightSide(work=request.works, open_contacts=True))
+        contacts: Any = module.unit(GAPS)
+        seen = (t, x, inputs)
+
+        def add(member: str, unit: CUnit, function: str, result: str) -> np.ndarray:
+            return memory.function(record, member, unit, function, result, seen, request.p)
+
+        add("field", field, "rhs", "xd")
+        add("gaps", contacts, GAPS, "gap")
+        add("directions", contacts, DIRECTIONS, "direction")
+        if module.metadata.constraints:
+            record.n_c = len(module.metadata.constraints)
+            add("position", field, "position_correction", "position_change")
+            add("velocity", field, "velocity_correction", "velocity_change")
+        if _varies(request.inputs):
+            record.function = self._input_function(n_x, n_in)
+
+    def _input_function(self, n_x: int, n_in: int) -> Any:
+        free = self.request.inputs
+
+        def call(t: float, x: Any, out: Any) -> int:
+            try:
+                state = np.ctypeslib.as_array(x, (n_x,))[:self.request.n_state].copy()
+                np.ctypeslib.as_array(out, (n_in,))[:] = free.at(t, state)
+                return 0
+            except BaseException as error:
+                self.raised.append(error)
+                return 1
+
+        made = dict(Moreau._fields_)["function"](call)
+        self.memory.kept.append(made)
+        return made
+
+    def go(self, t: float, h: float, n: int) -> tuple[int, np.ndarray]:
+        """At most n steps from t: the status and the states after them."""
+        most, self.step = max(1, int(self.cones.most)), h
+        room = most * max(2, min(n, 200_000 // most + 2))
+        out, ends = np.zeros((n, len(self.x))), np.zeros(n, dtype=np.dtype("long"))
+        places, values = np.zeros((room, 3), dtype=np.dtype("long")), np.zeros((room, 10))
+        done, span = ctypes.c_long(0), np.array([t, h])
+        status = self.library.symdyn_moreau_go(
+            ctypes.byref(self.record), ctypes.byref(self.cones), *[ctypes.c_void_p(a.ctypes.data) for a in (span, self.x)],
+            ctypes.c_long(n), *[ctypes.c_void_p(a.ctypes.data) for a in (out, ends, places, values)], ctypes.c_long(room),
+            ctypes.byref(done))
+        k = done.value
+        number = int(ends[k - 1]) if k else 0
+        self.now = t + k * h
+        per_step = np.diff(np.append(0, ends[:k]))
+        a, b, state = places[:number].T.copy()
+        self.parts.append(Touched(len(self.h) + np.repeat(np.arange(k), per_step), a, b, state, values[:number].copy()))
+        self.t += [t + i * h for i in range(k)]
+        self.h += [h] * k
+        if self.raised and isinstance(self.raised[0], KeyboardInterrupt):
+            raise self.raised[0]
+        return int(status), out[:k]
+
+    def touched(self) -> Touched:
+        """What contacts did in all steps."""
+        none = np.zeros(0, dtype=int)
+        parts = [Touched(none, none, none, none, np.zeros((0, 10))), *self.parts]
+        step, a, b, state, values = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        return Touched(step, a, b, state, values)
+
+    @property
+    def cause(self) -> BaseException | None:
+        """What a function of inputs raised."""
+        return (self.raised[0].__cause__ or self.raised[0]) if self.raised else None
+
+    def doubt(self) -> str:
+        """What is left of residuals and overlaps, if that is more than meant."""
+        record = self.record
+        if record.worst_residual > REPORTED * record.tolerance:
+            return (f"{self.module.name}: the laws of contact and friction are missed by up to {record.worst_residual:.3g} m/s "
+                    "in a step: its contact problem has no solution, or none that the iteration reaches; shorter steps or less "
+                    "friction")
+        if record.worst_depth > REPORTED * record.depth:
+            return (f"{self.module.name}: bodies overlap by up to {record.worst_depth:.3g} m at the end of a step, which "
+                    "no motion of theirs undoes: contacts that exclude each other, or a step that is too long")
+        return ""
+
+    def why(self, status: int) -> str:
+        """The reason of a failure."""
+        field = "the right-hand side cannot be evaluated"
+        return {
+            STATUS.MOREAU_FIELD: field, STATUS.MOREAU_NOT_FINITE: "the state is not finite; pass a shorter step",
+            STATUS.MOREAU_CONTACT: "gaps or directions of contacts cannot be evaluated",
+            STATUS.MOREAU_LONG_STEP: f"the equations of a step of {self.step:g} s are not solved by iteration: it is too long "
+                                     "for the stiffness of the mechanism; pass a shorter step",
+            STATUS.MOREAU_CONSTRAINTS: "there is no way back onto the constraints; pass a shorter step",
+            STATUS.MOREAU_INPUTS: f"a function of inputs raised {self.raised[0]!r}" if self.raised else "there are no inputs",
+        }[status]
+
+
+def _varies(inputs: Inputs) -> bool:
+    return inputs.function is not None or inputs.pieces is not None or inputs.motions is not None
+

@@ -1,0 +1,86 @@
+"""The records that time stepping in C works on, with their memory."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symdyn.backend.c_records import fields_of
+from symdyn.runtime.building.library import Frame
+
+if TYPE_CHECKING:
+    from symdyn.runtime.building.library import CUnit
+
+# Rows of a contact problem up to which a dense matrix is factorized.
+MOST_DENSE = 360
+
+
+class Cones(ctypes.Structure):
+    """Contacts of one problem; see c/runtime/cones_type.h."""
+
+    _fields_ = fields_of("runtime/cones_type.h")
+    n: int
+    residual: float
+    n_sweeps: int
+    n_newton: int
+
+
+class Moreau(ctypes.Structure):
+    """A mechanism in time stepping; see c/runtime/moreau_type.h."""
+
+    _fields_ = fields_of("runtime/moreau_type.h")
+    worst_residual: float
+    worst_depth: float
+    n_steps: int
+    n_rounds: int
+    n_evaluations: int
+    reason: int
+
+
+class Memory:
+    """Arrays that records point to, kept as long as these."""
+
+    def __init__(self) -> None:
+        self.kept: list[Any] = []
+
+    def put(self, record: Any, kind: Any, **sizes: int) -> None:
+        """Fresh arrays of zeros as members of a record."""
+        for name, size in sizes.items():
+            self.take(record, name, np.zeros(max(1, size), dtype=kind))
+
+    def take(self, record: Any, name: str, values: np.ndarray) -> np.ndarray:
+        """An array as a member of a record."""
+        self.kept.append(values)
+        setattr(record, name, values.ctypes.data)
+        return values
+
+    def function(self, record: Any, name: str, unit: CUnit, function: str, result: str,
+                 arguments: Sequence[np.ndarray], p: np.ndarray) -> np.ndarray:
+        """A generated function as a member of a record, with its frame and its results."""
+        t, x, inputs = arguments
+        constants, taken = np.zeros(max(1, unit.metadata.n_c)), np.zeros(max(1, len(p)))
+        taken[:len(p)] = p
+        unit.prologue(taken, constants)
+        out, ud = np.zeros(int(np.prod(unit.metadata.shapes[function]))), np.zeros(max(1, unit.metadata.sizes.ud))
+        frame = Frame(1, *[a.ctypes.data for a in (t, x, ud, inputs, taken, constants, out)], 1, 1, 1, 1, 0)
+        self.kept += [out, ud, taken, constants, frame, unit]
+        call = dict(Moreau._fields_)[name]
+        setattr(record, name, ctypes.cast(unit.function(f"{function}_rows"), call))
+        setattr(record, f"{name}_frame", ctypes.addressof(frame))
+        setattr(record, result, out.ctypes.data)
+        return out
+
+
+def cones(memory: Memory, n_u: int, most: int, most_entries: int, dense: int) -> Cones:
+    """A record for up to `most` contacts of three rows, with `most_entries` nonzero entries in all rows; dense: rows of a matrix
+    that is factorized."""
+    record = Cones(n_u=n_u, most=most, most_entries=most_entries, most_dense=dense)
+    memory.put(record, np.dtype("long"), first=most + 1, entry=3 * most + 1, speed=most_entries, active=dense)
+    rows = dict.fromkeys(("free", "P", "w", "kept", "step", "before"), 3 * most)
+    memory.put(record, float, along=most_entries, answer=most_entries, friction=most, d_n=most, d_t=most, block=9 * most, du=n_u,
+               dense=dense * dense, **rows)
+    memory.put(record, np.intc, state=most)
+    return record

@@ -1,0 +1,348 @@
+// Time stepping with contacts (Moreau and Jean): the implicit midpoint rule, with the impulses of all contacts over a step.
+//
+// A step goes from x to x + h f(t + h/2, (x + x_end)/2) + [0; M^-1 J^T P], J at the middle. The impulses P of the contacts whose
+// gap would close within the step fulfil the laws of contact and friction with the relative velocities at its end, along the
+// normal added to restitution times those at its begin. Without contacts the rule is of second order; an impact is at the begin
+// of a step. Then bodies that overlap are moved apart by the smallest change of the positions.
+//
+// Source: Jean, The non-smooth contact dynamics method, 1999; Acary, Projected event-capturing time-stepping schemes for
+// nonsmooth mechanical systems with unilateral contact and Coulomb's friction, 2013.
+#pragma once
+
+#include "many.h"
+
+enum {
+    SYMDYN_MOREAU_DONE = 0,
+    SYMDYN_MOREAU_FIELD = -1,      // the right-hand side cannot be evaluated
+    SYMDYN_MOREAU_CONTACT = -2,    // what contacts need cannot be evaluated
+    SYMDYN_MOREAU_LONG_STEP = -3,  // the equations of a step are not solved by iteration
+    SYMDYN_MOREAU_ROOM = -4,       // more contacts than there is room for
+    SYMDYN_MOREAU_NOT_FINITE = -5,
+    SYMDYN_MOREAU_CONSTRAINTS = -6,
+    SYMDYN_MOREAU_INPUTS = -7
+};
+
+enum { SYMDYN_OPEN = 0, SYMDYN_STICKING = 1, SYMDYN_SLIDING = 2 };
+
+// Let all frames look at a time and a state.
+static int symdyn_look(symdyn_moreau *s, double t, const double *x) {
+    *s->t = t;
+    for (int i = 0; i < s->n_x; i++) s->x[i] = x[i];
+    return s->function && s->function(t, x, s->inputs) ? SYMDYN_MOREAU_INPUTS : 0;
+}
+
+static int symdyn_rate(symdyn_moreau *s, double t, const double *x) {
+    const int stopped = symdyn_look(s, t, x);
+    if (stopped) return stopped;
+    s->n_evaluations++;
+    s->reason = s->field(s->field_frame);
+    return s->reason ? SYMDYN_MOREAU_FIELD : 0;
+}
+
+// Gaps and relative velocities at (t, x).
+static int symdyn_gaps(symdyn_moreau *s, double t, const double *x) {
+    const int stopped = symdyn_look(s, t, x);
+    if (stopped) return stopped;
+    s->reason = s->n_given ? s->gaps(s->gaps_frame) : 0;
+    if (!s->reason && s->n_bodies) s->reason = s->spheres(s->spheres_frame);
+    return s->reason ? SYMDYN_MOREAU_CONTACT : 0;
+}
+
+static double symdyn_size(const double *v, int n) {
+    double most = 0.0;
+    for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
+    return most;
+}
+
+// Put a state onto the constraints, and unit vectors to their length.
+static int symdyn_settle(symdyn_moreau *s, double t, double *x) {
+    for (int group = 0; group < s->n_units; group++) {
+        double square = 0.0;
+        for (long k = s->unit_first[group]; k < s->unit_first[group + 1]; k++)
+            square += x[s->unit_index[k]] * x[s->unit_index[k]];
+        for (long k = s->unit_first[group]; k < s->unit_first[group + 1]; k++)
+            if (square > 0.0) x[s->unit_index[k]] /= sqrt(square);
+    }
+    for (int round = 0; s->n_c && round < 8; round++) {
+        if (symdyn_look(s, t, x)) return SYMDYN_MOREAU_INPUTS;
+        s->reason = s->position(s->position_frame);
+        if (s->reason) return SYMDYN_MOREAU_CONSTRAINTS;
+        const double off = symdyn_size(s->position_change, s->n_c);
+        for (int i = 0; i < s->n_q; i++) x[i] += s->position_change[s->n_c + i];
+        if (symdyn_look(s, t, x)) return SYMDYN_MOREAU_INPUTS;
+        s->reason = s->velocity(s->velocity_frame);
+        if (s->reason) return SYMDYN_MOREAU_CONSTRAINTS;
+        for (int i = 0; i < s->n_u; i++) x[s->n_q + i] += s->velocity_change[s->n_c + i];
+        if (off <= 1e-13 * s->length) return 0;
+    }
+    return 0;
+}
+
+// Relative velocity and gap of a contact at what the frames looked at last; velocities to w. Returns the gap.
+static double symdyn_contact_now(const symdyn_moreau *s, long i, long m, double *basis, double *w) {
+    if (s->b[i] < 0) {
+        const long first = s->given_first[s->a[i]];
+        for (long k = 0; k < m; k++) w[k] = s->gap[4 * s->n_given + first + k];
+        return s->gap[4 * s->a[i]];
+    }
+    double normal[3];
+    const double gap = symdyn_pair(s, s->a[i], s->b[i], normal);
+    symdyn_basis(s, normal, basis, 0);
+    for (long k = 0; k < m; k++) w[k] = symdyn_pair_speed(s, s->a[i], s->b[i], basis, basis + 3 * k);
+    return gap;
+}
+
+// Coefficients of a contact: static and kinetic friction, restitution.
+static const double *symdyn_coefficients(const symdyn_moreau *s, long i) {
+    return s->b[i] < 0 ? s->gap + 4 * s->a[i] + 1 : s->sphere + 3 * s->group_of[s->a[i]];
+}
+
+static long symdyn_rows(const symdyn_moreau *s, long i) {
+    if (s->b[i] < 0) return s->given_first[s->a[i] + 1] - s->given_first[s->a[i]];
+    const double *coefficients = symdyn_coefficients(s, i);
+    return coefficients[0] > 0.0 || coefficients[1] > 0.0 ? s->planar ? 2 : 3 : 1;
+}
+
+// Append the first m rows of a contact with a name.
+static void symdyn_given_rows(const symdyn_moreau *s, symdyn_cones *c, long contact, long m) {
+    const double *J = s->direction, *answer = J + s->n_rows * s->n_u;
+    long r = c->first[c->n], e = c->entry[r];
+    for (long k = 0; k < m; k++) {
+        const long row = s->given_first[contact] + k;
+        for (int i = 0; i < s->n_u; i++) {
+            const double along = J[row * s->n_u + i], back = answer[i * s->n_rows + row];
+            if (along == 0.0 && back == 0.0) continue;
+            c->speed[e] = i;
+            c->along[e] = along;
+            c->answer[e++] = back;
+        }
+        c->entry[++r] = e;
+    }
+    c->first[++c->n] = r;
+}
+
+// J and M^-1 J^T of the contacts that were found, or of their normals alone, at (t, x). Bases turn to the normals there.
+static int symdyn_assemble(symdyn_moreau *s, symdyn_cones *c, double t, const double *x, int normals) {
+    const int stopped = symdyn_gaps(s, t, x);
+    if (stopped) return stopped;
+    s->reason = s->n_given ? s->directions(s->directions_frame) : 0;
+    if (s->reason) return SYMDYN_MOREAU_CONTACT;
+    if (s->n_bodies && symdyn_responses(s)) return SYMDYN_MOREAU_CONTACT;
+    c->n = 0;
+    c->first[0] = c->entry[0] = 0;
+    for (long i = 0; i < s->n_found; i++) {
+        const long m = normals ? 1 : symdyn_rows(s, i);
+        if (s->b[i] < 0) {
+            symdyn_given_rows(s, c, s->a[i], m);
+        } else {
+            double normal[3];
+            symdyn_pair(s, s->a[i], s->b[i], normal);
+            symdyn_basis(s, normal, s->basis + 9 * i, 0);
+            symdyn_pair_rows(s, c, s->a[i], s->b[i], s->basis + 9 * i, (int)m);
+        }
+    }
+    return 0;
+}
+
+// The contacts whose gap is at most reach at what the frames looked at last.
+static int symdyn_find(symdyn_moreau *s, symdyn_cones *c, double reach) {
+    s->n_found = 0;
+    for (long i = 0; i < s->n_given; i++) {
+        if (!(s->gap[4 * i] <= reach)) continue;
+        s->a[s->n_found] = i;
+        s->b[s->n_found++] = -1;
+    }
+    return s->n_bodies && symdyn_search(s, c, reach) ? SYMDYN_MOREAU_ROOM : 0;
+}
+
+// Move bodies apart that overlap at t, by the smallest change of the positions in the metric of the mass matrix.
+static int symdyn_part(symdyn_moreau *s, symdyn_cones *c, double t, double *x) {
+    double *before = s->work + 6 * s->n_x, *moved = s->work + 7 * s->n_x;
+    for (int round = 0; round < 8; round++) {
+        double deep = 0.0;
+        int failed = symdyn_gaps(s, t, x);
+        if (!failed) failed = symdyn_find(s, c, 0.0);
+        if (failed) return failed;
+        for (long i = 0; i < s->n_found; i++) {
+            double w[3], basis[9] = {0.0};
+            deep = fmax(deep, -symdyn_contact_now(s, i, 1, basis, w));
+        }
+        if (deep <= s->depth || round == 7) {
+            s->worst_depth = fmax(s->worst_depth, deep);
+            return 0;
+        }
+        failed = symdyn_find(s, c, 2.0 * deep);
+        if (!failed) failed = symdyn_assemble(s, c, t, x, 1);
+        if (failed) return failed;
+        for (long i = 0; i < c->n; i++) {
+            double w[3], basis[9] = {0.0};
+            c->free[i] = symdyn_contact_now(s, i, 1, basis, w) - 0.1 * s->depth;
+            c->friction[i] = c->P[i] = 0.0;
+        }
+        symdyn_cones_solve(c, 0.1 * s->depth, s->most_sweeps);
+        failed = symdyn_rate(s, t, x);
+        if (failed) return failed;
+        for (int i = 0; i < s->n_x; i++) {
+            before[i] = s->xd[i];
+            moved[i] = x[i];
+        }
+        for (int i = 0; i < s->n_u; i++) moved[s->n_q + i] += c->du[i];
+        failed = symdyn_rate(s, t, moved);
+        if (failed) return failed;
+        for (int i = 0; i < s->n_q; i++) x[i] += s->xd[i] - before[i];
+        failed = symdyn_settle(s, t, x);
+        if (failed) return failed;
+    }
+    return 0;
+}
+
+// The place of a contact among those of the step before; -1: it was not there.
+static long symdyn_earlier(const symdyn_moreau *s, long i) {
+    const int named = s->b[i] < 0;
+    for (long j = named ? 0 : s->old_from[s->a[i]]; j < s->n_old; j++) {
+        if (named ? s->old_b[j] >= 0 : s->old_b[j] < 0 || s->old_a[j] != s->a[i]) return -1;
+        if (s->old_a[j] == s->a[i] && s->old_b[j] == s->b[i]) return j;
+    }
+    return -1;
+}
+
+// What contacts bring into a step from the one before: impulses to start from, whether they stuck; coefficients of friction.
+static void symdyn_bring(symdyn_moreau *s, symdyn_cones *c) {
+    for (long i = 0; i < c->n; i++) {
+        const long old = symdyn_earlier(s, i), r = c->first[i];
+        const double *mu = symdyn_coefficients(s, i);
+        const int stuck = old >= 0 && s->old_state[old] == SYMDYN_STICKING;
+        for (long k = r; k < c->first[i + 1]; k++) c->P[k] = old < 0 ? 0.0 : s->P_old[3 * old + k - r];
+        s->broken[i] = !stuck || !(mu[0] > mu[1]);
+        c->friction[i] = stuck ? mu[0] : mu[1];
+    }
+}
+
+// Solve for the impulses; contacts that stuck and slip now have kinetic friction.
+static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c) {
+    for (int again = 1; again;) {
+        symdyn_cones_solve(c, s->tolerance, s->most_sweeps);
+        again = 0;
+        for (long i = 0; i < c->n; i++)
+            if (!s->broken[i] && c->state[i] == SYMDYN_SLIDING) {
+                s->broken[i] = again = 1;
+                c->friction[i] = symdyn_coefficients(s, i)[1];
+            }
+    }
+}
+
+// Iterate on the end of a step, from a first guess in end. Returns 0 or a failure.
+static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end) {
+    double *middle = s->work, *next = s->work + s->n_x, *kick = s->work + 2 * s->n_x, off = 0.0;
+    const int n_q = s->n_q, n_u = s->n_u;
+    for (int round = 0; round < s->most_rounds; round++) {
+        int failed;
+        for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
+        if (s->n_found && (round < 4 || round % 8 == 0)) {
+            failed = symdyn_assemble(s, c, t + 0.5 * h, middle, 0);
+            if (failed) return failed;
+            if (!round) symdyn_bring(s, c);
+        }
+        failed = symdyn_rate(s, t + 0.5 * h, middle);
+        if (failed) return failed;
+        for (int i = 0; i < s->n_x; i++) next[i] = x[i] + h * s->xd[i];
+        if (s->n_found) {
+            symdyn_cones_total(c, c->P, c->du);
+            for (int i = 0; i < n_u; i++) next[n_q + i] += kick[i] = c->du[i];
+        }
+        failed = symdyn_settle(s, t + h, next);
+        if (failed) return failed;
+        if (s->n_found) {
+            failed = symdyn_gaps(s, t + h, next);
+            if (failed) return failed;
+            for (long i = 0; i < c->n; i++) {
+                double w[3], basis[9];
+                const long r = c->first[i], m = c->first[i + 1] - r;
+                for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
+                symdyn_contact_now(s, i, m, basis, w);
+                for (long k = 0; k < m; k++) c->free[r + k] = w[k] - symdyn_cones_along(c, r + k, kick);
+                if (s->incoming[3 * i] < 0.0) c->free[r] += symdyn_coefficients(s, i)[2] * s->incoming[3 * i];
+            }
+            symdyn_impulses(s, c);
+            for (int i = 0; i < n_u; i++) next[n_q + i] += c->du[i] - kick[i];
+        }
+        off = 0.0;
+        double size = 0.0;
+        for (int i = 0; i < s->n_x; i++) {
+            off = fmax(off, fabs(next[i] - end[i]));
+            size = fmax(size, fabs(next[i]));
+            end[i] = next[i];
+        }
+        s->n_rounds++;
+        if (!(size <= 1e300)) return SYMDYN_MOREAU_NOT_FINITE;
+        const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
+        if (round && off <= noise) return 0;
+        if (round + 1 == s->most_rounds && off > 1e-6 * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
+    }
+    return 0;
+}
+
+// Keep what contacts did: what the next step starts from, velocities and gaps at the end, losses.
+static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double *x) {
+    const int failed = symdyn_gaps(s, t, x);
+    if (failed) return failed;
+    for (long body = 0; body <= s->n_bodies; body++) s->old_from[body] = -1;
+    for (long i = 0; i < s->n_found; i++) {
+        const long r = c->first[i], m = c->first[i + 1] - r;
+        double *end = s->at_end + 4 * i, basis[9];
+        for (int k = 0; k < 9; k++) basis[k] = s->basis[9 * i + k];
+        for (int k = 0; k < 4; k++) end[k] = 0.0;
+        end[0] = symdyn_contact_now(s, i, m, basis, end + 1);
+        double loss = 0.0;
+        for (int k = 0; k < 3; k++) {
+            s->P_old[3 * i + k] = k < m ? c->P[r + k] : 0.0;
+            if (k < m) loss -= 0.5 * c->P[r + k] * (s->incoming[3 * i + k] + end[1 + k]);
+        }
+        s->loss_of[s->b[i] < 0 ? s->a[i] : s->n_given + s->group_of[s->a[i]]] += loss;
+        s->old_a[i] = s->a[i];
+        s->old_b[i] = s->b[i];
+        s->old_state[i] = c->state[i];
+        if (s->b[i] >= 0 && s->old_from[s->a[i]] < 0) s->old_from[s->a[i]] = i;
+    }
+    s->n_old = s->n_found;
+    s->old_from[s->n_bodies] = s->n_old;
+    for (long body = s->n_bodies - 1; body >= 0; body--)
+        if (s->old_from[body] < 0) s->old_from[body] = s->old_from[body + 1];
+    s->worst_residual = fmax(s->worst_residual, s->n_found ? c->residual : 0.0);
+    return 0;
+}
+
+// One step from (t, x), in place.
+static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, double h, double *x) {
+    double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x;
+    int failed = symdyn_rate(s, t, x);
+    if (failed) return failed;
+    for (int i = 0; i < s->n_x; i++) guess[i] = x[i] + 0.5 * h * s->xd[i];
+    failed = symdyn_rate(s, t + 0.5 * h, guess);
+    if (failed) return failed;
+    for (int i = 0; i < s->n_x; i++) end[i] = x[i] + h * s->xd[i];
+    s->n_found = 0;
+    failed = symdyn_rounds(s, c, t, h, x, end);  // without contacts: what they are looked for with
+    if (failed) return failed;
+    for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
+    failed = symdyn_gaps(s, t + 0.5 * h, guess);
+    if (!failed) failed = symdyn_find(s, c, 0.0);
+    if (!failed) failed = symdyn_gaps(s, t, x);
+    if (failed) return failed;
+    for (long i = 0; i < s->n_found; i++) {
+        double normal[3];
+        if (s->b[i] >= 0) {
+            symdyn_pair(s, s->a[i], s->b[i], normal);
+            symdyn_basis(s, normal, s->basis + 9 * i, 1);
+        }
+        for (int k = 0; k < 3; k++) s->incoming[3 * i + k] = 0.0;
+        symdyn_contact_now(s, i, symdyn_rows(s, i), s->basis + 9 * i, s->incoming + 3 * i);
+    }
+    failed = s->n_found ? symdyn_rounds(s, c, t, h, x, end) : 0;
+    if (!failed) failed = symdyn_keep(s, c, t + h, end);
+    if (!failed) failed = symdyn_part(s, c, t + h, end);
+    if (failed) return failed;
+    for (int i = 0; i < s->n_x; i++) x[i] = end[i];
+    s->n_steps++;
+    return 0;
+}

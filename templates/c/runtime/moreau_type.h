@@ -1,0 +1,55 @@
+// A mechanism as time stepping with contacts takes it: functions of the generated code, each with the frame that it reads and
+// writes, and memory. All frames read the same t, x and inputs.
+#pragma once
+
+typedef struct {
+    int n_q, n_u, n_x, n_in, n_c, n_units;  // n_x: with what is integrated besides the state; constraints, unit vectors
+    long n_given, n_rows;                   // contacts with a name of their own, and their rows
+    const long *given_first;                // rows of these: given_first[i] to given_first[i + 1]
+    const long *unit_first, *unit_index;    // coordinates that form unit vectors
+
+    int (*field)(void *frame);  // x_dot with all contacts open
+    void *field_frame;
+    const double *xd;
+    int (*gaps)(void *frame);  // gap, static and kinetic friction, restitution of every contact; relative velocities
+    void *gaps_frame;
+    const double *gap;
+    int (*directions)(void *frame);  // J, M^-1 J^T
+    void *directions_frame;
+    const double *direction;
+    int (*position)(void *frame);  // residuals of constraints, the change of q that makes them zero
+    void *position_frame;
+    const double *position_change;
+    int (*velocity)(void *frame);
+    void *velocity_frame;
+    const double *velocity_change;
+    int (*spheres)(void *frame);  // see many.h
+    void *spheres_frame;
+    const double *sphere;
+    int (*function)(double t, const double *x, double *inputs);  // none: inputs are constant
+    double *t, *x, *inputs;                                      // what frames read
+
+    // Groups of spheres that touch each other and planes, see many.h.
+    int n_groups, n_bodies, n_planes, n_speeds, planar;  // speeds of each of these bodies
+    const long *group_of, *plane_group;                  // of each body, of each plane
+    const long *speed_of;                                // n_bodies*n_speeds: places of their speeds
+    long *cell, *next, *table;                           // n_bodies each, n_table
+    long n_table;
+
+    double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
+    long most_sweeps;                 // of one contact problem
+    int most_rounds;                  // of a step
+    double *work;                     // 8*n_x + n_rows + 16*n_given
+    double *response;                 // n_bodies*6*n_speeds: M^-1 B^T
+
+    // Contacts of the latest step: places of both bodies, or of the contact and -1; planes come after the bodies.
+    long *a, *b, *old_a, *old_b, *old_from, n_old;
+    int *old_state, *broken;
+    double *P_old, *basis, *incoming, *gap_of, *kept_P;
+    long n_found;                              // contacts of the latest step
+    double *at_end;                            // n*4: gap, then relative velocities at its end
+    double worst_residual, worst_depth, loss;  // of all steps so far; energy that contacts have taken
+    double *loss_of;                           // by contact with a name, then by group
+    long n_steps, n_rounds, n_evaluations;
+    int reason;
+} symdyn_moreau;
