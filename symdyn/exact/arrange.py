@@ -27,9 +27,9 @@ Polynomial = dict[Monomial, Number]
 Cost = tuple[int, int]
 
 # Longer polynomials are not given to the factorization. Up to ALL terms every grouping is tried at each level, above it the one
-# that leaves the fewest terms; Horner's scheme too up to BOTH terms, and where the grouping leaves more than this part of them.
-# Squares of sums are looked for up to BOTH terms.
-FACTORED, ALL, BOTH, CLEAR = 120, 16, 40, 0.6
+# that leaves the fewest terms; Horner's scheme too up to BOTH terms, and up to HORNER where the grouping leaves more than CLEAR
+# of them. Squares of sums are looked for up to BOTH terms.
+FACTORED, ALL, BOTH, HORNER, CLEAR = 120, 16, 40, 600, 0.6
 _UNIT: frozenset = frozenset({((), 1)})
 _KINDS = (("motion",), ("parameter",), ("position",))
 
@@ -299,7 +299,7 @@ class Arranger:
             found.append(self._gathered(group, self.nested))
             if total(found[-1])[0] == once:  # each letter stands in it once
                 return found[-1]
-        if not groups or len(q) <= BOTH or min(left) > CLEAR * len(q):
+        if not groups or len(q) <= BOTH or (len(q) <= HORNER and min(left) > CLEAR * len(q)):
             found.append(self.horner(q))
         squares = self._squares(q) if len(q) <= BOTH else None
         if squares is not None:

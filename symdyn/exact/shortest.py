@@ -32,6 +32,9 @@ from symdyn.tape.tape import Output, reachable
 
 FORMS = ("shortest", "polynomial", "fourier", "factored", "speeds", "parameters", "angles", "nested")
 _GROUPS = {"speeds": ("motion",), "parameters": ("parameter",), "angles": ("position",)}
+# Kinds of letters that whole entries are gathered by, and those of them that take little time for long entries.
+_GATHERED_LONG = (("position",), ("motion", "position"))
+_GATHERED = (("motion",), ("parameter",), *_GATHERED_LONG)
 _MOTION = SPEED | ACCELERATION | INPUT | SEED
 # Representations with this many times the terms of the shortest one are not arranged; those of more than SHORT terms are only
 # nested, in the two shortest representations, and of more than LONG terms in one.
@@ -43,7 +46,7 @@ MULTIPLE = 10
 # Entries are compared with the form in which they were derived if that has no more than LONGER times the operations, before
 # SymPy combines terms; up to FACTOR_TERMS operations common factors are taken out of it, if it then has no more than NEAR times
 # as many.
-LONGER, FACTOR_TERMS, NEAR = 2.1, 250, 1.6
+LONGER, FACTOR_TERMS, NEAR = 2.4, 250, 1.6
 
 
 class Writer:
@@ -75,16 +78,21 @@ class Writer:
 
     def _angle(self, vector: tuple[int, ...]) -> sp.Expr:
         if vector not in self._angles:
-            total: dict[Any, Fraction] = {}
-            for k, n in enumerate(vector):
-                for term, factor in self.exact.bases[k].items() if n else ():
-                    total[term] = total.get(term, Fraction(0)) + n * factor
+            total = self._terms(vector)
             e = sp.Add(*[number(factor) * sp.Mul(*[self._node(node) for node in term])
                          for term, factor in total.items() if factor])
             if any(isinstance(node, Inverse) for term in total for node in term):
                 e = min(e, sp.together(e), key=sp.count_ops)
             self._angles[vector] = e
         return self._angles[vector]
+
+    def _terms(self, vector: tuple[int, ...]) -> dict[Any, Fraction]:
+        """A combination of the base angles as a sum of terms with their factors."""
+        total: dict[Any, Fraction] = {}
+        for k, n in enumerate(vector):
+            for term, factor in self.exact.bases[k].items() if n else ():
+                total[term] = total.get(term, Fraction(0)) + n * factor
+        return total
 
     def _node(self, node: Node | Inverse) -> sp.Expr:
         """What stands in an angle: a symbol, something that the angle cannot be taken apart at, or one over it."""
@@ -95,6 +103,10 @@ class Writer:
         return expand(Output.of("angle", node), self.symbols)
 
     def _opposite(self, vector: tuple[int, ...]) -> bool:
+        terms = {term: factor for term, factor in self._terms(vector).items() if factor}
+        signs = sum(1 if factor > 0 else -1 for factor in terms.values())
+        if signs and all(node.op == "leaf" for term in terms for node in term):
+            return signs < 0  # SymPy's rule, which breaks ties by its order of symbols
         return bool(self._angle(vector).could_extract_minus_sign())
 
     def expression(self, letter: int) -> sp.Expr:
@@ -269,11 +281,10 @@ class Writer:
             return [a.nested(p)]
         if self.form in _GROUPS:
             return [a.grouped(p, _GROUPS[self.form]) or a.factored(p)]
-        if len(p) > SHORT:
-            return [a.nested(p)]
-        trees: list[Tree | None] = [a.nested(p), a.expanded(p)]
-        for kinds in (("motion",), ("parameter",), ("position",), ("motion", "position")):
-            trees.append(a.grouped(p, kinds))
+        trees: list[Tree | None] = [a.nested(p)]
+        if len(p) <= SHORT:
+            trees.append(a.expanded(p))
+        trees += [a.grouped(p, kinds) for kinds in (_GATHERED if len(p) <= LONG else _GATHERED_LONG)]
         return [tree for tree in trees if tree is not None]
 
     # -- SymPy
