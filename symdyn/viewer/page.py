@@ -57,9 +57,14 @@ def page_of(name: str, data: dict[str, Any], functions: str, path: Any) -> View:
     target = None if path is None else _target(path)
     folder = templates_folder() / "viewer"
     script = "\n".join((folder / part).read_text(encoding="utf-8") for part in _SCRIPTS)
+    try:
+        plain = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
+    except ValueError:
+        raise ArgumentError(f"{name}: lengths of the picture are beyond the range of double precision; pass smaller numbers for "
+                            "coordinates and parameters") from None
     text = page_environment().get_template("viewer/page.html.jinja").render(
         name=name, style=(folder / "style.css").read_text(encoding="utf-8"), script=script, functions=functions,
-        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/"))
+        data=plain)
     made = View(name, text, target)
     if target is not None:
         made.save(target)

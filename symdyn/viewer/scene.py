@@ -26,7 +26,8 @@ def scene_of(m: Mechanism, records: Sequence[Mapping[str, Any]], lengths: np.nda
 
     records   shapes of the user's, with `lengths` in place of None; bent: flexible bodies by their index
     """
-    items, length = looks_of(m)
+    with np.errstate(all="ignore"):
+        items, length = looks_of(m)
     meshes, threads, water = [], [], None
     names = [*m.bodies, "ground"]
     for record in filled(records, lengths):

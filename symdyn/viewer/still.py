@@ -83,7 +83,7 @@ def _of_item(m: Mechanism, item: Item, axes: np.ndarray) -> Iterator[Shape]:
     elif len(ends) == 2:
         rail = isinstance(item.ends[0], tuple) and item.ends[0][0] == "off"
         if kind in ("spring", "damper", "both"):
-            ends = list(_zigzag(*ends, size[0], axes))
+            ends = list(_zigzag(ends[0], ends[1], size[0], axes))
         points = np.array(ends)
         wide = size[0] * (0.16 if kind in ("spring", "damper", "both") else 1.0)
         yield float(points.mean(axis=0) @ axes[2]), points @ axes[:2].T, wide, item.color, "rail" if rail else "line"
@@ -136,7 +136,8 @@ def _zigzag(a: np.ndarray, b: np.ndarray, radius: float, axes: np.ndarray) -> It
 
 
 def _shaded(color: str, toward: float) -> str:
-    return str(to_hex(np.array(to_rgb(color)) * (_SHADE + (1 - _SHADE) * toward)))
+    red, green, blue = (float(v) * (_SHADE + (1 - _SHADE) * toward) for v in to_rgb(color))
+    return str(to_hex((red, green, blue)))
 
 
 def _text(points: np.ndarray, wide: float, color: str, kind: str, scale: float, middle: np.ndarray) -> str:

@@ -351,6 +351,8 @@ def test_what_cannot_be_shown(arm: Solution, tmp_path: Path) -> None:
     system.add_joint(sd.Prismatic("rail", system.ground, body, coordinate=q, parent_point=[1 / k, 0, 0]))
     with pytest.raises(sd.ArgumentError, match=r"are not finite at the coordinates and parameters to be shown; pass others"):
         system.show(params={k: 0.0})
+    with pytest.raises(sd.ArgumentError, match="pendulum: lengths of the picture are beyond the range of double precision"):
+        sd.systems.pendulum().show(params={"l": 1e308})
 
 
 def test_kinematics_that_cannot_run_in_a_page() -> None:
