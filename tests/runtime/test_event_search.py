@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ def test_a_threshold_that_is_passed_twice_at_short_distance_ends_the_motion(sear
 @pytest.mark.parametrize(("backend", "method"), SHARED)
 def test_what_varies_too_quickly_is_warned_of(backend: str, method: str) -> None:
     """A hundred thousand waves within a step, which stay above zero: whether they do is not resolved."""
-    module = thrown(blur=(lambda y: sp.sin(100000 * sd.t) + sp.Rational(1000001, 1000000), {}))[backend]
+    module = thrown(blur=(lambda y: sp.sin(100000 * sd.t) + sp.cos(100000 * sd.t) + sp.Rational(1414215, 1000000), {}))[backend]
     match = ("thrown: zeros of events may be missed: blur .from t = 0.0[0-9]* s on. varies so quickly within a step that 2048 "
              "divisions do not resolve it; give a max_step as short as its shortest wave")
     with pytest.warns(SimulationWarning, match=match):
@@ -64,8 +65,31 @@ def test_what_varies_too_quickly_is_warned_of(backend: str, method: str) -> None
     assert run.success and len(run.doubts) == 1
 
 
+def test_what_stays_above_zero_by_the_ranges_of_its_arguments_is_not_searched() -> None:
+    """The least of the sine is above zero: a step of an explicit method in which it waves a hundred thousand times is proved."""
+    module = thrown(waves=(lambda y: sp.sin(100000 * sd.t) + sp.Rational(1000001, 1000000), {}))["c"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert module.simulate((0, 10), u=[1e-3], params={"g": 0}).success
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-9])
+@pytest.mark.parametrize("method", ["dop853", "bs54"])
+def test_a_crossing_after_many_steps_that_were_not_searched_is_found(method: str, rtol: float) -> None:
+    """Thrown up from the ground, it is back at -1 m, at 1 mm below its top twice, and never above that."""
+    speed = np.sqrt(2 * G * 50)
+    module = thrown(deep=(lambda y: y + 1, {}), high=(lambda y: y - sp.Rational(49999, 1000), {}),
+                    over=(lambda y: y - sp.Rational(50001, 1000), {}))["c"]
+    run = module.simulate((0, 10), u=[speed], rtol=rtol, method=method, max_step=0.01)
+    above = np.sqrt(2 * 1e-3 / G)
+    assert run.events["deep"].t == pytest.approx([(speed + np.sqrt(speed**2 + 2 * G)) / G], abs=1e-9)
+    assert run.events["high"].t == pytest.approx([speed / G - above, speed / G + above], abs=1e-6)
+    assert not len(run.events["over"].t)
+
+
 def test_many_motions_warn_of_what_varies_too_quickly_by_their_numbers() -> None:
-    module = thrown(blur=(lambda y: sp.sin(100000 * sd.t * y) + sp.Rational(1000001, 1000000), {}))["c"]
+    module = thrown(blur=(lambda y: sp.sin(100000 * sd.t * y) + sp.cos(100000 * sd.t * y) + sp.Rational(1414215, 1000000),
+                          {}))["c"]
     with pytest.warns(SimulationWarning, match="of 2 motions 1: thrown: zeros of events may be missed: blur"):
         module.simulate_batch(q=[[0.0], [1.0]], t=(0, 10), params={"g": 0})
 

@@ -367,17 +367,86 @@ static int symdyn_event_reset(symdyn_run *run, double t, const double *x, double
 #endif
 }
 
-// Look for events in the latest step: note them, and end the step at the first that stops the motion or changes its state.
+#if SYMDYN_HAS_BOUNDS && SYMDYN_EXPLICIT && !SYMDYN_BOUNDED_INPUTS
+// Whether every quantity that is looked for stays on its side within ranges of what they depend on.
+static int symdyn_event_safe(symdyn_run *run, const double *range) {
+    double ud[6 * SYMDYN_LEAVES] = {0.0}, ranges[2 * SYMDYN_N_EVENTS];
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        ud[6 * l] = range[2 * l];
+        ud[6 * l + 1] = range[2 * l + 1];
+    }
+    if (symdyn_event_ranges_of(&run->problem, ud, ranges)) return 0;
+    for (int k = 0; k < SYMDYN_N_EVENTS; k++) {
+        const int clear = run->events.side[k] > 0.0 ? ranges[2 * k] > 0.0 : run->events.side[k] < 0.0 && ranges[2 * k + 1] < 0.0;
+        if (run->events.look[k] && !(symdyn_event_enclosed[k] && run->events.leaving[k] == 0 && clear)) return 0;
+    }
+    return 1;
+}
+
+// Ranges around those of a step in which all that is looked for is safe, as wide as they can be by powers of two. Returns whether
+// there are any.
+__attribute__((noinline)) static int symdyn_event_widened(symdyn_run *run, const double *range) {
+    double wider[2 * SYMDYN_LEAVES];
+    int inside = 0;
+    for (int power = run->events.widened + 4; !inside && power >= 0; power--) {
+        const double factor = power ? (double)(1L << power) : 0.0;
+        for (int l = 0; l < SYMDYN_LEAVES; l++) {
+            const double more = factor * (range[2 * l + 1] - range[2 * l]);
+            wider[2 * l] = range[2 * l] - more;
+            wider[2 * l + 1] = range[2 * l + 1] + more;
+        }
+        inside = symdyn_event_safe(run, wider);
+        run->events.widened = inside ? (power < 26 ? power : 26) : 0;
+    }
+    for (int l = 0; l < 2 * SYMDYN_LEAVES; l++) run->events.safe[l] = inside ? wider[l] : l % 2 ? -1.0 : 1.0;
+    return inside;
+}
+
+// Whether nothing that is looked for can vanish in the latest step, so that there is nothing to search. What it depends on moves
+// no further than twice as far as by the slopes of stages throughout the step; as long as it stays within ranges that were found
+// to be safe, this costs a few comparisons.
+__attribute__((noinline)) static int symdyn_event_far(symdyn_run *run) {
+    double range[2 * SYMDYN_LEAVES];
+    int inside = 1;
+    for (int l = 0; l < SYMDYN_LEAVES; l++) {
+        const int place = symdyn_event_leaf[l];
+        double least = 0.0, most = 0.0;
+        if (place) {
+            for (int j = 0; j <= 4; j++) {
+                const double slope = j < 4 ? run->method.k[j * SYMDYN_STAGES / 4][place - 1] : run->xd[place - 1];
+                least = slope < least ? slope : least;
+                most = slope > most ? slope : most;
+            }
+            const double from = 2.0 * run->h_old * least, to = 2.0 * run->h_old * most, x = run->x_old[place - 1];
+            range[2 * l] = x + (from < to ? from : to);
+            range[2 * l + 1] = x + (from < to ? to : from);
+        } else {
+            range[0] = run->direction > 0.0 ? run->t_old : run->t;
+            range[1] = run->direction > 0.0 ? run->t : run->t_old;
+        }
+        inside &= range[2 * l] >= run->events.safe[2 * l] && range[2 * l + 1] <= run->events.safe[2 * l + 1];
+    }
+    inside = inside || symdyn_event_widened(run, range);
+    run->events.stale |= inside;
+    return inside;
+}
+#endif
+
+// Search the latest step for events: note them, and end the step at the first that stops the motion or changes its state.
 // Panels are divided until it is certain what happens in each, the rest of the step waiting in `ends`.
-static void symdyn_look_for_events(symdyn_run *run) {
+__attribute__((noinline)) static void symdyn_search_step(symdyn_run *run) {
     const double least =
         1e-14 * run->h_floor / (symdyn_eps * symdyn_eps);  // times that are closer count as one: 1e-14 of the span
     double left = run->t_old, ends[64] = {run->t}, v[SYMDYN_PANEL + 1][SYMDYN_N_EVENTS];
     double states[SYMDYN_PANEL + 1][SYMDYN_NX], xd[SYMDYN_NX], *const x = states[SYMDYN_PANEL - 1];
     int failure = 0, n = 1;
     run->events.divisions = run->events.proofs = 0;
+#if SYMDYN_HAS_BOUNDS
+    if (run->events.stale && (failure = symdyn_event_values(run, run->t_old, run->x_old, run->events.now))) n = 0;
+    run->events.stale = 0;
+#endif
     for (int i = 0; i < SYMDYN_NX; i++) states[0][i] = run->x_old[i];
-    while (run->events.looking && n) {
+    while (n) {
         const double right = ends[n - 1], middle = 0.5 * (left + right), width = fabs(right - left);
         double first = right, root[SYMDYN_N_EVENTS];
         int passed[SYMDYN_N_EVENTS], any = 0, cut = 0, resets = 0, again = 0;
@@ -507,6 +576,15 @@ static void symdyn_look_for_events(symdyn_run *run) {
     run->t_low = 0.0;
     run->status = failure;
     for (int i = 0; i < SYMDYN_NX; i++) run->x[i] = x[i];
+}
+
+// Look for events in the latest step.
+static void symdyn_look_for_events(symdyn_run *run) {
+    if (!run->events.looking) return;
+#if SYMDYN_HAS_BOUNDS && SYMDYN_EXPLICIT && !SYMDYN_BOUNDED_INPUTS
+    if (symdyn_event_far(run)) return;
+#endif
+    symdyn_search_step(run);
 }
 
 // Before a step: begin to look, or go on from an event, before whose reset event_now has the changes of a small step. Returns 1

@@ -12,9 +12,13 @@ typedef struct {
     int divisions, proofs;                    // of the latest step: for samples, for proofs
     int unresolved[SYMDYN_N_EVENTS], coarse;  // quantities that vary too quickly, whether there are any
     int unproved[SYMDYN_N_EVENTS];            // of which it is not proved that the samples show all zeros
-    double spacing;                           // of samples at the most, s; 0: any
-    double t, after[SYMDYN_NX];               // of the latest reset; the state after it
-    double reset_gap;                         // by how much a reset that was rejected is off
+#if SYMDYN_HAS_BOUNDS
+    double safe[2 * SYMDYN_LEAVES];  // ranges of what the quantities depend on, in which none that is looked for vanishes
+    int widened, stale;              // by powers of two; values at the start of what is searched next are of an earlier time
+#endif
+    double spacing;              // of samples at the most, s; 0: any
+    double t, after[SYMDYN_NX];  // of the latest reset; the state after it
+    double reset_gap;            // by how much a reset that was rejected is off
     int n_noted;
     double noted[SYMDYN_NOTES * SYMDYN_NOTE];  // events, times, states before and after them, until they are taken
 } symdyn_events;
