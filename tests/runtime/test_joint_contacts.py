@@ -193,6 +193,7 @@ def test_faults_of_elements_are_reported_together() -> None:
                     sd.Stop("lost", "knee", lower=0), sd.Stop("bad name", "a", lower=0),
                     sd.Stop("lively", "a", lower=0, restitution=1.2), sd.Backlash("narrow", "a", "b", width=-0.1),
                     sd.OneWayClutch("way", "a", direction=2), sd.JointFriction("weak", "a", breakaway=1.0, sliding=2.0),
+                    sd.Stop("odd", "a", lower=0, impact="x"),
                     sd.JointFriction("negative", "a", breakaway=-1.0), sd.Rope("short", "ball", "ground", length=-1.0),
                     sd.Rope("same", "ball", "ball", length=1.0), sd.Rope("nobody", "ball", "bal", length=1.0)):
         system.add_contact(element)
@@ -202,7 +203,7 @@ def test_faults_of_elements_are_reported_together() -> None:
     for part in ("stop 'none' has neither lower nor upper", "lower is 1 and upper 0.5", "the joint 'free' has the coordinates",
                  "is at the joint 'knee', which the system does not have; joints: a, b, free", "a stop is named 'bad name'",
                  "restitution is 1.2; pass a number from 0 to 1", "width is -0.1; pass a number from 0 on",
-                 "direction is 2; pass 1",
+                 "direction is 2; pass 1", "impact is 'x'",
                  "sliding is 2 and breakaway 1", "breakaway is -1", "length is -1", "is between ball and ball",
                  "is between ball and bal;"):
         assert part in message, part

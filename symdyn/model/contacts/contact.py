@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from symdyn.given import BodyOrName, Scalar
     from symdyn.model.contacts.shapes import Counterpart, Shape
 
-LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson")
+LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson", "stronge")
 ORIGIN_OF_A = Point()
 ON_A, ON_B = (Point, Sphere, Disc, Cylinder, Box), (Plane, Sphere, Curve, Surface)
 
@@ -33,7 +33,8 @@ class Contact:
     restitution   normal velocity after an impact by that before it, 0 to 1, likewise
     law           "rigid": no penetration; open, sticking and sliding are modes that change at located events; "compliant": forces
                   by the depth of penetration and the slip, smooth in every formulation and method
-    impact        law of rigid impacts: "newton" (velocities) or "poisson" (impulses of compression and expansion)
+    impact        law of rigid impacts: "newton" (velocities), "poisson" (impulses of compression and expansion) or "stronge"
+                  (their energies; one contact at a time, with friction in a plane)
     compliance    how a compliant contact yields, sd.contacts.Compliance(...)
 
     A rigid contact is open as long as its gap is positive. Closed, it transmits a normal force N >= 0 and in its tangential
@@ -120,7 +121,9 @@ class Contact:
 
     def structure_faults(self, planar: bool) -> list[str]:
         """Shapes that do not fit each other or the plane."""
-        a, b, found = self.on_a, self.on_b, []
+        a, b, found = self.on_a, self.on_b, list[str]()
+        if self.impact == "stronge" and not planar and not self.frictionless:
+            found.append(f"{self.where}: impact='stronge' follows the slip in a plane; in space pass 'poisson', or no friction")
         kind_a, kind_b = type(a).__name__, type(b).__name__
         if planar and isinstance(a, (Disc, Cylinder)):
             found.append(f"{self.where}: a {kind_a} touches in space; pass a Sphere, in a plane a circle")

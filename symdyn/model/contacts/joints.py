@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from symdyn.model.system import System
 
 NEWTON = "newton"
+IMPACTS = (NEWTON, "poisson")
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,9 @@ class JointElement:
         return [JointForce(joint, (factor * force,), f"{self.where}: {row.name}") for joint, factor in row.on]
 
     def number_faults(self, defaults: Mapping[sp.Basic | str, float]) -> list[str]:
-        """Numbers that cannot be, with those that parameters have."""
-        found = []
+        """Numbers that cannot be, with those that parameters have, and laws of impacts that there are not."""
+        found = [] if self.impact in IMPACTS else [f"{self.where}: impact is {shown(self.impact)}; there are "
+                                                   f"{', '.join(map(repr, IMPACTS))}"]
         for what, (expression, least, most) in self.bounds.items():
             value = value_of(expression, defaults)
             if value is not None and not least <= value <= most:

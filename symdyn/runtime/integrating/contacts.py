@@ -25,6 +25,7 @@ from symdyn.runtime.integrating.contact_columns import FIRST, Switch
 from symdyn.runtime.integrating.events import Happened
 from symdyn.runtime.integrating.outcome import Impact, Outcome, Phase, Request, of_pieces
 from symdyn.runtime.integrating.stops import describe_stop
+from symdyn.runtime.stronge import stronge
 
 if TYPE_CHECKING:
     from symdyn.runtime.module import Module
@@ -47,6 +48,7 @@ NO_SPEED = 1e-11
 MOST_SWITCHES, SAME_TIME = 50, 1e-13
 # What is added to the diagonal of rows that depend on each other, by its size.
 SOFTNESS = 1e-8
+STRONGE = "stronge"
 # Part of the run in which an event that has just been dealt with is not looked for again.
 GRACE = 1e-9
 # The same of a contact that begins to slip, whose slip grows with the square of the time where it left the friction cone.
@@ -500,8 +502,17 @@ class _Phases:
         sites = self._sites(at, touching, impact=True)
         v = at.slip[places]
         law = self.records[hit[0]].impact
-        found = impact(at.D[np.ix_(places, places)], v, at.restitution[list(touching)].tolist(), sites, law)
         names = ", ".join(self.records[k].name for k in hit)
+        D = at.D[np.ix_(places, places)]
+        if law == STRONGE:
+            if len(touching) > 1:
+                raise _Stop(f"the impact of {names} is one of {len(touching)} contacts at once, "
+                            f"{', '.join(self.records[k].name for k in touching)}; impact='stronge' takes one at a time, pass "
+                            "'poisson'")
+            one_alone = stronge(D, v, float(at.restitution[touching[0]]), sites[0])
+            found = [] if one_alone is None else [one_alone]
+        else:
+            found = impact(D, v, at.restitution[list(touching)].tolist(), sites, law)
         if not found:
             raise _Stop(f"the impact of {names} has no solution under Coulomb's law and impact='{law}'; take the other law of "
                         "impacts, or less friction")
