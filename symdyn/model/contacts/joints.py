@@ -62,7 +62,7 @@ class JointElement:
         """Its rows in a system; what is wrong is added to faults."""
         raise NotImplementedError
 
-    def act(self, row: Row, force: sp.Expr) -> list[Any]:
+    def act(self, row: Row, force: sp.Expr) -> list[JointForce | ForceBetween]:
         """The loads of a force along a row."""
         return [JointForce(joint, (factor * force,), f"{self.where}: {row.name}") for joint, factor in row.on]
 
@@ -285,7 +285,7 @@ class Rope(JointElement):
         apart = distance(names[0], names[1], list(at[0]), list(at[1]))
         return [Row(self.name, STOP, self.length - apart, -apart.dot, ())]
 
-    def act(self, row: Row, force: sp.Expr) -> list[Any]:
+    def act(self, row: Row, force: sp.Expr) -> list[JointForce | ForceBetween]:
         return [ForceBetween(self.a, self.b, force, self.at[0], self.at[1], self.where)]
 
 
