@@ -92,6 +92,8 @@ FUNCTIONS = _entries(
      "gap, static and kinetic friction, restitution of every rigid contact; relative velocities along its rows, m/s",
      "rigid contacts"),
     ("contact_directions", "contact_directions", None, "J, M^-1 J^T of the rows of rigid contacts, row by row", "rigid contacts"),
+    ("contact_points", "contact_points", None,
+     "where every contact touches, m, and the force on its body a, N, n-frame", "contacts"),
     ("events", "events", ("n_e",), "what vanishes at the events, in their order", "events"),
     ("event_resets", "event_resets", None, "what entries of the state become at events that reset them", "events with resets"),
     ("reset_directions", "reset_directions", None, "changes of [q; u] along each coordinate and speed that events reset",

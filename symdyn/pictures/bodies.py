@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from symdyn.errors import ArgumentError
+from symdyn.pictures.arrows import arrows
 from symdyn.pictures.drawing import Drawing
 from symdyn.pictures.scene import Scene
 from symdyn.pictures.style import MANY, colors_of
@@ -21,6 +22,8 @@ VIEW = (22.0, -55.0)
 VIEW_OF_SOLIDS = (14.0, -58.0)
 # Of the axes' box before it is fitted.
 ZOOM = 0.79
+# Forces of contacts.
+FORCE = "tab:red"
 # What is drawn over all shapes.
 ABOVE = 1e6
 
@@ -127,7 +130,8 @@ def draw_path(figure: Figure, place: Any, drawing: Drawing, view: Any = None) ->
 
 
 def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
-    """Shapes, and empty curves for rails, arms, rods, bodies, sliders and centres of mass, in the order of `_points_at`."""
+    """Shapes, and empty curves for rails, arms, rods, bodies, sliders, centres of mass and contacts, in the order of
+    `_points_at`."""
     empty: list[list[float]] = [[]] * len(drawing.labels)
     colors = colors_of(len(drawing.lines))
     if len(drawing.pivots):
@@ -144,7 +148,10 @@ def make_artists(axes: Any, drawing: Drawing, alpha: float = 1.0) -> list[Any]:
             *[axes.plot(*empty, color=c, linewidth=width, marker="o", markersize=width, **style)[0] for c in colors],
             *[axes.plot(*empty, color=colors[k], linestyle="", marker="s", markersize=3.5 * width, alpha=alpha)[0]
               for k in drawing.sliders],
-            axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0]]
+            axes.plot(*empty, color="black", linestyle="", marker="o", markersize=0.8 * width, alpha=alpha)[0],
+            *([axes.plot(*empty, color=FORCE, linewidth=1.6, alpha=alpha, zorder=ABOVE)[0],
+               axes.plot(*empty, color=FORCE, linestyle="", marker="o", markersize=4.5, alpha=alpha, zorder=ABOVE)[0]]
+              if drawing.touches.shape[1] else [])]
 
 
 def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
@@ -159,7 +166,8 @@ def show(artists: Sequence[Any], drawing: Drawing, index: int) -> None:
 def _points_at(drawing: Drawing, index: int) -> list[np.ndarray]:
     slides = [drawing.lines[k][:, places] for k, places in drawing.sliders.items()]
     return [points[index] for points in (drawing.rails, drawing.arms, drawing.rods, *drawing.lines, *slides,
-                                         drawing.centres[:, drawing.bare])]
+                                         drawing.centres[:, drawing.bare])] + (
+        [arrows(drawing.touches[index], drawing.pushes[index]), drawing.touches[index]] if drawing.touches.shape[1] else [])
 
 
 def move(artist: Any, points: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from symdyn.pictures.arrows import arrow_scale, touching
 from symdyn.pictures.jointed import carriers, jointed_skeleton, placed_joints
 from symdyn.pictures.points import points_of
 from symdyn.pictures.skeleton import Skeleton, bare_skeleton, connect, guess_skeleton
@@ -29,6 +30,7 @@ class Drawing:
     centres    centres of mass (n_t, n_b, 2 or 3); pivots: points that hold the mechanism to the ground, (n, 2 or 3)
     sliders    the bodies that slide, and which points of their lines do; labels: of the axes
     solids     shapes, if there are any; bare: the bodies without
+    touches    where contacts touch, (n_t, n_c, 2 or 3), NaN while they do not; pushes: the ends of the arrows of their forces
     """
 
     lines: list[np.ndarray]
@@ -41,6 +43,8 @@ class Drawing:
     labels: Sequence[str]
     solids: Solids | None
     bare: Sequence[int]
+    touches: np.ndarray
+    pushes: np.ndarray
 
     @property
     def spatial(self) -> bool:
@@ -62,8 +66,10 @@ class Drawing:
             body not in solids.bodies and solution.module.metadata.bodies[body] not in tips)]
         if solids is not None:
             skeleton = _without(skeleton, bare)
+        touches, forces = touching(solution)
         everything = np.concatenate([*[line.reshape(-1, 3) for line in skeleton.lines], centres.reshape(-1, 3),
-                                     skeleton.pivots, solids.reach() if solids is not None else np.zeros((0, 3))])
+                                     touches.reshape(-1, 3), skeleton.pivots,
+                                     solids.reach() if solids is not None else np.zeros((0, 3))])
         ranges = np.nanmax(everything, axis=0) - np.nanmin(everything, axis=0)
         shown = [k for k in range(3) if ranges[k] > _LEFT_OUT * max(ranges.max(), _LEFT_OUT)]
         if solids is not None:
@@ -72,9 +78,11 @@ class Drawing:
             return None
         if len(shown) == 1:
             shown = sorted({*shown, 1 if shown[0] != 1 else 0})
-        arms, rails, rods, centres, pivots, *lines = [points[..., shown] for points in (
-            skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, *skeleton.lines)]
-        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare)
+        arms, rails, rods, centres, pivots, touches, forces, *lines = [points[..., shown] for points in (
+            skeleton.arms, skeleton.rails, skeleton.rods, centres, skeleton.pivots, touches, forces, *skeleton.lines)]
+        pushes = touches + forces * arrow_scale(forces, float(ranges.max()))
+        return cls(lines, arms, rails, rods, centres, pivots, skeleton.sliders, ["xyz"[k] for k in shown], solids, bare, touches,
+                   pushes)
 
     def at(self, t: np.ndarray, times: np.ndarray) -> Drawing:
         """The drawing at other times, by linear interpolation."""
@@ -82,15 +90,17 @@ class Drawing:
         right = np.clip(np.searchsorted(t[order], times), 1, len(t) - 1)
         a, b = order[right - 1], order[right]
         w = ((times - t[a]) / (t[b] - t[a]))[:, None, None]
-        arms, rails, rods, centres, *lines = [points[a] * (1 - w) + points[b] * w for points in
-                                              (self.arms, self.rails, self.rods, self.centres, *self.lines)]
+        arms, rails, rods, centres, touches, pushes, *lines = [
+            points[a] * (1 - w) + points[b] * w for points in
+            (self.arms, self.rails, self.rods, self.centres, self.touches, self.pushes, *self.lines)]
         return Drawing(lines, arms, rails, rods, centres, self.pivots, self.sliders, self.labels,
-                       None if self.solids is None else self.solids.at(t, times), self.bare)
+                       None if self.solids is None else self.solids.at(t, times), self.bare, touches, pushes)
 
     def limits(self) -> np.ndarray:
         """Lower and upper limits of the axes, (2 or 3, 2), the same length in each direction of a plane."""
         reach = self.solids.reach() if self.solids is not None else np.zeros((0, 3))
         points = np.concatenate([*[line.reshape(-1, len(self.labels)) for line in self.lines], self.pivots,
+                                 *[part.reshape(-1, len(self.labels)) for part in (self.touches, self.pushes)],
                                  self.centres.reshape(-1, len(self.labels)), reach[:, :len(self.labels)]])
         low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
         longest = (high - low).max()

@@ -15,14 +15,19 @@ from symdyn.pictures.panels import panels_of
 if TYPE_CHECKING:
     from symdyn.runtime.solutions.solution import Solution
 
+# Changes of modes that are marked at most.
+MOST_SWITCHES = 80
+
 
 def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
     """Coordinates, speeds, states, inputs, outputs and energy over time, and the path of the mechanism.
 
     view    elevation and azimuth of the eye, degrees, for a mechanism in space
+
+    Dotted lines mark the times at which contacts change their modes, forces of contacts are arrows.
     Returns the figure; saves it (PNG, PDF, SVG by the ending) if a path is given.
     """
-    panels = panels_of(solution)
+    panels, switches = panels_of(solution), _switches(solution)
     drawing = Drawing.of(solution) if len(solution.t) else None
     columns = 1 if len(panels) <= 3 else 2
     rows = -(-len(panels) // columns)
@@ -39,6 +44,8 @@ def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
         axes = figure.add_subplot(grid[row, column:end], sharex=shared)
         shared = shared or axes
         draw_panel(figure, axes, solution.t, panel)
+        for t in switches:
+            axes.axvline(t, color="0.75", linewidth=0.6, linestyle=":", zorder=0)
         last = row == rows - 1
         axes.tick_params(labelbottom=last)
         if last:
@@ -49,6 +56,16 @@ def plot(solution: Solution, path: Any = None, view: Any = None) -> Figure:
     if path is not None:
         figure.save(path)
     return figure
+
+
+def _switches(solution: Solution) -> list[float]:
+    """Times at which contacts change their modes or hit, in order; none where there are too many to be seen."""
+    if not len(solution.t):
+        return []
+    begin = float(solution.t[0])
+    times = {float(t) for one in solution.contacts.values()
+             for t in (*[when for when, _ in one.switches], *one.impacts.t) if t != begin}
+    return sorted(times) if len(times) <= MOST_SWITCHES else []
 
 
 def _title(solution: Solution) -> str:

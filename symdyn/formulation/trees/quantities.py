@@ -91,6 +91,11 @@ class TreeQuantities(Motion):
         """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
         return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
 
+    def contact_points(self) -> np.ndarray:
+        """Where every contact of bodies touches and the force on its body a, n-frame, rigid contacts first."""
+        touching = (*[c for c in self.model.contacts if c.at], *self.model.compliant)
+        return vector(*[self.expression(e) for contact in touching for e in (*contact.at, *contact.acting)])
+
     def _apart(self, memory: dict[str, Any]) -> Self:
         """The same quantities, to be recorded apart from these."""
         other = copy(self)
@@ -130,6 +135,8 @@ class TreeQuantities(Motion):
             own["ground_rotation"] = self.ground_rotation
         if self.model.contacts:
             own |= {"contacts": self.contacts, "contact_gaps": self.contact_gaps, "contact_directions": self.contact_directions}
+        if self.model.compliant or any(c.at for c in self.model.contacts):
+            own["contact_points"] = self.contact_points
         if self.model.events:
             own["events"] = self.events
         if any(event.reset for event in self.model.events):

@@ -77,10 +77,14 @@ class Geometry:
         ends = [_add(center, _scaled(axis, s * half_length)) for s in (1, -1)]
         return [self._edge(f"{name}_{k + 1}", end, axis, radius) for k, end in enumerate(ends)]
 
+    def place(self, touch: Touch) -> Triple:
+        """Where body a touches, n-frame."""
+        return _add(self._position(self.a, touch.at), touch.lever)
+
     def rows(self, touch: Touch) -> tuple[sp.Expr, ...]:
         """Relative velocity of the touching points along the normal, then along the tangents."""
         velocity_a = _add(self._velocity(self.a, touch.at), _cross(self._omega(self.a), touch.lever))
-        place = _add(self._position(self.a, touch.at), touch.lever)
+        place = self.place(touch)
         origin = (sp.S.Zero,) * 3
         if self._still(self.b):
             relative = velocity_a

@@ -46,6 +46,7 @@ class RigidContact:
     sliding   parameters of the direction of slip, one for each tangent
     events    what its events are called after its name
     kind      BODIES, or that of the element of joints
+    at, acting   where it touches and the force on body a, n-frame; empty of an element of joints
     """
 
     name: str
@@ -62,6 +63,8 @@ class RigidContact:
     impact: str
     events: tuple[str, ...]
     kind: str = BODIES
+    at: tuple[sp.Expr, ...] = ()
+    acting: tuple[sp.Expr, ...] = ()
 
     @property
     def normal(self) -> bool:
@@ -82,7 +85,7 @@ class RigidContact:
 @dataclass(frozen=True)
 class CompliantContact:
     """A compliant contact in one place: the forces along its rows, the slip up to which it counts as sticking, m/s, and the depth
-    that is reported, m."""
+    that is reported, m; where it touches and the force on body a, n-frame."""
 
     name: str
     gap: sp.Expr
@@ -90,6 +93,8 @@ class CompliantContact:
     forces: tuple[sp.Expr, ...]
     slip_speed: sp.Expr
     depth: float | None
+    at: tuple[sp.Expr, ...] = ()
+    acting: tuple[sp.Expr, ...] = ()
 
     @property
     def expressions(self) -> list[sp.Expr]:
@@ -162,7 +167,7 @@ def _add(system: System, contact: Contact, geometry: Geometry, touch: Touch) -> 
         events[SLIPS] = (contact.static * forces[0]) ** 2 - sp.Add(*[f**2 for f in forces[1:]])
     system.rigid_contacts.append(RigidContact(name, contact.name, touch.gap, rows, forces, switches, slide, sliding,
                                               contact.static, contact.kinetic, contact.restitution, contact.impact,
-                                              tuple(events)))
+                                              tuple(events), at=geometry.place(touch), acting=_along(directions, forces)))
     _act(system, geometry, touch, directions, forces)
     for what, value in events.items():
         system.events.append(Event(f"{name}_{what}", value, -1, True, ()))
@@ -197,7 +202,8 @@ def _add_compliant(system: System, contact: Contact, geometry: Geometry, touch: 
     law = law_of(compliance, contact.static, contact.kinetic, touch.gap, rows, deflections, geometry.faults, contact.where)
     system.states += [State(z, rate) for z, rate in zip(deflections, law.rates, strict=True)]
     slow = geometry.faults.expression(compliance.slip_speed, f"{contact.where}: slip_speed")
-    system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth))
+    system.compliant_contacts.append(CompliantContact(touch.name, touch.gap, rows, law.forces, slow, compliance.depth,
+                                                      geometry.place(touch), _along(directions, law.forces)))
     _act(system, geometry, touch, directions, law.forces)
 
 
@@ -220,9 +226,14 @@ def _sliding(kinetic: sp.Expr, slips: tuple[sp.Expr, ...],
     return forces, {STICKS: along, TURNS: along**2 - across**2}
 
 
+def _along(directions: list[Any], forces: tuple[Any, ...]) -> tuple[sp.Expr, ...]:
+    """The sum of forces along directions, n-frame."""
+    return tuple(sp.Add(*[f * d[k] for f, d in zip(forces, directions, strict=True)]) for k in range(3))
+
+
 def _act(system: System, geometry: Geometry, touch: Touch, directions: list[Any], forces: tuple[Any, ...]) -> None:
     """The force on body a and the opposite on body b, at one place."""
-    force = [sp.Add(*[f * d[k] for f, d in zip(forces, directions, strict=True)]) for k in range(3)]
+    force = _along(directions, forces)
     other = None if geometry.b == "ground" else geometry.b
     label = f"contact {touch.name}"
     system.loads.append(Force(geometry.a, sp.ImmutableMatrix(force), sp.ImmutableMatrix(touch.at), None, other, label))

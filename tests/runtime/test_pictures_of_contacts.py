@@ -1,0 +1,81 @@
+"""Contacts in pictures: points and forces as arrows, and marks where modes change."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symdyn as sd
+from symdyn.pictures import arrows
+from symdyn.pictures.drawing import Drawing
+
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def landing() -> Any:
+    """A box that falls flat and slides to rest."""
+    system = sd.System("box", gravity=[0, -G])
+    body = system.add_body("box", mass=2.0, inertia=0.03)
+    system.add_joint(sd.Planar("free", system.ground, body, sd.coordinates("x y theta")))
+    for name, x in (("left", -0.2), ("right", 0.2)):
+        system.add_contact(sd.Contact(name, body, system.ground, shape=sd.contacts.Point([x, -0.1]), friction=0.4))
+    return system.compile().simulate(np.linspace(0, 1, 101), q={"y": 0.2}, u={"x_dot": 1.0}, rtol=1e-10)
+
+
+def test_arrows_are_at_the_contacts_along_their_forces(landing: Any) -> None:
+    at, forces = arrows.touching(landing)
+    lands = np.sqrt(0.2 / G)
+    assert np.isnan(at[landing.t < lands]).all() and np.isfinite(at[landing.t > lands + 0.02]).all()
+    assert at[-1] == pytest.approx(np.array([[landing["x"][-1] - 0.2, 0, 0], [landing["x"][-1] + 0.2, 0, 0]]), abs=1e-9)
+    assert forces[-1].sum(axis=0) == pytest.approx([0, 2 * G, 0], abs=1e-9)
+    slides = int(np.searchsorted(landing.t, lands)) + 1
+    assert forces[slides].sum(axis=0) == pytest.approx([-0.4 * 2 * G, 2 * G, 0], rel=1e-9)
+    drawing = Drawing.of(landing)
+    assert drawing is not None
+    ways = drawing.pushes - drawing.touches
+    parallel = ways[slides, :, 0] * forces[slides, :, 1] - ways[slides, :, 1] * forces[slides, :, 0]
+    assert np.abs(parallel).max() < 1e-12
+    assert (ways[slides:, :, 1] > 0).all()
+
+
+def test_heads_of_arrows_end_at_their_tips() -> None:
+    for n in (2, 3):
+        tails, tips = np.zeros((2, n)), np.eye(n)[[0, -1]] * 2.0
+        curve = arrows.arrows(tails, tips).reshape(2, -1, n)
+        assert np.isnan(curve[:, -1]).all() and (curve[:, 1] == tips).all()
+        barbs = curve[:, 2:-1:2]
+        assert np.linalg.norm(barbs - tips[:, None], axis=2) == pytest.approx(2 * np.hypot(arrows.HEAD, arrows.WIDTH))
+        assert barbs.shape[1] == 2 * (n - 1)
+    assert arrows.arrow_scale(np.full((1, 1, 2), np.nan), 1.0).item() == 0
+    sizes = arrows.arrow_scale(np.array([[[1.0, 0.0]], [[1.0, 0.0]], [[100.0, 0.0]]]), 1.0)
+    assert (sizes[:, 0, 0] * [1, 1, 100]).tolist() == pytest.approx([arrows.LENGTH, arrows.LENGTH, 2 * arrows.LENGTH])
+
+
+def test_plots_mark_changes_of_modes_and_films_have_arrows(landing: Any, tmp_path: Path) -> None:
+    figure = landing.plot()
+    lands, rests = landing.contacts["left"].switches[1][0], landing.contacts["left"].switches[-1][0]
+    marks = {float(np.asarray(line.get_xdata())[0]) for line in figure.axes[0].lines if line.get_linestyle() == ":"}
+    assert {lands, rests} <= marks
+    shown = landing.picture(1.0).axes[0]
+    curves = [line for line in shown.lines if line.get_color() == "tab:red"]
+    assert len(curves) == 2 and np.asarray(curves[1].get_xdata()) == pytest.approx(landing["x"][-1] + np.array([-0.2, 0.2]))
+    landing.animate(tmp_path / "film.gif", fps=5)
+    assert (tmp_path / "film.gif").stat().st_size > 0
+
+
+@pytest.mark.parametrize("formulation", ["recursive", "augmented", "absolute"])
+def test_forces_are_the_same_in_every_formulation(formulation: str) -> None:
+    system = sd.System("drop", gravity=[0, -G])
+    y = sd.coordinates("y")
+    body = system.add_body("ball", mass=2.0)
+    system.add_joint(sd.Prismatic("height", system.ground, body, axis=[0, 1], coordinate=y))
+    system.add_contact(sd.Contact("floor", body, system.ground))
+    system.add_contact(sd.Contact("soft", body, system.ground, shape=(sd.contacts.Point(), sd.contacts.Plane([0, 1], [0, 0.01])),
+                                  law="compliant", compliance=sd.contacts.Compliance(100.0, exponent=1)))
+    absolute = formulation == "absolute"
+    equations = system.augmented(coordinates="absolute") if absolute else getattr(system, formulation)()
+    found = equations.compile().simulate((0, 0.1), rtol=1e-10)
+    _, forces = arrows.touching(found)
+    assert forces[-1] == pytest.approx(np.array([[0, 2 * G - 1, 0], [0, 1, 0]]), rel=1e-6)
