@@ -93,8 +93,8 @@ class TreeQuantities(Motion):
 
     def contact_points(self) -> np.ndarray:
         """Where every contact of bodies touches and the force on its body a, n-frame, rigid contacts first."""
-        touching = (*[c for c in self.model.contacts if c.at], *self.model.compliant)
-        return vector(*[self.expression(e) for contact in touching for e in (*contact.at, *contact.acting)])
+        places = [(c.at, c.acting) for c in self.model.contacts if c.at] + [(c.at, c.acting) for c in self.model.compliant]
+        return vector(*[self.expression(e) for at, acting in places for e in (*at, *acting)])
 
     def _apart(self, memory: dict[str, Any]) -> Self:
         """The same quantities, to be recorded apart from these."""

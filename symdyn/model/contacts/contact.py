@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.model.contacts.compliance import Compliance, compliance_faults
-from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
+from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
 from symdyn.model.faults import Faults
 from symdyn.real_numbers import length_of
 from symdyn.shown import shown
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 LAWS, IMPACTS = ("rigid", "compliant"), ("newton", "poisson", "stronge")
 ORIGIN_OF_A = Point()
-ON_A, ON_B = (Point, Sphere, Disc, Cylinder, Box), (Plane, Sphere, Curve, Surface)
+ON_A, ON_B = (Point, Sphere, Disc, Cylinder, Box), (Plane, Sphere, Bore, Curve, Surface)
 
 
 class Contact:
@@ -28,7 +28,7 @@ class Contact:
     name          of the contact; events, parameters and results are named after it
     a             the body that carries the shape; b: the body that it touches, which may be the ground
     shape         of sd.contacts: that on a (Point, Sphere, Disc, Cylinder, Box), or a pair of it and that on b (Plane, Sphere,
-                  Curve, Surface); default on b: the plane y = 0 of a planar system, z = 0 in space
+                  Bore, Curve, Surface); default on b: the plane y = 0 of a planar system, z = 0 in space
     friction      coefficient of Coulomb friction, or (static, kinetic); numbers or expressions of parameters
     restitution   normal velocity after an impact by that before it, 0 to 1, likewise
     law           "rigid": no penetration; open, sticking and sliding are modes that change at located events; "compliant": forces

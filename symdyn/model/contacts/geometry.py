@@ -15,11 +15,14 @@ from typing import Any
 import sympy as sp
 
 from symdyn.model.contacts.contact import Contact
-from symdyn.model.contacts.shapes import Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface
+from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Shape, Sphere, Surface
 from symdyn.model.faults import Faults
 from symdyn.model.quantity import Measure, Place, Quantity
 
 Triple = tuple[sp.Expr, sp.Expr, sp.Expr]
+
+# Square of a distance from the middle of a bore, m^2, below which the normal loses its direction.
+CENTRED = sp.Rational(1, 10**30)
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,12 @@ class Geometry:
             distance = sp.sqrt(_dot(arm, arm))
             gap = distance - self._number(other.radius, "radius on b")
             normal = _scaled(arm, 1 / distance)
+            tangents = self._tangents(normal)
+        elif isinstance(other, Bore):
+            arm = _add(place, self._position(self.b, self._vector(other.center, "center on b")), -1)
+            distance = sp.sqrt(_dot(arm, arm) + CENTRED)
+            gap = self._number(other.radius, "radius on b") - distance
+            normal = _scaled(arm, -1 / distance)
             tangents = self._tangents(normal)
         else:
             gap, normal, tangents = self._from_graph(other, place)

@@ -109,6 +109,23 @@ class Plane:
 
 
 @dataclass(frozen=True)
+class Bore:
+    """The inside of a hollow sphere on body b, in a planar system of a circle: a bearing with clearance around a pin.
+
+    radius   m; center: m, body axes of b
+
+    Body a is inside; the gap of a pin in the middle is the difference of the radii, the clearance, and its normal has no
+    direction there.
+
+    >>> sd.contacts.Bore(0.01).radius
+    0.01
+    """
+
+    radius: Scalar
+    center: Vector = ORIGIN
+
+
+@dataclass(frozen=True)
 class Curve:
     """A curve y = f(x) in the axes of body b of a planar system, with body a above it.
 
@@ -144,4 +161,4 @@ class Surface:
 
 
 Shape = Point | Sphere | Disc | Cylinder | Box
-Counterpart = Plane | Sphere | Curve | Surface
+Counterpart = Plane | Sphere | Bore | Curve | Surface
