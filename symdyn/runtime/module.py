@@ -859,7 +859,7 @@ class Module:
         >>> system = sd.System("ball", gravity=[0, -9.81])
         >>> ball = system.add_body("ball", mass=1.0)
         >>> joint = system.add_joint(sd.Prismatic("height", system.ground, ball, axis=[0, 1], coordinate=y))
-        >>> system.add_contact(sd.Contact("floor", ball, system.ground))
+        >>> contact = system.add_contact(sd.Contact("floor", ball, system.ground))
         >>> system.compile(backend="numpy").rest().contacts["floor"].force
         array([9.81])
         """
