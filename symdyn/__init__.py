@@ -20,6 +20,7 @@ _HOME = {
     "symdyn.model.elements.added_mass": ("AddedMass",),
     "symdyn.model.closures": ("Gear", "Rod"),
     "symdyn.model.contacts.contact": ("Contact",),
+    "symdyn.model.contacts.group": ("ContactGroup",),
     "symdyn.model.contacts.joints": ("Backlash", "JointFriction", "OneWayClutch", "Rope", "Stop"),
     "symdyn.model.elements": ("Box", "Buoyancy", "Drag", "LinearDamping", "LinearStiffness", "MooringLine", "Thrust",
                               "WaveExcitation"),

@@ -115,6 +115,7 @@ from symdyn.model import shapes as shapes
 from symdyn.model.closures import Gear as Gear
 from symdyn.model.closures import Rod as Rod
 from symdyn.model.contacts.contact import Contact as Contact
+from symdyn.model.contacts.group import ContactGroup as ContactGroup
 from symdyn.model.contacts.joints import Backlash as Backlash
 from symdyn.model.contacts.joints import JointFriction as JointFriction
 from symdyn.model.contacts.joints import OneWayClutch as OneWayClutch

@@ -142,6 +142,16 @@ class ContactRecord(NamedTuple):
         return (*filter(None, (self.closed, self.sticking)), *self.sliding)
 
 
+class GroupRecord(NamedTuple):
+    """A group of contacts whose pairs are found along a motion: its bodies, places of their speeds in u body after body, how many
+    planes it has."""
+
+    name: str
+    bodies: tuple[str, ...]
+    speeds: tuple[int, ...]
+    planes: int
+
+
 class CompliantRecord(NamedTuple):
     """A compliant contact in one place, and its number of rows."""
 
@@ -194,7 +204,7 @@ class ModuleMetadata(Metadata):
     connections            loads along a line between two points: name, bodies, kind ("spring", "damper", "both", "force")
     down                   direction of gravity, zero where there is none
     output_units           of outputs that are points
-    contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord
+    contacts               rigid ones, see ContactRecord; compliant: see CompliantRecord; contact_groups: see GroupRecord
     """
 
     functions: tuple[str, ...] = ()
@@ -225,6 +235,7 @@ class ModuleMetadata(Metadata):
     output_units: Mapping[str, str] = field(default_factory=dict)
     contacts: tuple[ContactRecord, ...] = ()
     compliant: tuple[CompliantRecord, ...] = ()
+    contact_groups: tuple[GroupRecord, ...] = ()
 
 
 def _plain(value: Any) -> Any:

@@ -87,6 +87,7 @@ class Equations:
     watched      gives what elements of load want to be looked at, in the order of the quantity watches
     events       what is looked for along a motion (see model.event), in the order of the quantity events
     contacts     rigid ones, place by place (see model.contacts.lowering); compliant: likewise
+    contact_groups   those whose pairs are found along a motion
     identification   what records regressors and base parameters; None without bodies
     provenance       what records contributions of bodies (see formulation.provenance); None where there are none
     """
@@ -120,6 +121,7 @@ class Equations:
     events: tuple[Any, ...] = ()
     contacts: tuple[Any, ...] = ()
     compliant: tuple[Any, ...] = ()
+    contact_groups: tuple[Any, ...] = ()
     identification: Any = None
     provenance: Any = None
     _recorded: dict[str, np.ndarray] = field(default_factory=dict)

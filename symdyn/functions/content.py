@@ -11,6 +11,7 @@ from symdyn.backend.metadata import (
     CompliantRecord,
     ContactRecord,
     EventRecord,
+    GroupRecord,
     JumpRecord,
     Metadata,
     ModuleMetadata,
@@ -104,7 +105,8 @@ def module_metadata(equations: Equations, of_code: Metadata) -> ModuleMetadata:
         contacts=tuple(ContactRecord(c.name, c.contact, len(c.rows), c.switches[0].name if c.normal else "",
                                      c.switches[-1].name if len(c.rows) > c.normal else "", tuple(s.name for s in c.sliding),
                                      c.events, c.impact, c.kind, c.normal) for c in equations.contacts),
-        compliant=tuple(CompliantRecord(c.name, len(c.rows)) for c in equations.compliant))
+        compliant=tuple(CompliantRecord(c.name, len(c.rows)) for c in equations.compliant),
+        contact_groups=_group_records(equations))
 
 
 def output_shapes(equations: Equations) -> tuple[tuple[str, tuple[int, ...]], ...]:
@@ -120,6 +122,12 @@ def event_records(equations: Equations) -> tuple[EventRecord, ...]:
     about = zip(equations.events, enclosed(equations), unproved(equations), unknowns(equations), strict=True)
     return tuple(EventRecord(e.name, e.direction, e.stop, tuple(places[s] for s, _ in e.reset), can, tuple(inputs),
                              tuple(functions), why) for e, can, why, (inputs, functions) in about)
+
+
+def _group_records(equations: Equations) -> tuple[GroupRecord, ...]:
+    places = {u: k for k, u in enumerate(equations.symbols.speeds)}
+    return tuple(GroupRecord(g.name, tuple(s.body for s in g.spheres), tuple(places[u] for s in g.spheres for u in s.speeds),
+                             len(g.planes)) for g in equations.contact_groups)
 
 
 def closed_names(equations: Equations) -> list[str]:

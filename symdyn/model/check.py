@@ -107,7 +107,7 @@ class _Checker:
             tuple(c for _, _, c in order), s.ground_motion, tuple(self.loads), tuple(s.outputs), tuple(s.states),
             constraints, tuple(s.loops), self.coordinates, self.speeds, self.parameters, self.inputs,
             defaults, {**self._upright(), **initial}, float(s.duration), units,
-            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.compliant_contacts),
+            tuple(s.shapes), self.events, distinct, tuple(s.rigid_contacts), tuple(s.compliant_contacts), tuple(s.lowered_groups),
             tuple(s.chosen_speeds.items()), self.own_speeds if s.chosen_speeds else (), self.eliminated)
 
     # -- names
@@ -123,7 +123,7 @@ class _Checker:
                             ("constraints", [c.name for c in s.constraints]),
                             ("outputs", [o.name for o in s.outputs]), ("events", [e.name for e in s.events]),
                             ("states", [z.symbol.name for z in s.states]),
-                            ("contacts", [c.name for c in s.contacts]),
+                            ("contacts", [c.name for c in [*s.contacts, *s.contact_groups]]),
                             ("loads", [load.label for load in s.loads])):
             for name, count in Counter(map(_hashable, names)).items():
                 if count > 1 and kind != "loads":

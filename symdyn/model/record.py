@@ -11,6 +11,7 @@ import sympy as sp
 from symdyn.counting import counted
 from symdyn.model.bodies import Body
 from symdyn.model.closures import Constraint, Gear
+from symdyn.model.contacts.group import LoweredGroup
 from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.event import Event
 from symdyn.model.joints import Joint
@@ -40,6 +41,7 @@ class Model:
     shapes        what bodies look like
     doubts        sentences on what is possible, but hardly meant
     contacts      rigid ones, place by place; their forces are among the loads, their events among the events; compliant: likewise
+    groups        of contacts whose pairs are found along a motion
     chosen        generalized speeds of the user's choice: symbol, expression in the speeds that the joints would have,
                   own_speeds; eliminated: velocity constraints that the chosen speeds fulfil, which are not among `constraints`
     """
@@ -70,6 +72,7 @@ class Model:
     doubts: tuple[str, ...] = ()
     contacts: tuple[RigidContact, ...] = ()
     compliant: tuple[CompliantContact, ...] = ()
+    groups: tuple[LoweredGroup, ...] = ()
     chosen: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     own_speeds: tuple[sp.Symbol, ...] = ()
     eliminated: tuple[Constraint, ...] = ()

@@ -18,6 +18,7 @@ from symdyn.model.bodies import Body
 from symdyn.model.check import check
 from symdyn.model.closures import Constraint, Gear
 from symdyn.model.contacts.contact import Contact
+from symdyn.model.contacts.group import ContactGroup, LoweredGroup
 from symdyn.model.contacts.joints import JointElement
 from symdyn.model.contacts.lowering import CompliantContact, RigidContact
 from symdyn.model.elements import AddedMass, Element
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
 ZERO = (0, 0, 0)
 Closure = TypeVar("Closure", Joint, Gear)
 Load = TypeVar("Load", Element, AddedMass)
-ContactLike = TypeVar("ContactLike", bound=Contact | JointElement)
+ContactLike = TypeVar("ContactLike", bound=Contact | JointElement | ContactGroup)
 
 
 class System:
@@ -104,6 +105,8 @@ class System:
         self.contacts: list[Contact | JointElement] = []
         self.rigid_contacts: list[RigidContact] = []
         self.compliant_contacts: list[CompliantContact] = []
+        self.contact_groups: list[ContactGroup] = []
+        self.lowered_groups: list[LoweredGroup] = []
         self.ground_motion: Joint | None = None
         self.shapes: list[Drawn] = []
         self.extra_coordinates: list[sp.Symbol] = []
@@ -383,8 +386,8 @@ class System:
         return load
 
     def add_contact(self, contact: ContactLike) -> ContactLike:
-        """Add a contact between two bodies, see Contact, or a Stop, Backlash, OneWayClutch, JointFriction or Rope; its results
-        are `Solution.contacts[name]`.
+        """Add a contact between two bodies, see Contact, or a Stop, Backlash, OneWayClutch, JointFriction or Rope, whose results
+        are `Solution.contacts[name]`; or a group of many bodies that touch one another, see ContactGroup.
 
         >>> system = sd.System("ball", gravity=[0, -9.81])
         >>> ball = system.add_body("ball", mass=1.0)
@@ -392,9 +395,11 @@ class System:
         >>> system.add_contact(sd.Contact("floor", ball, system.ground, restitution=0.8)).name
         'floor'
         """
-        if not isinstance(contact, (Contact, JointElement)):
-            self._faults.append(f"add_contact was given {shown(contact)}; pass sd.Contact(...), or sd.Stop(...), "
-                                "sd.Backlash(...), sd.OneWayClutch(...), sd.JointFriction(...) or sd.Rope(...)")
+        if isinstance(contact, ContactGroup):
+            self.contact_groups.append(contact)
+        elif not isinstance(contact, (Contact, JointElement)):
+            self._faults.append(f"add_contact was given {shown(contact)}; pass sd.Contact(...), sd.ContactGroup(...), "
+                                "sd.Stop(...), sd.Backlash(...), sd.OneWayClutch(...), sd.JointFriction(...) or sd.Rope(...)")
         else:
             self.contacts.append(contact)
         return contact

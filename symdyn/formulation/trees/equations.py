@@ -77,7 +77,7 @@ def tree_result(quantities: TreeQuantities, formulation: str, result: type[E], a
                   implicit_loads=tuple(load.label for load in model.loads if implicit(expressions_of(load))),
                   identification=quantities.identification if tree.rigid else None,
                   provenance=OfBodies(quantities), charts=_charts(model), watched=quantities.loads.watches, events=model.events,
-                  contacts=model.contacts, compliant=model.compliant,
+                  contacts=model.contacts, compliant=model.compliant, contact_groups=model.groups,
                   bodies=tuple(b.name for b in model.bodies),
                   joints=_joints(quantities), drawn=tuple(shape.record for shape in model.shapes),
                   connections=_connections(quantities), down=_down(model),

@@ -14,6 +14,7 @@ import sympy as sp
 from symdyn.errors import ModelError
 from symdyn.formulation.accelerations import Motion
 from symdyn.formulation.identification.quantities import Identification
+from symdyn.formulation.loads.contact_groups import spheres
 from symdyn.formulation.loads.contacts import ContactRows
 from symdyn.formulation.loads.implicit import Settled, solve
 from symdyn.formulation.loads.recorded import Loads
@@ -87,6 +88,10 @@ class TreeQuantities(Motion):
         """Relative velocities by speeds, and speeds by impulses, see ContactRows.steps."""
         return self.recall("contact_rows").steps(self._leaves(self.speeds))  # type: ignore[no-any-return]
 
+    def contact_spheres(self) -> np.ndarray:
+        """Of groups of contacts where their bodies are, how these move and what they weigh, see contact_groups.spheres."""
+        return spheres(self.model.groups, self.kinematics, self.loads)
+
     def compliant_contacts(self) -> np.ndarray:
         """Gap, slip speed, forces and slips of compliant contacts, one after the other."""
         return vector(*[self.algebra.expression(e) for contact in self.model.compliant for e in contact.expressions])
@@ -137,6 +142,8 @@ class TreeQuantities(Motion):
             own |= {"contacts": self.contacts, "contact_gaps": self.contact_gaps, "contact_directions": self.contact_directions}
         if self.model.compliant or any(c.at for c in self.model.contacts):
             own["contact_points"] = self.contact_points
+        if self.model.groups:
+            own["contact_spheres"] = self.contact_spheres
         if self.model.events:
             own["events"] = self.events
         if any(event.reset for event in self.model.events):

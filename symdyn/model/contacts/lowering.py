@@ -17,6 +17,7 @@ from symdyn.contact_kinds import BODIES, FRICTION
 from symdyn.model.contacts.compliance import Compliance, law_of
 from symdyn.model.contacts.contact import Contact
 from symdyn.model.contacts.geometry import Geometry, Touch
+from symdyn.model.contacts.group import lowered
 from symdyn.model.contacts.joints import JointElement, Row
 from symdyn.model.event import Event
 from symdyn.model.faults import Faults
@@ -109,10 +110,12 @@ def contact_force(name: str, row: int) -> Quantity:
 
 def with_contacts(system: System) -> System:
     """The system with what its contacts become; the same one where it has none."""
-    if not system.contacts:
+    if not system.contacts and not system.contact_groups:
         return system
     result = copy.copy(system)
     result._faults = faults = Faults(system._faults)
+    found = [lowered(system, group, faults) for group in system.contact_groups]
+    result.lowered_groups = [group for group in found if group is not None]
     result.loads, result.events, result.states = list(system.loads), list(system.events), list(system.states)
     result.rigid_contacts, result.compliant_contacts = [], []
     result.defaults = dict(system.defaults)

@@ -18,6 +18,7 @@ from symdyn.runtime.building.compiler import require_compiler
 from symdyn.runtime.building.shared import shared
 from symdyn.runtime.inputs.inputs import Inputs
 from symdyn.runtime.integrating.contacts import SHARED, SOFTNESS
+from symdyn.runtime.integrating.moreau_groups import SPHERES, add_groups, n_speeds, room_of
 from symdyn.runtime.integrating.moreau_memory import MOST_DENSE, Cones, Memory, Moreau, cones
 from symdyn.runtime.integrating.outcome import Outcome, Phase, Request, Stepped, Touched
 from symdyn.runtime.integrating.stops import describe_stop
@@ -41,7 +42,13 @@ FIRST, MOST = 64, 2**21
 PIECE = 512
 # Velocities by which the laws are missed, m/s, per m/s of the start; gaps, m.
 TOLERANCE, DEPTH = 1e-12, 1e-12
-MOST_SWEEPS, MOST_ROUNDS = 20_000, 60
+MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES = 20_000, 60, 30
+# Change of the last round of a step, by the size of the state, above which the step is too long.
+ACCEPTED = 1e-6
+# The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
+FEW = 40
+GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 1e-6, 1e-7, 1e-2
+GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 200, 10, 3
 # Residuals above this many tolerances are reported.
 REPORTED = 1e3
 
@@ -52,7 +59,7 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
     if module.backend != "c":
         raise ArgumentError(f"{name}: method='moreau' steps in compiled C; this module runs on {module.backend}. Compile with "
                             "backend='c', or leave out the method, which locates every switch of the contacts")
-    if not metadata.contacts:
+    if not metadata.contacts and not metadata.contact_groups:
         raise ArgumentError(f"{name}: method='moreau' is for rigid contacts, of which there are none; pass another method, or "
                             "add_contact")
     if request.span[1] < request.span[0]:
@@ -210,7 +217,8 @@ def _phases(module: Module, request: Request, stepped: Stepped) -> tuple[list[Ph
                 values = [mode != 0, *([mode == STICKING] if record.sticking else []), *direction[:record.rows - 1]]
                 for name, value in zip(record.parameters, values, strict=True):
                     p[names.index(name)] = value
-            p[names.index(SHARED)] = SOFTNESS * (np.count_nonzero(modes[k]) > 1)
+            if n:
+                p[names.index(SHARED)] = SOFTNESS * (np.count_nonzero(modes[k]) > 1)
             phases.append(Phase(float(stepped.t[k]), p, tuple(MODES[mode] for mode in modes[k].tolist())))
             latest = here
         places.append(len(phases) - 1)
@@ -234,27 +242,37 @@ class Stepper:
         n_x, n_in = len(request.x0), sizes.inputs
         first = np.cumsum([0, *[c.rows for c in metadata.contacts]])
         n_given, n_rows = len(metadata.contacts), int(first[-1])
-        self.n_contacts = n_given
+        groups = metadata.contact_groups
         self.record = record = Moreau(n_q=sizes.q, n_u=sizes.u, n_x=n_x, n_in=n_in, n_given=n_given, n_rows=n_rows)
         self._frames(n_x, n_in)
         most, entries = n_given, n_rows * sizes.u
+        if groups:
+            add_groups(module, record, memory)
+            most += room_of(groups)
+            entries += 6 * n_speeds(groups) * room_of(groups)
         self.cones: Cones = cones(memory, sizes.u, most, entries, min(MOST_DENSE, 3 * most))
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))
         coordinates = metadata.names("q")
-        groups = [[coordinates.index(q) for q in group] for group in metadata.unit_groups]
-        record.n_units = len(groups)
-        memory.take(record, "unit_first", np.cumsum([0, *map(len, groups)]).astype(places))
-        memory.take(record, "unit_index", np.array([k for group in groups for k in group] or [0], dtype=places))
-        memory.put(record, places, a=most, b=most, old_a=most, old_b=most, old_from=1)
+        place = {q: k for k, q in enumerate(coordinates)}
+        record.n_units = len(metadata.unit_groups)
+        memory.take(record, "unit_first", np.cumsum([0, *map(len, metadata.unit_groups)]).astype(places))
+        memory.take(record, "unit_index",
+                    np.array([*(place[q] for group in metadata.unit_groups for q in group), 0], dtype=places))
+        memory.put(record, places, **dict.fromkeys(("a", "b", "was_a", "was_b", "sum_a", "sum_b", "old_a", "old_b"), most),
+                   old_from=record.n_bodies + 1)
         memory.put(record, np.intc, old_state=most, broken=most)
         memory.put(record, float, work=8 * n_x, P_old=3 * most, basis=9 * most, incoming=3 * most, at_end=4 * most)
-        self.losses = memory.take(record, "loss_of", np.zeros(n_given))
+        self.losses = memory.take(record, "loss_of", np.zeros(n_given + len(groups)))
         record.tolerance = TOLERANCE * max(1.0, float(np.abs(self.x[sizes.q:sizes.q + sizes.u]).max(initial=0.0)))
         record.depth = DEPTH * max(1.0, float(np.abs(self.x[:sizes.q]).max(initial=0.0)))
         record.length = request.stabilization.length or 1.0
-        record.most_sweeps, record.most_rounds = MOST_SWEEPS, MOST_ROUNDS
+        record.most_sweeps, record.most_rounds, record.most_passes = MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES
+        record.accepted = ACCEPTED
+        if record.n_bodies > FEW:
+            record.tolerance, record.depth, record.accepted = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED
+            record.most_sweeps, record.most_rounds, record.most_passes = GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES
 
     def _frames(self, n_x: int, n_in: int) -> None:
         """What the record calls."""
@@ -263,16 +281,20 @@ class Stepper:
         for name, values in (("t", t), ("x", x), ("inputs", inputs)):
             memory.take(record, name, values)
         inputs[:n_in] = request.inputs.constant
-        field: Any = module.unit(RightSide(work=request.works, open_contacts=True))
-        contacts: Any = module.unit(GAPS)
+        named = bool(module.metadata.contacts)
+        field: Any = module.unit(RightSide(work=request.works, open_contacts=named))
+        contacts: Any = module.unit(GAPS if named else SPHERES)
         seen = (t, x, inputs)
 
         def add(member: str, unit: CUnit, function: str, result: str) -> np.ndarray:
             return memory.function(record, member, unit, function, result, seen, request.p)
 
         add("field", field, "rhs", "xd")
-        add("gaps", contacts, GAPS, "gap")
-        add("directions", contacts, DIRECTIONS, "direction")
+        if named:
+            add("gaps", contacts, GAPS, "gap")
+            add("directions", contacts, DIRECTIONS, "direction")
+        if module.metadata.contact_groups:
+            add("spheres", contacts, SPHERES, "sphere")
         if module.metadata.constraints:
             record.n_c = len(module.metadata.constraints)
             add("position", field, "position_correction", "position_change")
@@ -352,6 +374,7 @@ class Stepper:
             STATUS.MOREAU_LONG_STEP: f"the equations of a step of {self.step:g} s are not solved by iteration: it is too long "
                                      "for the stiffness of the mechanism; pass a shorter step",
             STATUS.MOREAU_CONSTRAINTS: "there is no way back onto the constraints; pass a shorter step",
+            STATUS.MOREAU_ROOM: f"more than {int(self.cones.most)} contacts at once: spheres of very different size",
             STATUS.MOREAU_INPUTS: f"a function of inputs raised {self.raised[0]!r}" if self.raised else "there are no inputs",
         }[status]
 

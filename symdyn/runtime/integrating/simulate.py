@@ -30,6 +30,7 @@ from symdyn.runtime.integrating.handover import run_series
 from symdyn.runtime.integrating.held_run import run_held
 from symdyn.runtime.integrating.methods import DEFAULT, SERIES, SMALLEST_RTOL, check_compiled, is_compiled
 from symdyn.runtime.integrating.moreau import MOREAU, check_moreau, run_moreau
+from symdyn.runtime.integrating.moreau_groups import check_spheres_apart
 from symdyn.runtime.integrating.outcome import Outcome, Request
 from symdyn.runtime.integrating.scipy_run import run_scipy, solver_class_of, takes_changed_states
 from symdyn.runtime.integrating.sensitivities import Asked
@@ -99,12 +100,17 @@ def simulate(module: Module, t: Any = None, q: Any = None, u: Any = None, params
             check_start(module, span[0], start, p)
             if metadata.contacts:
                 check_overlap(module, span[0], start, p, free.at(span[0], start))
+            if metadata.contact_groups:
+                check_spheres_apart(module, span[0], start, p, free.at(span[0], start))
         why = ""
         if isinstance(method, str) and method == "auto":
             blind = replace(request, look=None if request.look is None else np.zeros_like(request.look), inputs=free.held())
             method, why = automatic(module, blind, lambda asked, name: _trial(module, asked, name))
         if is_compiled(method):
             check_compiled(module, request, method)
+        if metadata.contact_groups and method != MOREAU:
+            raise ArgumentError(f"{module.name}: contacts of the group {metadata.contact_groups[0].name} are found in steps; "
+                                "pass method='moreau' with a step, such as step=2e-3 (in s)")
         if method == MOREAU:
             check_moreau(module, request, stabilization)
         if method == "ggl":

@@ -134,6 +134,48 @@ def stepped_contacts(solution: Solution, stepped: Stepped) -> dict[str, ContactM
     return found
 
 
+class GroupMotion(NamedTuple):
+    """Contacts of a group along a motion by time stepping, one row for each that was near in the step before a stored time.
+
+    row       index of that time, (n,)
+    a, b      places of both bodies in the group; from the number of its bodies on b counts its planes
+    mode      "open", "sticking" or "sliding"
+    gap       m, at the end of the step
+    normal    normal force, N; friction: size of the tangential force, N; both are the impulse by the length of the step
+    slip      size of the tangential velocity at the end of the step, m/s
+    """
+
+    row: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    mode: np.ndarray
+    gap: np.ndarray
+    normal: np.ndarray
+    friction: np.ndarray
+    slip: np.ndarray
+
+
+def group_motions(solution: Solution, stepped: Stepped) -> dict[str, GroupMotion]:
+    """Every group of contacts by name."""
+    touched, found, first, plane = stepped.touched, {}, 0, 0
+    groups = solution.module.metadata.contact_groups
+    n_bodies = sum(len(group.bodies) for group in groups)
+    row_of = np.full(len(stepped.h), -1)
+    row_of[stepped.row[stepped.row > 0] - 1] = np.flatnonzero(stepped.row > 0)
+    rows = row_of[touched.step]
+    for group in groups:
+        end = first + len(group.bodies)
+        own = np.flatnonzero((touched.b >= 0) & (touched.a >= first) & (touched.a < end) & (rows >= 0))
+        b, values = touched.b[own], touched.values[own]
+        other = np.where(b >= n_bodies, b - n_bodies - plane + len(group.bodies), b - first)
+        forces = values[:, 4:7] / stepped.h[touched.step[own], None]
+        modes = np.array(MODES, dtype=object)[touched.state[own]]
+        found[group.name] = GroupMotion(rows[own], touched.a[own] - first, other, modes, values[:, 0], forces[:, 0],
+                                        np.linalg.norm(forces[:, 1:], axis=1), np.linalg.norm(values[:, 2:4], axis=1))
+        first, plane = end, plane + group.planes
+    return found
+
+
 def _called(mode: str, record: ContactRecord) -> str:
     """The mode of a contact, or of an element of joints, which does not slide where it has no friction."""
     return CLOSED if record.kind in (STOP, CLUTCH) and mode != OPEN else mode

@@ -24,7 +24,7 @@ from symdyn.runtime.inputs.sampled import SampleRows
 from symdyn.runtime.integrating.events import EventRows, rows_of
 from symdyn.runtime.integrating.outcome import Outcome, Stepped
 from symdyn.runtime.paths import as_path, writing
-from symdyn.runtime.solutions.contacts import ContactMotion, contact_motions
+from symdyn.runtime.solutions.contacts import ContactMotion, GroupMotion, contact_motions, group_motions
 from symdyn.runtime.solutions.energy_balance import reset_energy
 from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
 from symdyn.runtime.solutions.sensitivity import Sensitivity
@@ -253,6 +253,16 @@ class Solution:
         """
         return contact_motions(self, self._phases, self._row_phases, self._impacts, self._stepped)
 
+    @cached_property
+    def contact_groups(self) -> Mapping[str, GroupMotion]:
+        """What groups of contacts did: name -> pairs that were near, with mode, gap and forces over time, see GroupMotion.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 1))
+        >>> dict(solution.contact_groups)
+        {}
+        """
+        return {} if self._stepped is None else group_motions(self, self._stepped)
+
     @property
     def stepped(self) -> Stepped | None:
         """Of a motion by method="moreau" its steps, what is left of the laws of contact (residual, m/s; depth, m), and the
@@ -283,7 +293,8 @@ class Solution:
         for name, rows in self.reset_energy.items():
             parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
         if self._stepped is not None:
-            names = [contact.name for contact in self.module.metadata.contacts]
+            metadata = self.module.metadata
+            names = [contact.name for contact in (*metadata.contacts, *metadata.contact_groups)]
             parts |= {f"contact {name}": -rows for name, rows in zip(names, self._stepped.losses.T, strict=False)}
         return {"change": change, **parts, "error": change - sum(parts.values())}
 

@@ -277,7 +277,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
         if (!(size <= 1e300)) return SYMDYN_MOREAU_NOT_FINITE;
         const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
         if (round && off <= noise) return 0;
-        if (round + 1 == s->most_rounds && off > 1e-6 * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
+        if (round + 1 == s->most_rounds && off > s->accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
     }
     return 0;
 }
@@ -312,6 +312,64 @@ static int symdyn_keep(symdyn_moreau *s, symdyn_cones *c, double t, const double
     return 0;
 }
 
+// What orders contacts: those with a name first, then pairs by their first body.
+static long symdyn_order(const symdyn_moreau *s, const long *a, const long *b, long i, long n) {
+    return i >= n ? s->n_given + s->n_bodies : b[i] < 0 ? a[i] : s->n_given + a[i];
+}
+
+// Add to the contacts of a step those whose gap closes at what the frames looked at last. added: whether there are new ones.
+static int symdyn_add(symdyn_moreau *s, symdyn_cones *c, int *added) {
+    const long n_was = s->n_found;
+    for (long i = 0; i < n_was; i++) {
+        s->was_a[i] = s->a[i];
+        s->was_b[i] = s->b[i];
+    }
+    const int failed = symdyn_find(s, c, s->depth);
+    if (failed) return failed;
+    long n = 0, i = 0, j = 0;
+    *added = 0;
+    while (i < n_was || j < s->n_found) {
+        const long one = symdyn_order(s, s->was_a, s->was_b, i, n_was), two = symdyn_order(s, s->a, s->b, j, s->n_found);
+        const long now = one < two ? one : two, begin = i;
+        for (; symdyn_order(s, s->was_a, s->was_b, i, n_was) == now && i < n_was; i++) {
+            if (n >= c->most) return SYMDYN_MOREAU_ROOM;
+            s->sum_a[n] = s->was_a[i];
+            s->sum_b[n++] = s->was_b[i];
+        }
+        for (; symdyn_order(s, s->a, s->b, j, s->n_found) == now && j < s->n_found; j++) {
+            int there = 0;
+            for (long k = begin; k < i; k++) there |= s->was_b[k] == s->b[j];
+            if (there) continue;
+            if (n >= c->most) return SYMDYN_MOREAU_ROOM;
+            *added = 1;
+            s->sum_a[n] = s->a[j];
+            s->sum_b[n++] = s->b[j];
+        }
+    }
+    s->n_found = n;
+    for (long k = 0; k < n; k++) {
+        s->a[k] = s->sum_a[k];
+        s->b[k] = s->sum_b[k];
+    }
+    return 0;
+}
+
+// Relative velocities of the contacts of a step, and their tangents, at its begin.
+static int symdyn_begin(symdyn_moreau *s, double t, const double *x) {
+    const int failed = symdyn_gaps(s, t, x);
+    if (failed) return failed;
+    for (long i = 0; i < s->n_found; i++) {
+        double normal[3];
+        if (s->b[i] >= 0) {
+            symdyn_pair(s, s->a[i], s->b[i], normal);
+            symdyn_basis(s, normal, s->basis + 9 * i, 1);
+        }
+        for (int k = 0; k < 3; k++) s->incoming[3 * i + k] = 0.0;
+        symdyn_contact_now(s, i, symdyn_rows(s, i), s->basis + 9 * i, s->incoming + 3 * i);
+    }
+    return 0;
+}
+
 // One step from (t, x), in place.
 static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, double h, double *x) {
     double *guess = s->work + 3 * s->n_x, *end = s->work + 4 * s->n_x;
@@ -325,21 +383,19 @@ static int symdyn_moreau_step(symdyn_moreau *s, symdyn_cones *c, double t, doubl
     failed = symdyn_rounds(s, c, t, h, x, end);  // without contacts: what they are looked for with
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
-    failed = symdyn_gaps(s, t + 0.5 * h, guess);
-    if (!failed) failed = symdyn_find(s, c, 0.0);
-    if (!failed) failed = symdyn_gaps(s, t, x);
-    if (failed) return failed;
-    for (long i = 0; i < s->n_found; i++) {
-        double normal[3];
-        if (s->b[i] >= 0) {
-            symdyn_pair(s, s->a[i], s->b[i], normal);
-            symdyn_basis(s, normal, s->basis + 9 * i, 1);
+    for (int pass = 0, added = 1; added; pass++) {
+        failed = symdyn_gaps(s, t + 0.5 * h, guess);
+        if (!failed) failed = symdyn_add(s, c, &added);
+        if (!failed && added && pass < s->most_passes) {
+            failed = symdyn_begin(s, t, x);
+            if (!failed) failed = symdyn_rounds(s, c, t, h, x, end);
+        } else {
+            added = 0;
         }
-        for (int k = 0; k < 3; k++) s->incoming[3 * i + k] = 0.0;
-        symdyn_contact_now(s, i, symdyn_rows(s, i), s->basis + 9 * i, s->incoming + 3 * i);
+        if (failed) return failed;
+        for (int i = 0; i < s->n_x; i++) guess[i] = 0.5 * (x[i] + end[i]);
     }
-    failed = s->n_found ? symdyn_rounds(s, c, t, h, x, end) : 0;
-    if (!failed) failed = symdyn_keep(s, c, t + h, end);
+    failed = symdyn_keep(s, c, t + h, end);
     if (!failed) failed = symdyn_part(s, c, t + h, end);
     if (failed) return failed;
     for (int i = 0; i < s->n_x; i++) x[i] = end[i];

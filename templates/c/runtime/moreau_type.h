@@ -38,12 +38,14 @@ typedef struct {
 
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
+    double accepted;                  // change of the last round, by the size of the state
+    int most_passes;                  // of a step, in which further contacts may close
     int most_rounds;                  // of a step
     double *work;                     // 8*n_x + n_rows + 16*n_given
     double *response;                 // n_bodies*6*n_speeds: M^-1 B^T
 
     // Contacts of the latest step: places of both bodies, or of the contact and -1; planes come after the bodies.
-    long *a, *b, *old_a, *old_b, *old_from, n_old;
+    long *a, *b, *was_a, *was_b, *sum_a, *sum_b, *old_a, *old_b, *old_from, n_old;
     int *old_state, *broken;
     double *P_old, *basis, *incoming, *gap_of, *kept_P;
     long n_found;                              // contacts of the latest step
