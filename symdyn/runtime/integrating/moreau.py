@@ -48,7 +48,7 @@ ACCEPTED = 1e-6
 # The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
 FEW = 40
 GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 1e-6, 1e-7, 1e-2
-GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 200, 10, 3
+GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 40, 3, 2
 # Residuals above this many tolerances are reported.
 REPORTED = 1e3
 
@@ -250,7 +250,8 @@ class Stepper:
             add_groups(module, record, memory)
             most += room_of(groups)
             entries += 6 * n_speeds(groups) * room_of(groups)
-        self.cones: Cones = cones(memory, sizes.u, most, entries, min(MOST_DENSE, 3 * most))
+        many = record.n_bodies > FEW
+        self.cones: Cones = cones(memory, sizes.u, most, entries, 0 if many else min(MOST_DENSE, 3 * most))
         self.library = shared("moreau", require_compiler())
         places = np.dtype("long")
         memory.take(record, "given_first", first.astype(places))
@@ -270,7 +271,7 @@ class Stepper:
         record.length = request.stabilization.length or 1.0
         record.most_sweeps, record.most_rounds, record.most_passes = MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES
         record.accepted = ACCEPTED
-        if record.n_bodies > FEW:
+        if many:
             record.tolerance, record.depth, record.accepted = GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED
             record.most_sweeps, record.most_rounds, record.most_passes = GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES
 

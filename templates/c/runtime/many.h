@@ -140,6 +140,12 @@ static void symdyn_wrench(const double *normal, double arm, const double *d, dou
     }
 }
 
+// From the centre of the second body of a pair to where the first one touches, along the normal: forces on both act at one point.
+static double symdyn_arm(const symdyn_moreau *s, long a, long b) {
+    double normal[3];
+    return symdyn_sphere(s, b)[0] + symdyn_pair(s, a, b, normal);
+}
+
 // Relative velocity of a pair along a direction.
 static double symdyn_pair_speed(const symdyn_moreau *s, long a, long b, const double *normal, const double *d) {
     const double *one = symdyn_sphere(s, a);
@@ -148,7 +154,7 @@ static double symdyn_pair_speed(const symdyn_moreau *s, long a, long b, const do
     for (int k = 0; k < 6; k++) sum += six[k] * one[4 + k];
     if (b >= s->n_bodies) return sum;
     const double *two = symdyn_sphere(s, b);
-    symdyn_wrench(normal, two[0], d, six);
+    symdyn_wrench(normal, symdyn_arm(s, a, b), d, six);
     for (int k = 0; k < 6; k++) sum -= six[k] * two[4 + k];
     return sum;
 }
@@ -179,7 +185,7 @@ static void symdyn_pair_rows(const symdyn_moreau *s, symdyn_cones *c, long a, lo
         symdyn_wrench(basis, -symdyn_sphere(s, a)[0], basis + 3 * k, six);
         e = symdyn_pair_entries(s, c, e, a, six, 1.0);
         if (b < s->n_bodies) {
-            symdyn_wrench(basis, symdyn_sphere(s, b)[0], basis + 3 * k, six);
+            symdyn_wrench(basis, symdyn_arm(s, a, b), basis + 3 * k, six);
             e = symdyn_pair_entries(s, c, e, b, six, -1.0);
         }
         c->entry[++r] = e;
