@@ -81,6 +81,8 @@ def test_a_pile_of_three_rests_on_the_floor() -> None:
     forces = dict(zip(zip(last.a[at_end], last.b[at_end], strict=True), last.normal[at_end], strict=True))
     assert set(forces) == {(0, 3), (1, 0), (2, 1)}
     np.testing.assert_allclose([forces[0, 3], forces[1, 0], forces[2, 1]], [3 * G, 2 * G, G], rtol=1e-5)
+    with pytest.raises(ArgumentError, match="rhs depends on the forces in the contact groups"):
+        solution.rows("rhs")
 
 
 def test_the_grid_finds_what_all_pairs_find() -> None:

@@ -47,7 +47,7 @@ MOST_SWEEPS, MOST_ROUNDS, MOST_PASSES = 20_000, 60, 30
 ACCEPTED = 1e-6
 # The same in groups of more bodies than FEW, whose problems are too large for a dense matrix.
 FEW = 40
-GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 1e-6, 1e-7, 1e-2
+GROUP_TOLERANCE, GROUP_DEPTH, GROUP_ACCEPTED = 1e-6, 1e-7, 1.0
 GROUP_SWEEPS, GROUP_ROUNDS, GROUP_PASSES = 40, 3, 2
 # Residuals above this many tolerances are reported.
 REPORTED = 1e3

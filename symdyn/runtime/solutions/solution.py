@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 # With kinetic energy and changes of potential energy below this part of it, a mechanism rests: both are rounding errors.
 REST = 1e-10
 
+# Functions that take what contacts do at an instant.
+OF_FORCES = ("rhs", "reactions", "lam", "cut_loads", "contacts")
+
 
 class Solution:
     """A motion.
@@ -753,6 +756,9 @@ class Solution:
         return found
 
     def _rows(self, name: str) -> np.ndarray:
+        if name in OF_FORCES and self.module.metadata.contact_groups:
+            raise ArgumentError(f"{self.module.name}: {name} depends on the forces in the contact groups, which are known as "
+                                "impulses over steps alone; take them from sol.contact_groups")
         if len(self.t) == 0:
             return np.zeros((0, *self.module.shape(name)))
         shape = self.module.shape(name)

@@ -235,7 +235,9 @@ static void symdyn_impulses(symdyn_moreau *s, symdyn_cones *c) {
 static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, const double *x, double *end) {
     double *middle = s->work, *next = s->work + s->n_x, *kick = s->work + 2 * s->n_x, off = 0.0;
     const int n_q = s->n_q, n_u = s->n_u;
-    for (int round = 0; round < s->most_rounds; round++) {
+    const int most = s->n_found ? s->most_rounds : 60;
+    const double accepted = s->n_found ? s->accepted : 1e-6;
+    for (int round = 0; round < most; round++) {
         int failed;
         for (int i = 0; i < s->n_x; i++) middle[i] = 0.5 * (x[i] + end[i]);
         if (s->n_found && (round < 4 || round % 8 == 0)) {
@@ -277,7 +279,7 @@ static int symdyn_rounds(symdyn_moreau *s, symdyn_cones *c, double t, double h, 
         if (!(size <= 1e300)) return SYMDYN_MOREAU_NOT_FINITE;
         const double noise = 1e-13 * size + (s->n_found ? 10.0 * s->tolerance : 0.0);
         if (round && off <= noise) return 0;
-        if (round + 1 == s->most_rounds && off > s->accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
+        if (round + 1 == most && off > accepted * (1.0 + size)) return SYMDYN_MOREAU_LONG_STEP;
     }
     return 0;
 }

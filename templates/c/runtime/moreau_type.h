@@ -38,7 +38,7 @@ typedef struct {
 
     double tolerance, depth, length;  // of velocities, m/s, of gaps, m; the length of the mechanism, m
     long most_sweeps;                 // of one contact problem
-    double accepted;                  // change of the last round, by the size of the state
+    double accepted;                  // change of the last round with contacts, by the size of the state
     int most_passes;                  // of a step, in which further contacts may close
     int most_rounds;                  // of a step
     double *work;                     // 8*n_x + n_rows + 16*n_given
