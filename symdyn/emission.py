@@ -17,6 +17,7 @@ from symdyn.collector import collector_paused
 from symdyn.formulation.equations import Equations
 from symdyn.functions import groups
 from symdyn.functions.content import content_of
+from symdyn.functions.tapes import columns_of
 from symdyn.runtime.building.stored import write_whole
 from symdyn.runtime.paths import as_path
 
@@ -52,9 +53,9 @@ def emit(equations: Equations, backend: str, functions: Sequence[str] | None = N
     names = groups.written(equations, functions, method if integrator and backend == "c" else None)
     with collector_paused():
         # The self-test of a file that stands alone exercises its statements one by one.
-        jacobians = backend == "c" and not standalone and templates is None
+        columns = columns_of if backend == "c" and not standalone and templates is None else None
         right_side = RightSide(work, baumgarte, method, sensitivities, adjoint, held, followed, open_contacts)
-        content = content_of(equations, names, standalone, bound, right_side, jacobians)
+        content = content_of(equations, names, standalone, bound, right_side, columns)
         return render(content, backend, templates, standalone, integrator, batch, method, states)
 
 

@@ -114,7 +114,8 @@ def backends(extra: str | os.PathLike | None = None) -> list[str]:
 
 
 def render(content: Content, backend: str, templates: str | os.PathLike | None = None, standalone: bool = True,
-           integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2) -> Source:
+           integrator: bool = True, batch: bool = False, method: str = "dop853", states: int = 2,
+           only: str | None = None) -> Source:
     """Render a backend's files.
 
     templates    folder whose files take precedence over the shipped ones
@@ -123,6 +124,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     batch        C only: with rhs, and the integrator if there is one, of many states at once
     method       the integrator's, one of symdyn.backend.methods.METHODS
     states       how many random states the reference vectors begin with
+    only         the template of the one file that is wanted
     Raises SymdynError for an unknown backend or a broken template.
     """
     folders = template_folders(templates)
@@ -153,7 +155,7 @@ def render(content: Content, backend: str, templates: str | os.PathLike | None =
     files = {}
     wanted = dialect.files or {}
     if not standalone:
-        wanted = dict(list(wanted.items())[:1])
+        wanted = {only: wanted[only]} if only is not None else dict(list(wanted.items())[:1])
     for template, target in wanted.items():
         try:
             text = environment.get_template(f"{backend}/{template}").render(context)

@@ -13,6 +13,8 @@ from symdyn.tape.tape import Tape
 _DEFINED = re.compile(r"^[ \t]*static\s+int\s+(\w+)\s*\(\s*const\s+double\s*\*\s*\w+\s*,\s*double\s*\*\s*\w+\s*\)\s*\{",
                       re.MULTILINE)
 _WAYS = {"c": "c=", "numpy": "python="}
+# Backends whose texts are those of another.
+_TEXTS = {"python": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ def texts(functions: Sequence[UserFunction], backend: str, name: str) -> list[Us
     name   of the mechanism, which names of the file begin with
     Raises SymdynError for a function without a text for the backend, and for a name that the file has already.
     """
+    backend = _TEXTS.get(backend, backend)
     together: dict[str, list[UserFunction]] = {}
     for f in functions:
         text = f.text(backend)

@@ -12,6 +12,7 @@ from symdyn.cli.compare import compare
 from symdyn.cli.demo import demo
 from symdyn.cli.derive import READABLE, derive
 from symdyn.cli.diagnose import diagnose
+from symdyn.cli.export import add_export, export
 from symdyn.cli.generate import generate
 from symdyn.cli.list import list_systems
 from symdyn.cli.measurements import MEASUREMENTS, overview
@@ -55,6 +56,9 @@ def make_parser() -> argparse.ArgumentParser:
     _add_derive(formulation(command("derive", derive, "print the equations of motion M_tilde u_dot + k_tilde = F_tilde, with "
                                     "multipliers where there are constraints"), None))
     _add_generate(formulation(command("generate", generate, "write source files; no compiler is needed")))
+    exported = formulation(command("export", export, "write a mechanism for CasADi, JAX or PyTorch"))
+    add_export(exported)
+    _add_output(exported)
     _add_simulate(formulation(command("simulate", simulate, "simulate, and save data and a picture")))
     _add_view(formulation(command("view", view, "look at a mechanism with a slider for every coordinate, or at its motion: one "
                                   "HTML page, which is opened in the browser")))

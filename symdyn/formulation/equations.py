@@ -411,6 +411,65 @@ class Equations:
 
         return prove_equations(self)
 
+    def to_casadi(self, name: str = "rhs", specialize: Numbers | None = None) -> Any:
+        """A function of the equations, such as "rhs", as a casadi.Function f(t, x, params, inputs), with exact derivatives.
+
+        name         of a function of a module; those of accelerations, such as "inverse_dynamics", take ud as well
+        specialize   parameters, by symbol or name, that become numbers
+
+        x, params and inputs are columns in the order of a module's; the result is NaN where a module raises. Raises MissingExtra
+        without CasADi, SymdynError for a function that the equations do not have.
+
+        >>> f = sd.systems.pendulum().embedding().to_casadi("rhs")
+        >>> f
+        Function(rhs:(t,x[2],params[3],inputs[0])->(rhs[2]) SXFunction)
+        """
+        from symdyn.targets.functions import casadi_function
+
+        return casadi_function(self, name, specialize)
+
+    def to_jax(self, name: str = "rhs", dtype: str = "float64", through: str = "xla", unroll: bool | None = None,
+               specialize: Numbers | None = None) -> Callable[..., Any]:
+        """A function of the equations as f(t, x, params=None, inputs=(), ud=()) for JAX: jit, vmap, grad, jacobian.
+
+        dtype      "float64" (needs JAX's jax_enable_x64) or "float32"
+        through    "xla": statements that XLA compiles; "c": the compiled C library, which XLA calls on a CPU
+        unroll     of "xla": True: XLA gets the statements one by one; False: as a table that a loop goes through; None: as is
+                   faster on the device
+        specialize   parameters, by symbol or name, that become numbers
+
+        One state x (n_x,), params in order or by name; jax.vmap takes many. Derivatives are symdyn's own. The result is
+        NaN where a module raises. Raises MissingExtra without JAX, SymdynError for a function that the equations do not have,
+        ArgumentError for float64 while JAX computes in float32.
+
+        >>> import jax                                                         # doctest: +SKIP
+        >>> jax.config.update("jax_enable_x64", True)                          # doctest: +SKIP
+        >>> f = sd.systems.pendulum().embedding().to_jax("rhs")                # doctest: +SKIP
+        >>> f(0.0, [0.1, 0.0]).shape                                           # doctest: +SKIP
+        (2,)
+        """
+        from symdyn.targets.jax_function import jax_function
+
+        return jax_function(self, name, dtype, through, unroll, specialize)
+
+    def to_torch(self, name: str = "rhs", dtype: str = "float64", specialize: Numbers | None = None) -> Callable[..., Any]:
+        """A function of the equations as f(t, x, params=None, inputs=None, ud=None) for PyTorch, with exact derivatives.
+
+        dtype        "float64" or "float32"
+        specialize   parameters, by symbol or name, that become numbers
+
+        One state x (n_x,) or many (..., n_x); arguments broadcast, params also by name. The result is NaN where a module raises.
+        Raises MissingExtra without PyTorch, SymdynError for a function that the equations do not have.
+
+        >>> import torch                                                       # doctest: +SKIP
+        >>> f = sd.systems.pendulum().embedding().to_torch("rhs")              # doctest: +SKIP
+        >>> f(0.0, torch.zeros(100, 2)).shape                                  # doctest: +SKIP
+        torch.Size([100, 2])
+        """
+        from symdyn.targets.functions import torch_function
+
+        return torch_function(self, name, dtype, specialize)
+
     def to_sympy(self, simplify: bool = True) -> SympyEquations:
         """The equations in SymPy's terms: functions of time, mass matrix and forcing under the names that KanesMethod has.
 

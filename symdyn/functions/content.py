@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+from symdyn.backend.columns import Columns
 from symdyn.backend.metadata import (
     Chart,
     CompliantRecord,
@@ -25,7 +26,7 @@ from symdyn.formulation.event_bounds import BOUNDS, enclosed, event_leaves, unkn
 from symdyn.formulation.printed.skipped import skipped
 from symdyn.functions.sensitivities import column_names, held_names
 from symdyn.functions.table import FUNCTIONS, title_of
-from symdyn.functions.tapes import columns_of, given_rates, has_function, switches, tapes_of
+from symdyn.functions.tapes import given_rates, has_function, switches, tapes_of
 from symdyn.model.symbols import GivenMotion
 from symdyn.shown import name_of
 from symdyn.tape.balance import balance
@@ -40,15 +41,16 @@ WORK = "(work)"
 
 
 def content_of(equations: Equations, names: Sequence[str], standalone: bool, bound: Mapping[str, float],
-               right_side: RightSide, jacobians: bool = False) -> Content:
+               right_side: RightSide,
+               columns: Callable[[Equations, str, RightSide], Columns | None] | None = None) -> Content:
     """What a backend takes to emit the named functions.
 
     standalone   with what is documented in a file that is written
     bound        parameters that become numbers in the code, by name
-    jacobians    whether these may be directional derivatives, several columns at once
+    columns      decides which of these are directional derivatives, several columns at once; None: none of them
     """
     symbols = equations.symbols
-    found = {name: columns_of(equations, name, right_side) for name in names} if jacobians else {}
+    found = {name: columns(equations, name, right_side) for name in names} if columns is not None else {}
     several = {name: made for name, made in found.items() if made is not None}
     one_by_one = tapes_of(equations, [n for n in names if n not in several], right_side)
     tapes = {n: several[n].tape if n in several else one_by_one[n] for n in names}

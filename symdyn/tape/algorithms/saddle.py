@@ -66,13 +66,14 @@ def symdyn_substitute(xp, factors, right):
     return x
 
 
-def symdyn_saddle_point(xp, n, m, values, least):
+def symdyn_saddle_point(xp, n, m, values, least, in_order=False):
     """x (n) of M x + C^T lam = f, C x = d, and whether there is none: M symmetric, perhaps singular, the m rows of C perhaps
     dependent. Values: e, M lower triangle row by row, C row by row, scales of the rows (m) and columns (n) of C, f, d.
 
     The iterated augmented Lagrangian of Bayo, Garcia de Jalon and Serna, Comput. Methods Appl. Mech. Eng. 71 (1988), scaled:
     (M + a C^T C) x = f - C^T lam + a C^T d, lam += a (C x - d) with a = M_kk / e^2; each round takes the residual again.
-    There is none where a pivot is no more than the part `least` of its entry; None: that is not looked at.
+    There is none where a pivot is no more than the part `least` of its entry; None: that is not looked at. in_order: the
+    pivots of the factorization itself are looked at, for arithmetic that cannot choose the next one.
     """
     e, triangle, C, rows, columns, f, d = np.split(values, np.cumsum([1, n * (n + 1) // 2, m * n, m, n, n]))
     i, j = np.indices((n, n))
@@ -91,8 +92,10 @@ def symdyn_saddle_point(xp, n, m, values, least):
     a = xp.divide(largest, e[0] * e[0])
     f, d = columns * f, rows * d
     A = M + a * symdyn_less(xp, np.zeros_like(M), -(C[:, :, None] * C[:, None, :]))
-    loose = False if least is None else symdyn_loose(A, least)
+    loose = False if least is None or in_order else symdyn_loose(A, least)
     factors, failed = symdyn_factorize(xp, np.where(loose, np.eye(n).reshape((n, n) + (1,) * np.ndim(loose)), A))
+    if in_order:
+        failed = xp.logical_or.reduce(xp.less_equal(factors[1], least * symdyn_diagonal(A)))
     x, lam = np.zeros_like(f), np.zeros_like(d)
     for _ in range(SYMDYN_ROUNDS):
         gap = a * symdyn_less(xp, d, Ct * x[:, None]) - lam
