@@ -518,6 +518,9 @@ def test_report_of_constraints(capsys: pytest.CaptureFixture[str]) -> None:
     (["derive", "n_link_pendulum", "--option", "n"], "--option 'n': write name=value"),
     (["derive", "puma560", "--option", "convention=mine"], "puma560 has no convention 'mine'"),
     (["derive", "pendulum", "--quantity", "N_tilde"], "no quantity 'N_tilde'; it has"),
+    (["simulat", "pendulum"], "there is no command 'simulat'; did you mean simulate"),
+    (["xyz"], "there is no command 'xyz'; there are list, derive,"),
+    (["export", "pendulum"], "nothing to export: pass one of --casadi, --jax, --torch"),
     (["generate", "pendulum", "--backend", "cobol"], "no backend 'cobol'; there are c, javascript, numpy"),
     (["generate", "pendulum", "--functions", "lhs"], "no function lhs; it has rhs"),
     (["generate", "pendulum", "--templates", "absent"], "template folder absent does not exist"),
@@ -547,3 +550,9 @@ def test_an_unusable_folder_or_compiler_is_told(here: Path, monkeypatch: pytest.
     assert "taken" in refused(capsys, "simulate", "pendulum", "--backend", "numpy", "--output", "taken", code=1)
     monkeypatch.setenv("SYMDYN_CC", "no-such-compiler")
     assert "no-such-compiler" in refused(capsys, "simulate", "pendulum", code=1)
+
+
+def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0 and capsys.readouterr().out == f"symdyn {symdyn.__version__}\n"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import symdyn
 from symdyn.cli import bench
 from symdyn.cli.compare import compare
 from symdyn.cli.demo import demo
@@ -24,11 +26,23 @@ from symdyn.cli.values import path, stabilization
 from symdyn.cli.view import view
 
 
+class _Parser(argparse.ArgumentParser):
+    """The parser of commands, which offers the nearest ones for one that there is not."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [name for name in action.choices if " " not in name]
+            near = difflib.get_close_matches(str(value), known, 3, cutoff=0.5)
+            hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"
+            raise argparse.ArgumentError(None, f"there is no command {value!r}; {hint}")
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser; what it returns holds the function of the command as `run`."""
-    parser = argparse.ArgumentParser(prog="symdyn", description="Equations of motion of multibody systems: derived "
-                                     "symbolically, generated as C and NumPy, simulated fast.")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser = _Parser(prog="symdyn", description="Equations of motion of multibody systems: derived "
+                     "symbolically, generated as C and NumPy, simulated fast.")
+    parser.add_argument("--version", action="version", version=f"symdyn {symdyn.__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=argparse.ArgumentParser)
 
     def command(name: str, run: Callable[[argparse.Namespace], int], text: str, system: bool = True) -> Any:
         sub = commands.add_parser(name, help=text, description=text)
