@@ -24,6 +24,7 @@ from symdyn.runtime.inputs.sampled import SampleRows
 from symdyn.runtime.integrating.events import EventRows, rows_of
 from symdyn.runtime.integrating.outcome import Outcome, Stepped
 from symdyn.runtime.paths import as_path, writing
+from symdyn.runtime.solutions import frames
 from symdyn.runtime.solutions.contacts import ContactMotion, GroupMotion, contact_motions, group_motions
 from symdyn.runtime.solutions.energy_balance import reset_energy
 from symdyn.runtime.solutions.reactions import in_frame, reactions, unique_reactions
@@ -716,7 +717,36 @@ class Solution:
         np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
                  about=np.array(json.dumps(about)), **arrays)
 
-    def _save_columns(self, path: Path) -> None:
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame over the time: states, inputs, outputs and multipliers in columns, as in a .csv file.
+
+        The units of the columns are in its attrs["units"], by name. Raises MissingExtra without pandas.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> frame = solution.to_pandas()                                       # doctest: +SKIP
+        >>> list(frame), frame.index.name                                      # doctest: +SKIP
+        (['q1', 'q1_dot'], 't')
+        """
+        return frames.to_pandas(self)
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over the time: a variable for each state, input, output and multiplier, with its unit.
+
+        Outputs keep their shapes. Raises MissingExtra without xarray.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> solution.to_xarray()["q1"].attrs["units"]                          # doctest: +SKIP
+        'rad'
+        """
+        return frames.to_xarray(self)
+
+    def columns(self) -> tuple[list[str], list[np.ndarray]]:
+        """Names and values over the time, (n_t,) each: t, states, inputs, outputs entry by entry, multipliers.
+
+        >>> solution = sd.systems.pendulum().compile(backend="numpy").simulate((0, 0.2))
+        >>> solution.columns()[0]
+        ['t', 'q1', 'q1_dot']
+        """
         titles = ["t", *self.module.metadata.x, *self.module.metadata.inputs]
         columns = [self.t, *self.x.T, *self.inputs.T]
         for name, rows in self.outputs.items():
@@ -725,6 +755,10 @@ class Solution:
             columns += list(flat.T)
         titles += [f"lam_{name}" for name in names(self.module)]
         columns += list(self.lam.T)
+        return titles, columns
+
+    def _save_columns(self, path: Path) -> None:
+        titles, columns = self.columns()
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(titles)
