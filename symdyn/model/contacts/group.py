@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -101,9 +102,9 @@ def lowered(system: System, group: ContactGroup, faults: Faults) -> LoweredGroup
     closed = {getattr(body, "name", body) for body in ends}
     wanted, spheres = FREE_JOINT[system.planar], []
     names = [getattr(body, "name", body) for body in group.bodies]
-    twice = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
+    twice = [str(name) for name, count in Counter(names).items() if count > 1]
     if twice:
-        faults.append(f"{group.where}: {', '.join(map(str, twice))} is in it twice; name each body once")
+        faults.append(f"{group.where}: {', '.join(sorted(twice))} is in it twice; name each body once")
     for name, shape in zip(names, group.shapes, strict=True):
         joint = joints.get(name)
         if joint is None or joint.kind != wanted or getattr(joint.parent, "name", joint.parent) != "ground" or (

@@ -85,8 +85,8 @@ class JointElement:
     def _coordinate(self, system: System, joint: Any, faults: Faults) -> tuple[Any, Any] | None:
         """A joint of one degree of freedom with its coordinate."""
         joints = {name_of(j): j for j in system.joints}
-        found = joints.get(joint) if isinstance(joint, str) else joint
-        if not any(found is j for j in system.joints):
+        found = joints.get(joint) if isinstance(joint, str) else next((j for j in system.joints if j is joint), None)
+        if found is None:
             faults.append(f"{self.where} is at the joint {shown(joint)}, which the system does not have; joints: "
                           f"{', '.join(map(str, joints)) or 'none'}")
             return None

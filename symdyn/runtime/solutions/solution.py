@@ -298,7 +298,7 @@ class Solution:
             parts[f"impact of {name.removesuffix('_closes')}" if name in touching else f"reset of {name}"] = rows
         if self._stepped is not None:
             metadata = self.module.metadata
-            names = [contact.name for contact in (*metadata.contacts, *metadata.contact_groups)]
+            names = [*(contact.name for contact in metadata.contacts), *(group.name for group in metadata.contact_groups)]
             parts |= {f"contact {name}": -rows for name, rows in zip(names, self._stepped.losses.T, strict=False)}
         return {"change": change, **parts, "error": change - sum(parts.values())}
 
