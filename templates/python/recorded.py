@@ -97,7 +97,7 @@ class _Record:
         return lam
 
     def _near(self, terms, wanted, part):
-        """What single precision leaves where constraints nearly depend on each other may be no solution, and then counts as none."""
+        """What single precision leaves where constraints nearly depend on each other may be no solution: it counts as none."""
         rest, size = -wanted, self.apply("abs", wanted)
         for term in terms:
             rest, size = rest + term, size + self.apply("abs", term)
@@ -109,7 +109,8 @@ class _Record:
 
         two = {"greater": "gt", "less_equal": "le", "not_equal": "ne", "maximum": "max", "logical_or": "or", "divide": "div"}
         names = {name: elementwise(operation, 2) for name, operation in two.items()}
-        arithmetic = types.SimpleNamespace(**names, subtract=np.subtract, sqrt=elementwise("sqrt", 1), where=elementwise("select", 3))
+        arithmetic = types.SimpleNamespace(**names, subtract=np.subtract, sqrt=elementwise("sqrt", 1),
+                                           where=elementwise("select", 3))
         array = np.empty(len(values), dtype=object)
         array[:] = values
         found, failed = algorithm(arithmetic, n, m, array, *bounds)
@@ -211,5 +212,5 @@ def _shape_by(name, by):
 
 
 def _ways(name):
-    """For each way to compute a function the numbers of directions of its blocks of columns; none where it is no matrix by columns."""
+    """For each way to compute a function the numbers of directions of its blocks of columns; none of what has no columns."""
     return [[n for n, _ in way[1]] if isinstance(way, tuple) else [] for way in _define(_Record(0))[name]]

@@ -250,6 +250,22 @@ def test_what_does_not_fit_is_rejected() -> None:
         solution(0.123)
 
 
+def test_other_laws_and_elements_of_joints_are_rejected() -> None:
+    """Their rows mean something else: impulses by Newton's law alone would be wrong without a word."""
+    system = sd.System("door")
+    leaf = system.add_body("leaf", mass=1.0, inertia=[1, 1, 1])
+    hinge = system.add_joint(sd.Revolute("hinge", system.ground, leaf, sd.coordinates("q")))
+    system.add_contact(sd.Stop("frame", hinge, lower=0))
+    with pytest.raises(ArgumentError, match=r"takes contacts of bodies, not stops, clutches, .* \(frame\); leave out the method"):
+        system.compile().simulate((0, 1), q=[1.0], method="moreau", step=1e-3)
+    other = sd.System("ball", gravity=[0, -G])
+    body = other.add_body("body", mass=1.0)
+    other.add_joint(sd.Prismatic("height", other.ground, body, axis=[0, 1], coordinate=sd.coordinates("y")))
+    other.add_contact(sd.Contact("floor", body, other.ground, restitution=0.5, impact="poisson"))
+    with pytest.raises(ArgumentError, match="has Newton's law of impacts; floor has impact='poisson': pass impact='newton'"):
+        other.compile().simulate((0, 1), q=[1.0], method="moreau", step=1e-3)
+
+
 def test_a_step_that_is_too_long_is_reported() -> None:
     y = sd.coordinates("y")
     system = sd.System("stiff", gravity=[0, -G])

@@ -12,6 +12,7 @@ import numpy as np
 
 from symdyn.backend.c_records import codes_of
 from symdyn.backend.right_side import RightSide
+from symdyn.contact_kinds import BODIES
 from symdyn.errors import ArgumentError
 from symdyn.runtime import contact_laws as laws
 from symdyn.runtime.building.compiler import require_compiler
@@ -62,6 +63,15 @@ def check_moreau(module: Module, request: Request, stabilization: Any) -> None:
     if not metadata.contacts and not metadata.contact_groups:
         raise ArgumentError(f"{name}: method='moreau' is for rigid contacts, of which there are none; pass another method, or "
                             "add_contact")
+    elements = [c.contact for c in metadata.contacts if c.kind != BODIES]
+    if elements:
+        raise ArgumentError(f"{name}: method='moreau' takes contacts of bodies, not stops, clutches, ropes or dry friction of "
+                            f"joints ({', '.join(dict.fromkeys(elements))}); leave out the method, and switches are located")
+    others = {c.contact: c.impact for c in metadata.contacts if c.impact != "newton"}
+    if others:
+        raise ArgumentError(f"{name}: method='moreau' has Newton's law of impacts; "
+                            + ", ".join(f"{contact} has impact={impact!r}" for contact, impact in others.items())
+                            + ": pass impact='newton', or leave out the method")
     if request.span[1] < request.span[0]:
         raise ArgumentError(f"{name}: rigid contacts lose energy, so that motions with them do not run backward in time; pass an "
                             "end after the start")
