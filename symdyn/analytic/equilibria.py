@@ -57,10 +57,10 @@ class EquilibriumPoint:
     proved: bool = True
 
     def __str__(self) -> str:
-        told = ", ".join(f"{q} = {value}" for q, value in self.values.items())
-        told += f"{', ' if told and self.free else ''}{', '.join(f'{q} free' for q in self.free)}"
-        told = told or "the coordinates that are held are at rest"
-        return told + (f"   where {' and '.join(map(str, self.conditions))}" if self.conditions else "")
+        text = ", ".join(f"{q} = {value}" for q, value in self.values.items())
+        text += f"{', ' if text and self.free else ''}{', '.join(f'{q} free' for q in self.free)}"
+        text = text or "the coordinates that are held are at rest"
+        return text + (f"   where {' and '.join(map(str, self.conditions))}" if self.conditions else "")
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,10 +98,10 @@ class EquilibriumPoints:
     def _repr_latex_(self) -> str:
         rows = []
         for point in self.points:
-            told = [f"{sp.latex(q)} = {sp.latex(value)}" for q, value in point.values.items()]
-            told += [rf"{sp.latex(q)} \text{{ free}}" for q in point.free]
-            told += [rf"\text{{where }} {sp.latex(c)}" for c in point.conditions]
-            rows.append("&" + r",\enspace ".join(told))
+            entries = [f"{sp.latex(q)} = {sp.latex(value)}" for q, value in point.values.items()]
+            entries += [rf"{sp.latex(q)} \text{{ free}}" for q in point.free]
+            entries += [rf"\text{{where }} {sp.latex(c)}" for c in point.conditions]
+            rows.append("&" + r",\enspace ".join(entries))
         rows = rows or [r"&\text{no equilibrium}"]
         return "$\\displaystyle \\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}$"
 
@@ -469,10 +469,10 @@ class _Search:
         names = [x for x in (*[s for pair in self.pairs.values() for s in pair], *self.unknown)
                  if any(e.has(x) for e in case.left)]
         coupled = sorted({str(self._angle(x)) for e in case.left for x in self._unknowns(e)})
-        told = (f"{self.equations.name}: the conditions of equilibrium stay coupled in {', '.join(coupled)} and are not "
+        problem = (f"{self.equations.name}: the conditions of equilibrium stay coupled in {', '.join(coupled)} and are not "
                 "solved in closed form")
         if any(e.atoms(sp.Symbol) - set(names) for e in case.left):
-            raise SymdynError(f"{told}; pass numbers for all parameters with values=..., fix some coordinates, or use "
+            raise SymdynError(f"{problem}; pass numbers for all parameters with values=..., fix some coordinates, or use "
                               "module.equilibria()")
         circles = [s**2 + c**2 - 1 for s, c in self.pairs.values() if s in names or c in names]
         basis = sp.groebner([*case.left, *circles], *names, order="lex")
@@ -480,7 +480,7 @@ class _Search:
             return []
         polynomials = [e for e in basis.exprs if self._reduced(e) != 0]
         if not any(len(self._unknowns(e)) == 1 for e in polynomials) or set(polynomials) == set(case.left):
-            raise SymdynError(f"{told}: they do not hold at single states; fix some coordinates, or use module.equilibria()")
+            raise SymdynError(f"{problem}: they do not hold at single states; fix some coordinates, or use module.equilibria()")
         return [_Case(tuple(polynomials), case.found, case.angles, case.conditions)]
 
     def _angle(self, unknown: Any) -> sp.Expr:

@@ -43,18 +43,18 @@ class Stability:
     equilibrium: tuple[sp.Basic, ...] = ()
 
     def __str__(self) -> str:
-        told = [f"{self.kind} stability where"] + [f"  {c.lhs} > 0" for c in self.conditions]
+        lines = [f"{self.kind} stability where"] + [f"  {c.lhs} > 0" for c in self.conditions]
         if not self.conditions:
-            told = [f"{self.kind} stability for all values of the parameters"]
+            lines = [f"{self.kind} stability for all values of the parameters"]
         never = [c.lhs for c in self.conditions if c.lhs.is_nonpositive]
         if never:
-            told = [f"no {self.kind} stability for any values of the parameters: {never[0]} would have to be positive"]
+            lines = [f"no {self.kind} stability for any values of the parameters: {never[0]} would have to be positive"]
         if self.kind == "undecided":
-            told = ["stability is not decided by the linear equations: all roots are s = 0"]
+            lines = ["stability is not decided by the linear equations: all roots are s = 0"]
         elif self.zero_roots:
-            told.append(f"  besides {self.zero_roots} root{'s' * (self.zero_roots > 1)} s = 0")
-        told += [f"  if the state is an equilibrium: {c.lhs} = {c.rhs}" for c in self.equilibrium]
-        return "\n".join(told)
+            lines.append(f"  besides {self.zero_roots} root{'s' * (self.zero_roots > 1)} s = 0")
+        lines += [f"  if the state is an equilibrium: {c.lhs} = {c.rhs}" for c in self.equilibrium]
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return str(self)

@@ -101,16 +101,16 @@ def check_units(equations: Equations) -> UnitReport:
             if differ:
                 wanted_unit = ENERGIES.get(differ[1], differ[1]) if name in ("T", "V") else differ[1]
                 faults.append(f"{name}{list(index) if index else ''} is in {differ[0]}, the equations take it in {wanted_unit}")
-    told: dict[str, Any] = {}
+    units_of: dict[str, Any] = {}
     for name, value in quantities.items():
         words = ENERGIES if name in ("T", "V") else {}
         found = [text(dimensions.of(e)) if isinstance(e, Node) else "" for e in value.ravel()]
         array = np.array([words.get(unit, unit) for unit in found], dtype=object)
-        told[name] = array.reshape(value.shape).tolist()
+        units_of[name] = array.reshape(value.shape).tolist()
     used = {symbol: leaf for leaf, symbol in printed.items() if leaf in dimensions}
     inferred = {symbol: text(dimensions.of(leaf)) for symbol, leaf in used.items() if units.get(symbol) is None}
     unread = {symbol: s.units[symbol] for symbol in inferred if s.units.get(symbol)}
-    return UnitReport(f"{equations.name} ({equations.formulation})", tuple(dict.fromkeys(faults)), told, inferred, unread)
+    return UnitReport(f"{equations.name} ({equations.formulation})", tuple(dict.fromkeys(faults)), units_of, inferred, unread)
 
 
 def _wanted(name: str, index: tuple[int, ...], speeds: list[Dimension | None], states: list[Dimension | None],

@@ -22,7 +22,7 @@ class Convention:
     sentence   what the slide does otherwise
     to_slide   takes an expression or a matrix (of an equation: left minus right), returns the same
 
-    A case refuses a convention without name, sentence or function; what to_slide raises becomes a CaseError.
+    A case rejects a convention without name, sentence or function; what to_slide raises becomes a CaseError.
     """
 
     name: str

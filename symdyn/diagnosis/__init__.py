@@ -1,6 +1,6 @@
 """What is wrong, or special, with the constraints of a mechanism: System.diagnose."""
 
-from symdyn.diagnosis.doctor import diagnose
+from symdyn.diagnosis.examine import diagnose
 from symdyn.diagnosis.result import Dependency, Diagnosis, SingularState
 
 __all__ = ["Dependency", "Diagnosis", "SingularState", "diagnose"]

@@ -203,7 +203,7 @@ class _Run:
         return Ensemble(store.folder, n_before, clock.perf_counter() - begun)
 
     def kept(self, write: Callable[[], Any]) -> Any:
-        """Do what writes to the disk; if the disk refuses, tell what is there."""
+        """Do what writes to the disk; if the disk rejects it, report what is there."""
         try:
             return write()
         except OSError as error:

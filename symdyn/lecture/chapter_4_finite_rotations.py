@@ -49,7 +49,7 @@ def _finite() -> list[Formula]:
                     "printed is that of rotations from b to n.", proofs.Proof(
         "invariant axis", "The first rotation leaves the unit vector along z_{0} as it is; only those about y and x change it.",
         lambda R: sp.Matrix(R) * sp.Matrix([0, 0, 1]) - seen))
-    # The product with R_z and R_x mended, as the slides themselves use them at line 6361.
+    # The product with R_z and R_x corrected, as the slides themselves use them at line 6361.
     right_z, right_x = R_x(psi), R_z(phi)
     to_b = sd.rotation.from_euler("ZYX", (psi, theta, phi)).T
     return [
@@ -80,7 +80,7 @@ def _infinitesimal() -> list[Formula]:
     turns = small_turn([0, 0, psi_]).T * small_turn([0, theta_, 0]).T * small_turn([phi_, 0, 0]).T
     rates = sp.Matrix([x.dot for x in small])
     there = dict.fromkeys(small, sp.S.Zero)
-    # Of small angles the order does not matter; R_z and R_x mended, as the slides themselves use them at line 6361.
+    # Of small angles the order does not matter; R_z and R_x corrected, as the slides themselves use them at line 6361.
     of_small = R_x(psi_) * R_y(theta_) * R_z(phi_)
     linear = sp.eye(3) + sum((of_small.diff(x).xreplace(there) * x for x in small), sp.zeros(3))
     return [

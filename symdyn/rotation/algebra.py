@@ -198,7 +198,7 @@ def _expression(value: Any, what: str) -> Any:
 
 
 def _floats(array: np.ndarray, what: str) -> np.ndarray:
-    """Fractions and the like as floats; texts, truth values, complex numbers and all else refused."""
+    """Fractions and the like as floats; texts, truth values, complex numbers and all else rejected."""
     for entry in array.flat:
         if isinstance(entry, str):
             raise ArgumentError(f"{what}: the text {shown(str(entry))}; text is never evaluated: pass numbers or SymPy "

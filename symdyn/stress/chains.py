@@ -31,7 +31,7 @@ def long_chains(short: bool) -> Iterator[Row]:
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("long chains", f"{name}({n})", f"{tested.equations.tape('rhs').operations} operations, accelerations at "
                      f"{len(where.x)} states, condition of the mass matrix up to {finite.max(initial=1.0):.2g}, "
-                     f"{found.refused} refused", [found])
+                     f"{found.rejected} rejected", [found])
         yield from first_order_row(tested, f"accelerations at {len(where.x)} states", [found])
         rtol, end = 1e-8, 0.2 if short else 0.5
         try:

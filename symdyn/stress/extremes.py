@@ -116,10 +116,10 @@ def masses(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
         every.append(replace(found, name=f"{ratio:g}"))
         finite = measured.condition[np.isfinite(measured.condition)]
         yield judged("mass ratios", tested.name, f"{done}: accelerations at {FEW} states, condition up to {finite.max():.2g}, "
-                     f"{found.refused} refused", [found])
-        if found.refused and found.least_refused < 1e8:
-            yield Row("mass ratios", tested.name, f"{done}: {found.refused} states refused, condition from "
-                      f"{found.least_refused:.2g}", None, None, "", FAIL, "well-conditioned states are refused")
+                     f"{found.rejected} rejected", [found])
+        if found.rejected and found.least_rejected < 1e8:
+            yield Row("mass ratios", tested.name, f"{done}: {found.rejected} states rejected, condition from "
+                      f"{found.least_rejected:.2g}", None, None, "", FAIL, "well-conditioned states are rejected")
     if every:
         yield from first_order_row(tested, f"accelerations at {FEW} states for each ratio of masses", every, "ratios",
                                    FEW * len(every))

@@ -32,14 +32,14 @@ class Aside:
 @dataclass(frozen=True)
 class Finding:
     """What came of a function's values: the most decimal digits lost beyond what is due (plain: with a system that is solved in
-    plain numbers), how many states were refused and the least condition there; the states next to lost rank and the singular
+    plain numbers), how many states were rejected and the least condition there; the states next to lost rank and the singular
     ones; of the others the digits beyond the first-order bound of rounding errors, and at how many of them none is known."""
 
     name: str
     digits: float
     plain: float
-    refused: int = 0
-    least_refused: float = np.inf
+    rejected: int = 0
+    least_rejected: float = np.inf
     near: Aside = Aside()
     singular: Aside = Aside()
     beyond: float = -np.inf
@@ -68,13 +68,13 @@ def judged(check: str, system: str, done: str, found: Sequence[Finding]) -> Row:
                   "no more digits are lost than the problem itself costs", "digits are lost that the problem does not cost")
 
 
-def refusals(tested: SystemUnderTest, label: str, found: Sequence[Finding], refused: int) -> Row:
-    """Values that were refused: right where the system that is solved has no digits left."""
-    least = min(f.least_refused for f in found)
-    return Row("refused states", tested.name, f"{label}: {refused} values refused; condition there from {least:.2g}", 1 / least
+def rejections(tested: SystemUnderTest, label: str, found: Sequence[Finding], rejected: int) -> Row:
+    """Values that were rejected: right where the system that is solved has no digits left."""
+    least = min(f.least_rejected for f in found)
+    return Row("rejected states", tested.name, f"{label}: {rejected} values rejected; condition there from {least:.2g}", 1 / least
                if least > 0 else np.inf, 1e-8, "a pivot that vanishes to half of the digits", DEGRADE if least > 1e8 else FAIL,
-               "only states are refused whose equations are singular to half of the digits" if least > 1e8 else
-               "states are refused whose equations are well-conditioned")
+               "only states are rejected whose equations are singular to half of the digits" if least > 1e8 else
+               "states are rejected whose equations are well-conditioned")
 
 
 def first_order_row(tested: SystemUnderTest, label: str, found: Sequence[Finding], of: str = "functions",

@@ -16,7 +16,7 @@ from symdyn.formulation.equations import Symbols
 from symdyn.functions.tapes import function_tape
 from symdyn.runtime.building.compiler import Compiler, find_compiler, package_path, probe
 from symdyn.stress.coded import SMALLEST, Coded, imbalance
-from symdyn.stress.finding import Aside, Finding, first_order_row, judged, refusals, set_aside
+from symdyn.stress.finding import Aside, Finding, first_order_row, judged, rejections, set_aside
 from symdyn.stress.record import FAIL, NotApplicable, Row
 from symdyn.stress.reference import (
     CORRECTIONS,
@@ -168,13 +168,13 @@ def rounding(tested: SystemUnderTest, short: bool) -> Iterator[Row]:
             found.append(one.compared(values, "numpy" if label == "NumPy" else "c"))
         if all(f.digits == -np.inf for f in found):
             raise NotApplicable("no state at which the functions are defined")
-        refused = sum(f.refused for f in found)
+        rejected = sum(f.rejected for f in found)
         yield from first_order_row(tested, label, found)
-        done = (f"{label}: {len(names)} functions at {len(where.x)} states, half of them adversarial, {refused} values refused "
+        done = (f"{label}: {len(names)} functions at {len(where.x)} states, half of them adversarial, {rejected} values rejected "
                 "where 32 digits have one" + ("; the same bits as the first" if same else ""))
         yield judged("rounding", tested.name, done, found)
-        if refused:
-            yield refusals(tested, label, found, refused)
+        if rejected:
+            yield rejections(tested, label, found, rejected)
         every += found
     yield from set_aside(tested, every)
 
@@ -246,8 +246,8 @@ class Measured:
         """Values of generated code (n, size) against these."""
         usable = np.isfinite(self.values).all(axis=1) & (values.shape[1] > 0)
         usable &= np.abs(self.values).max(axis=1, initial=0.0) <= 1 / SMALLEST
-        refused = usable & ~np.isfinite(values).all(axis=1)
-        usable &= ~refused
+        rejected = usable & ~np.isfinite(values).all(axis=1)
+        usable &= ~rejected
         with np.errstate(invalid="ignore"):
             errors = np.where(usable[:, None], np.abs((self.values - values) + self.rest), 0.0)
 
@@ -272,7 +272,7 @@ class Measured:
                          self._imbalance(values, states & ~noise & usable, backend))
 
         return Finding(self.name, scaled[apart].max(initial=-np.inf), excess(self.plain)[apart].max(initial=-np.inf),
-                       int(refused.sum()), self.condition[refused].min(initial=np.inf), aside(usable & self.smoothed),
+                       int(rejected.sum()), self.condition[rejected].min(initial=np.inf), aside(usable & self.smoothed),
                        aside(usable & self.singular), beyond[regular & known].max(initial=-np.inf), int((regular & ~known).sum()))
 
     def _imbalance(self, values: np.ndarray, states: np.ndarray, backend: str) -> float:

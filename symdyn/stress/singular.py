@@ -65,7 +65,7 @@ def massless(short: bool) -> Iterator[Row]:
 
 
 def _refused(check: str, what: str, run: Any, words: tuple[str, ...]) -> Row:
-    """The row of what must be refused, by a named error or stop that holds one of the words."""
+    """The row of what must be rejected, by a named error or stop that holds one of the words."""
     try:
         sol = run()
     except SymdynError as error:
@@ -76,7 +76,7 @@ def _refused(check: str, what: str, run: Any, words: tuple[str, ...]) -> Row:
         said = sol.message
     named = any(word in said for word in words)
     return Row(check, "-", f"{what}: {said[:300]}", None, None, "", DEGRADE if named else FAIL,
-               "it is refused, and the message names the culprit" if named else "the message does not name the culprit")
+               "it is rejected, and the message names the culprit" if named else "the message does not name the culprit")
 
 
 def _named(check: str, name: str, done: str, sol: Any, words: tuple[str, ...]) -> Row:
@@ -178,7 +178,7 @@ def _held(system: System, what: str) -> Iterator[Row]:
     except SymdynError as error:
         named = any(word in str(error) for word in ("reach", "rank", "gradient"))
         yield Row("singular positions", system.name, f"{what}: {str(error)[:200]}", None, None, "", DEGRADE if named else FAIL,
-                  "it is refused, and the message names the constraint" if named else "the message does not name the constraint")
+                  "it is rejected, and the message names the constraint" if named else "the message does not name the constraint")
         return
     if not sol.success:
         yield _named("singular positions", tested.name, what, sol, ("reach", "rank", "gradient"))

@@ -30,7 +30,7 @@ class Placed:
         """Another body that rests on this one, which is the ground."""
         try:
             offset = body.masscenter.pos_from(self.origin).to_matrix(self.frame)
-        except ValueError:  # no position is told: it is at the fixed point
+        except ValueError:  # no position is given: it is at the fixed point
             offset = sp.zeros(3, 1)
         return replace(self, source=body, origin=body.masscenter, offset=offset)
 

@@ -131,7 +131,7 @@ def test_refused_states_must_be_singular(double: SystemUnderTest, monkeypatch: p
 
     monkeypatch.setattr(rounding, "evaluated", refuses)
     rows = list(rounding.rounding(double, True))
-    assert [r.verdict for r in rows if r.check == "refused states"] and FAIL in verdicts(rows)
+    assert [r.verdict for r in rows if r.check == "rejected states"] and FAIL in verdicts(rows)
 
 
 @needs_c

@@ -16,7 +16,7 @@ import numpy as np
 
 from symdyn.errors import SymdynError
 
-# A column is independent if more than this is left of it; what lies in the gap around it is refused.
+# A column is independent if more than this is left of it; what lies in the gap around it is rejected.
 TOLERANCE = 1e-8
 GAP = 100.0
 

@@ -58,7 +58,7 @@ class Link:
     S, c        the joint's motion subspace (6, k) and velocity product (6,), link axes (see JointMotion)
     speeds      places of the joint's speeds among all joint speeds of the tree
     inertia     of all bodies merged into the link, about its origin, link axes
-    effective   the same with what its joint does not move counted to its parent (see lumping); same equations of motion
+    effective   the same with what its joint does not move counted to its parent (see regrouping); same equations of motion
     """
 
     name: str

@@ -110,20 +110,20 @@ def check_overlap(module: Module, t: float, x: np.ndarray, p: np.ndarray, inputs
         places = [first[k] for k in below]
         push = np.linalg.lstsq(now.D[np.ix_(places, places)], -now.gap[below], rcond=1e-10)[0]
         moved[:n_q] += now.coordinates[:, places] @ push
-    told = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
+    depths = ", ".join(f"{records[k].name} by {-at.gap[k]:.6g} {'m' if records[k].kind == BODIES else 'm or rad'}" for k in deep)
     names = module.metadata.q
     lifted = all(gap >= -TOUCHING for gap, record in zip(numbers(module, t, moved, p, inputs).gap, records, strict=True)
                  if record.kind != CLUTCH)
     remedy = "start from q = {" + ", ".join(f"{name}: {value:.9g}" for name, value, old in zip(
         names, moved[:n_q], x[:n_q], strict=True) if value != old) + "}, where they touch" if lifted else "start further apart"
-    raise ArgumentError(f"{module.name}: contacts overlap at the start: {told}; {remedy}")
+    raise ArgumentError(f"{module.name}: contacts overlap at the start: {depths}; {remedy}")
 
 
 def run_contacts(module: Module, request: Request, part: Part, method: object = None,
                  crossed: list[Switch] | None = None) -> Outcome:
     """Integrate with rigid contacts.
 
-    part     integrates a request in one mode; by an implicit method, and with all contacts open, if so told
+    part     integrates a request in one mode; by an implicit method, and with all contacts open, if so wanted
     method   the one that it integrates by else
     crossed  takes the switches, for a way back
 
