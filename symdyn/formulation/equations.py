@@ -26,6 +26,10 @@ _UNREADABLE = 50_000
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import casadi
+    import jax
+    import torch
+
     from symdyn.analytic.units import UnitReport
     from symdyn.exact.mechanism import Proofs
     from symdyn.formulation.identification.quantities import BaseParameters
@@ -411,7 +415,7 @@ class Equations:
 
         return prove_equations(self)
 
-    def to_casadi(self, name: str = "rhs", specialize: Numbers | None = None) -> Any:
+    def to_casadi(self, name: str = "rhs", specialize: Numbers | None = None) -> casadi.Function:
         """A function of the equations, such as "rhs", as a casadi.Function f(t, x, params, inputs), with exact derivatives.
 
         name         of a function of a module; those of accelerations, such as "inverse_dynamics", take ud as well
@@ -429,7 +433,7 @@ class Equations:
         return casadi_function(self, name, specialize)
 
     def to_jax(self, name: str = "rhs", dtype: str = "float64", through: str = "xla", unroll: bool | None = None,
-               specialize: Numbers | None = None) -> Callable[..., Any]:
+               specialize: Numbers | None = None) -> Callable[..., jax.Array]:
         """A function of the equations as f(t, x, params=None, inputs=(), ud=()) for JAX: jit, vmap, grad, jacobian.
 
         dtype      "float64" (needs JAX's jax_enable_x64) or "float32"
@@ -452,7 +456,8 @@ class Equations:
 
         return jax_function(self, name, dtype, through, unroll, specialize)
 
-    def to_torch(self, name: str = "rhs", dtype: str = "float64", specialize: Numbers | None = None) -> Callable[..., Any]:
+    def to_torch(self, name: str = "rhs", dtype: str = "float64",
+                 specialize: Numbers | None = None) -> Callable[..., torch.Tensor]:
         """A function of the equations as f(t, x, params=None, inputs=None, ud=None) for PyTorch, with exact derivatives.
 
         dtype        "float64" or "float32"

@@ -58,11 +58,11 @@ class Coordinates:
     def named(cls, metadata: ModuleMetadata, displacements: Sequence[str], others: Sequence[str]) -> Coordinates:
         """From the names that a linearization has for displacements, and for speeds and extra states.
 
-        A displacement has the name of the coordinate whose rate is a speed, else of the speed along which it is. Raises
-        ValueError for other names.
+        A displacement has the name of the coordinate whose rate is a speed, else along_ and the name of the speed along which it
+        is. Raises ValueError for other names.
         """
         speeds, states = list(metadata.u), list(metadata.z)
-        labels = [u.removesuffix("_dot") if u.removesuffix("_dot") in metadata.q else u for u in speeds]
+        labels = [u.removesuffix("_dot") if u.removesuffix("_dot") in metadata.q else f"along_{u}" for u in speeds]
         free = [n for n in others if n in states]
         moving = others[:len(others) - len(free)]
         return cls(tuple(labels.index(n) for n in displacements), tuple(speeds.index(n) for n in moving),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import linecache
+import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
@@ -50,10 +52,16 @@ def _differentiable(equations: Equations, name: str, by: str) -> bool:
 
 
 def module_for(source: Source, target: str) -> ModuleType:
-    """The module that a file for a library makes, in memory."""
+    """The module that a file for a library makes, in memory.
+
+    It is imported, once for the same text: CasADi does not keep what its functions call, which must stay as long as they may.
+    """
     text = next(iter(source.files.values()))
-    path = f"<{source.metadata.name} for {target}>"
-    module = ModuleType(f"symdyn_{target}_{source.metadata.name}")
-    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
-    exec(compile(text, path, "exec"), module.__dict__)
-    return module
+    name = f"symdyn_{target}_{source.metadata.name}_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    if name not in sys.modules:
+        path = f"<{source.metadata.name} for {target}>"
+        module = ModuleType(name)
+        linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
+        exec(compile(text, path, "exec"), module.__dict__)
+        sys.modules[name] = module
+    return sys.modules[name]

@@ -9,6 +9,7 @@ import sympy as sp
 
 import symdyn as sd
 from symdyn.backend.metadata import ContactRecord
+from symdyn.contact_kinds import BODIES
 from symdyn.errors import ArgumentError, NoEquilibrium
 from symdyn.runtime.integrating.contacts import Numbers
 from symdyn.statics.contact_rest import _Forces
@@ -101,7 +102,7 @@ def feet(legs: int, push: float, mu: float = 0.4) -> _Forces:
     n = 3 * legs
     none, rough, still = np.zeros(legs), np.full(legs, mu), np.zeros(n)
     at = Numbers(none, rough, rough, none, still, J @ load, still, J @ J.T, J.T, J.T)
-    records = [ContactRecord(f"leg_{k}", f"leg_{k}", 3, "", "", (), (), "newton") for k in range(legs)]
+    records = [ContactRecord(f"leg_{k}", f"leg_{k}", 3, "", "", (), (), "newton", BODIES, True) for k in range(legs)]
     return _Forces(cast(Any, SimpleNamespace(metadata=SimpleNamespace(contacts=records))), at, range(n))
 
 

@@ -32,7 +32,9 @@ from symdyn.runtime.solutions.sensitivity import Sensitivity
 from symdyn.shown import name_of, shown
 
 if TYPE_CHECKING:
+    import pandas
     import sympy as sp
+    import xarray
     from matplotlib.animation import FuncAnimation
     from matplotlib.figure import Figure
 
@@ -717,7 +719,7 @@ class Solution:
         np.savez(path, t=self.t, x=self.x, q=self.q, u=self.u, z=self.z, params=self.params,
                  about=np.array(json.dumps(about)), **arrays)
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame over the time: states, inputs, outputs and multipliers in columns, as in a .csv file.
 
         The units of the columns are in its attrs["units"], by name. Raises MissingExtra without pandas.
@@ -729,7 +731,7 @@ class Solution:
         """
         return frames.to_pandas(self)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> xarray.Dataset:
         """An xarray.Dataset over the time: a variable for each state, input, output and multiplier, with its unit.
 
         Outputs keep their shapes. Raises MissingExtra without xarray.
