@@ -206,7 +206,7 @@ def test_towards_gimbal_lock_the_bound_holds_until_states_are_refused() -> None:
     values = turning.evaluate("rhs", 0.0, x)
     assert np.isnan(values[0]).all() and np.isnan(one.values[0]).all() and np.isfinite(values[1:]).all()
     right = one.compared(values)
-    assert right.refused == right.singular.noise == right.unknown == 0 and right.beyond <= 0
+    assert right.rejected == right.singular.noise == right.unknown == 0 and right.beyond <= 0
     assert list(set_aside(Named, [right])) == []  # type: ignore[arg-type]
     values[:, 3:] += 1e-6 * np.abs(values[:, 3:]).max(axis=1, keepdims=True)
     assert one.compared(values).beyond > 0
