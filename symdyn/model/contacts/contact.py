@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from symdyn.model.contacts.coefficients import above, coefficients, range_faults, value_of
 from symdyn.model.contacts.compliance import Compliance, compliance_faults
 from symdyn.model.contacts.shapes import Bore, Box, Curve, Cylinder, Disc, Plane, Point, Sphere, Surface
 from symdyn.model.faults import Faults
@@ -63,12 +65,7 @@ class Contact:
             pair = (Point(), Plane())
         self.on_a: Any = pair[0]
         self.on_b: Any = pair[1]
-        given = list(friction) if isinstance(friction, Sequence) and not isinstance(friction, str) else [friction] * 2
-        if len(given) != 2:
-            faults.append(f"{where}: friction is {shown(friction)}; pass a coefficient, or a pair (static, kinetic)")
-            given = [0, 0]
-        self.static, self.kinetic = (faults.expression(mu, f"{where}: friction") for mu in given)
-        self.restitution = faults.expression(restitution, f"{where}: restitution")
+        self.static, self.kinetic, self.restitution = coefficients(faults, where, friction, restitution)
         if law not in LAWS:
             faults.append(f"{where}: law is {shown(law)}; there are {', '.join(map(repr, LAWS))}")
         if impact not in IMPACTS:
@@ -91,32 +88,14 @@ class Contact:
             for kind in ("radius", "length"):
                 if hasattr(shape, kind):
                     values[f"{kind} of the shape {what}"] = Faults().expression(getattr(shape, kind), kind)
-        by_name = {getattr(key, "name", key): value for key, value in defaults.items()}
-
-        def number(value: Any) -> float | None:
-            expression = Faults().expression(value, "a number")
-            try:
-                return float(expression.xreplace({s: sp.Float(by_name[s.name]) for s in expression.free_symbols
-                                                  if s.name in by_name}))
-            except (TypeError, ValueError):
-                return None
-
+        number = partial(value_of, defaults=defaults)
         if self.law == "compliant":
             found += compliance_faults(self.where, self.compliance, number, self.kinetic)
-        numbers: dict[str, float] = {}
-        for what, expression in values.items():
-            value = number(expression)
-            if value is None:
-                continue
-            numbers[what] = value
-            if numbers[what] < 0:
-                found.append(f"{self.where}: {what} is {numbers[what]:g}; pass a number that is not negative")
-        if numbers.get("restitution", 0) > 1:
-            found.append(f"{self.where}: restitution is {numbers['restitution']:g}, which would gain energy in every impact; "
-                         "pass a number from 0 to 1")
-        if numbers.get("kinetic friction", 0) > numbers.get("static friction", 0) >= 0:
-            found.append(f"{self.where}: kinetic friction {numbers['kinetic friction']:g} is above static friction "
-                         f"{numbers.get('static friction', 0):g}; pass (static, kinetic) with static not below kinetic")
+        numbers = {what: value for what, e in values.items() if (value := number(e)) is not None}
+        found += range_faults(self.where, numbers)
+        static, kinetic = (numbers.get(f"{kind} friction", 0.0) for kind in ("static", "kinetic"))
+        if kinetic > static >= 0:
+            found.append(above(self.where, kinetic, static))
         return found
 
     def structure_faults(self, planar: bool) -> list[str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from symdyn.model.contacts.coefficients import above, coefficients, range_faults, value_of
 from symdyn.model.contacts.shapes import Plane, Sphere
 from symdyn.model.faults import Faults
 from symdyn.shown import shown
@@ -58,12 +59,7 @@ class ContactGroup:
         self.planes = tuple(planes) if isinstance(planes, Sequence) and all(isinstance(p, Plane) for p in planes) else ()
         if len(self.planes) != (len(planes) if isinstance(planes, Sequence) else -1):
             faults.append(f"{where}: planes are {shown(planes)}; pass a list of sd.contacts.Plane")
-        given = list(friction) if isinstance(friction, Sequence) and not isinstance(friction, str) else [friction] * 2
-        if len(given) != 2:
-            faults.append(f"{where}: friction is {shown(friction)}; pass a coefficient, or a pair (static, kinetic)")
-            given = [0, 0]
-        self.static, self.kinetic = (faults.expression(mu, f"{where}: friction") for mu in given)
-        self.restitution = faults.expression(restitution, f"{where}: restitution")
+        self.static, self.kinetic, self.restitution = coefficients(faults, where, friction, restitution)
 
 
 @dataclass(frozen=True)
@@ -133,28 +129,13 @@ def lowered(system: System, group: ContactGroup, faults: Faults) -> LoweredGroup
 
 def _coefficient_faults(system: System, group: ContactGroup) -> list[str]:
     """Coefficients and radii that cannot be, with the numbers that parameters have."""
-    by_name = {getattr(key, "name", key): value for key, value in system.defaults.items()}
-
-    def number(expression: Any) -> float | None:
-        e = Faults().expression(expression, "a number")
-        try:
-            return float(e.xreplace({s: sp.Float(by_name[s.name]) for s in e.free_symbols if s.name in by_name}))
-        except (TypeError, ValueError):
-            return None
-
-    found = []
     values = {"static friction": group.static, "kinetic friction": group.kinetic, "restitution": group.restitution}
-    numbers = {what: number(e) for what, e in values.items()}
-    for what, value in numbers.items():
-        if value is not None and value < 0:
-            found.append(f"{group.where}: {what} is {value:g}; pass a number that is not negative")
-    e, static, kinetic = numbers["restitution"], numbers["static friction"], numbers["kinetic friction"]
-    if e is not None and e > 1:
-        found.append(f"{group.where}: restitution is {e:g}, which would gain energy in every impact; pass a number from 0 to 1")
+    numbers = {what: value for what, e in values.items() if (value := value_of(e, system.defaults)) is not None}
+    found = range_faults(group.where, numbers)
+    static, kinetic = (numbers.get(f"{kind} friction") for kind in ("static", "kinetic"))
     if static is not None and kinetic is not None and kinetic > static:
-        found.append(f"{group.where}: kinetic friction {kinetic:g} is above static friction {static:g}; pass (static, kinetic) "
-                     "with static not below kinetic")
-    radii = {number(radius) for radius in {shape.radius for shape in group.shapes}}
+        found.append(above(group.where, kinetic, static))
+    radii = {value_of(radius, system.defaults) for radius in {shape.radius for shape in group.shapes}}
     if any(radius is not None and radius <= 0 for radius in radii):
         found.append(f"{group.where}: a radius is not positive; pass lengths in m")
     return found

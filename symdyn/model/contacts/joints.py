@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from symdyn.contact_kinds import CLUTCH, FRICTION, STOP
+from symdyn.model.contacts.coefficients import value_of
 from symdyn.model.faults import Faults
 from symdyn.model.loads import ForceBetween, JointForce
 from symdyn.model.quantity import distance
@@ -291,11 +292,3 @@ class Rope(JointElement):
 
 def _signed(on: tuple[tuple[Any, sp.Expr], ...], sign: int) -> tuple[tuple[Any, sp.Expr], ...]:
     return tuple((joint, sign * factor) for joint, factor in on)
-
-
-def value_of(value: Any, defaults: Mapping[sp.Basic | str, float]) -> float | None:
-    """The number that an expression has with the defaults of parameters; None where some have none."""
-    by_name = {getattr(key, "name", key): number for key, number in defaults.items()}
-    expression = Faults().expression(value, "a number")
-    known = expression.xreplace({s: sp.Float(by_name[s.name]) for s in expression.free_symbols if s.name in by_name})
-    return float(known) if known.is_number and known.is_real else None
