@@ -4,6 +4,7 @@ contacts, constraints in the same step, errors."""
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,13 +59,19 @@ def test_a_bouncing_ball_converges_with_the_first_order_of_the_step() -> None:
     assert errors[-1] < 2e-3
 
 
-def test_smooth_phases_are_of_second_order() -> None:
-    """A block slides down and meets a spring: a harmonic motion with friction, in contact all the time."""
+def slider(name: str) -> tuple[sd.System, Any, Any]:
+    """A system, its body of 1 kg that slides along x and across y, and x."""
     x, y = sd.coordinates("x y")
-    system = sd.System("slider", gravity=[0, -G])
+    system = sd.System(name, gravity=[0, -G])
     cart, body = system.add_body("cart"), system.add_body("body", mass=1.0)
     system.add_joint(sd.Prismatic("along", system.ground, cart, axis=[1, 0], coordinate=x))
     system.add_joint(sd.Prismatic("across", cart, body, axis=[0, 1], coordinate=y))
+    return system, body, x
+
+
+def test_smooth_phases_are_of_second_order() -> None:
+    """A block slides down and meets a spring: a harmonic motion with friction, in contact all the time."""
+    system, body, x = slider("slider")
     system.add_force(body, [-40 * x, 0])
     system.add_contact(sd.Contact("sole", body, system.ground, friction=0.1))
     module = system.compile()
@@ -148,11 +155,7 @@ def test_an_impact_takes_the_energy_that_restitution_says() -> None:
 
 def test_static_friction_holds_more_than_kinetic_friction() -> None:
     """A block on a belt, held by a spring: the belt takes it along until the static friction is used up."""
-    x, y = sd.coordinates("x y")
-    system = sd.System("stick_slip", gravity=[0, -G])
-    cart, body = system.add_body("cart"), system.add_body("block", mass=1.0)
-    system.add_joint(sd.Prismatic("along", system.ground, cart, axis=[1, 0], coordinate=x))
-    system.add_joint(sd.Prismatic("across", cart, body, axis=[0, 1], coordinate=y))
+    system, body, x = slider("stick_slip")
     belt = system.add_body("belt")
     system.add_joint(sd.Prismatic("drive", system.ground, belt, axis=[1, 0], coordinate=0.1 * sd.t))
     system.add_force(body, [-25 * x, 0])
