@@ -98,7 +98,7 @@ assert off < 1e-5
 # ## 4. How near is a singular pose?
 #
 # Turned about the vertical, the legs get into one another's directions: at a right angle the platform can no longer be
-# held, and the forces grow without bound. The condition number of the actuation says so beforehand.
+# held, and the forces grow without bound. The condition number of the actuation shows it beforehand.
 
 # %%
 turns = np.radians(np.arange(0, 86, 5))

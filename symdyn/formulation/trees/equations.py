@@ -107,7 +107,7 @@ def _connections(quantities: TreeQuantities) -> tuple[tuple[str, str, str, str],
 def _down(model: Model) -> tuple[float, float, float]:
     """The direction of gravity at the parameters' numbers, 1 where they have none; zero where it has none."""
     numbers = {s: sp.Float(model.defaults.get(s, 1.0)) for s in model.gravity.free_symbols}
-    g = [float(e) if e.is_real else 0.0 for e in (sp.N(sp.sympify(e).xreplace(numbers)) for e in model.gravity)]
+    g = [float(e) if e.is_real else 0.0 for e in (sp.N(e.xreplace(numbers)) for e in model.gravity)]
     length = sum(v * v for v in g) ** 0.5
     x, y, z = (v / length if length > 0 else 0.0 for v in g)
     return x, y, z
