@@ -59,7 +59,7 @@ def of_right_side(equations: Equations, right_side: RightSide) -> tuple[str, ...
 def with_function(equations: Equations, name: str) -> tuple[str, ...]:
     """The functions in the library that is made when a function is first called."""
     if name == BATCH:
-        return ("rhs",)
+        return ("rhs", *(CORRECTIONS if equations.constraints else ()))
     if name in OF_CONTACTS:
         return tuple(n for n in OF_CONTACTS if has_function(equations, n))
     if name in STATICS:

@@ -762,10 +762,9 @@ class Module:
                     `BatchSolution.sensitivity`
 
         With the C backend as many motions as the processor's vectors have lanes advance at once; each takes the very steps that
-        `simulate` takes, and a lane that is through goes on with the next motion. Mechanisms with constraints, Euler parameters
-        or events, inputs that vary over time, other methods and options, and the NumPy backend run one by one through
-        `simulate`; `note`
-        of the solution says so.
+        `simulate` takes, projections onto constraints included, and a lane that is through goes on with the next motion.
+        Mechanisms with events or rigid contacts, inputs that vary over time, other methods and options, and the NumPy backend run
+        one by one through `simulate`; `note` of the solution says so.
 
         A motion that fails is reported with its number (`success`, `messages`, a SimulationWarning), the others run on. Ctrl-C
         raises SimulationInterrupted, whose `solution` holds what was finished. A SimulationWarning reports in how many motions

@@ -581,7 +581,8 @@ def test_motions_on_vectors_that_cannot_be_computed_are_failures(module, monkeyp
 
 
 @pytest.mark.parametrize("name, options, expected", [
-    ("double_pendulum", {"rtol": 1e-6}, True), ("double_pendulum", {"max_steps": 5}, False), ("four_bar", {}, False)])
+    ("double_pendulum", {"rtol": 1e-6}, True), ("double_pendulum", {"max_steps": 5}, False), ("four_bar", {}, True),
+    ("four_bar", {"stabilization": "none"}, False)])
 def test_vectors_serve_where_they_take_the_same_steps(name, options, expected):
     assert chunk.vectors_serve(recall(name, {}), False, options) is expected
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import symdyn as sd
-from symdyn.errors import ArgumentError, EvaluationWarning, SimulationInterrupted, SimulationWarning
+from symdyn.errors import ArgumentError, EvaluationWarning, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows
 from tests.user_functions import BOUNDED
 
@@ -207,21 +207,90 @@ def test_what_happens_on_the_way_is_told() -> None:
     assert many.messages[3].startswith("burst: ") and "positive" in many.messages[3]
 
 
-@pytest.mark.parametrize("system", ["four_bar", "free_body"])
-def test_what_is_projected_runs_one_by_one(four_bar: Any, system: str) -> None:
-    if system == "four_bar":
-        module, why = four_bar, "the mechanism has constraints"
-    else:
-        model = sd.System("free_body")
-        body = model.add_body("b", mass=1, inertia=[1, 2, 3])
-        model.add_joint(sd.Spherical("s", model.ground, body, sd.coordinates("e0 e1 e2 e3"), orientation=sd.EulerParameters()))
-        module, why = model.embedding().compile(backend="c"), "the mechanism has Euler parameters"
-    q = module.metadata.initial
-    start = np.array([q.get(n, float(n == "e0")) for n in module.metadata.q])
-    u = np.full(module.metadata.sizes.u, 0.0 if system == "four_bar" else 0.5)
-    many = module.simulate_batch(np.tile(start, (2, 1)), u, t=(0, 0.2))
-    assert why in many.note and many.width == 1 and many.success.all()
-    assert (many.x[1, -1] == module.simulate(np.array([0, 0.2]), start, u).x[-1]).all()
+def tops() -> sd.System:
+    """Two bodies in ball joints, with Euler parameters."""
+    system = sd.System("tops", gravity=[0, 0, -9.81])
+    last: Any = system.ground
+    for k in (1, 2):
+        body = system.add_body(f"b{k}", mass=1, inertia=[1, 0.8, 0.5])
+        system.add_joint(sd.Spherical(f"s{k}", last, body, orientation=sd.EulerParameters(), parent_point=[0, 0, -(k - 1.0)],
+                                      child_point=[0.1, 0, 1]))
+        last = body
+    return system
+
+
+def projected(name: str) -> Any:
+    if name == "tops":
+        return tops().embedding().compile(backend="c")
+    return sd.systems.get(name).augmented().compile(backend="c")
+
+
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "rolling_disc", "stewart_platform", "tops"])
+def test_motions_that_are_projected_take_the_steps_of_one(name: str) -> None:
+    """Of the slider-crank rejected steps, too, and states of its own parameters."""
+    module = projected(name)
+    metadata, rng = module.metadata, np.random.default_rng(1)
+    q, u = module.consistent()
+    q, u = np.tile(q, (N, 1)), np.tile(u, (N, 1)) + 0.1 * rng.normal(size=(N, len(u)))
+    for k in range(N):
+        q[k], u[k] = module.consistent(q[k], u[k])
+    mass = next(p for p in metadata.parameters if p.startswith("m")) if metadata.parameters else None
+    params = {mass: np.linspace(0.9, 1.1, N)} if mass else None
+    times = np.linspace(0, min(2.0, metadata.duration), 7)
+    many = module.simulate_batch(q, u, params, t=times)
+    assert many.success.all() and not many.note and many.width == module.batch_width
+    for k in range(N):
+        one = module.simulate(times, q[k], u[k], {mass: params[mass][k]} if params else None)
+        assert (one.x == many.x[k]).all()
+        assert (one.n_steps, one.n_rejected) == (many.n_steps[k], many.n_rejected[k])
+    assert name != "slider_crank" or many.n_rejected.all()
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_starts_off_the_constraints_are_reported_with_their_numbers(four_bar: Any, together: bool) -> None:
+    q, u = four_bar.consistent()
+    starts, params = np.tile(q, (N, 1)), None if together else {"m1": np.linspace(1, 2, N)}
+    starts[3, 0] += 1e-3
+    speeds = np.tile(u, (N, 1))
+    speeds[7, 1] += 1e-2
+    with pytest.warns(SimulationWarning, match="2 of 11 motions failed: 3: four_bar: the initial positions violate"):
+        many = four_bar.simulate_batch(starts, speeds, params, t=(0, 0.2))
+    assert np.flatnonzero(~many.success).tolist() == [3, 7] and np.isnan(many.x[[3, 7]]).all()
+    with pytest.raises(SymdynError, match="the initial speeds violate") as alone:
+        four_bar.simulate((0, 0.2), starts[7], speeds[7])
+    assert many.messages[7] == str(alone.value)
+    good = four_bar.simulate(np.array([0, 0.2]), starts[5], speeds[5], params and {"m1": params["m1"][5]})
+    assert (many.x[5, -1] == good.x[-1]).all()
+    with pytest.warns(SimulationWarning, match="2 of 2 motions failed: 0: four_bar: the initial positions"):
+        four_bar.simulate_batch(starts[3], u, t=(0, 0.2), inputs=None, params={"m1": [1.0, 2.0]})
+
+
+def test_euler_parameters_that_are_no_unit_vector_are_reported() -> None:
+    module = projected("tops")
+    q = np.tile(module.consistent()[0], (N, 1))
+    q[2, 0] = 0.9
+    with pytest.warns(SimulationWarning, match=r"1 of 11 motions failed: 2: tops: initial q: .* have the norm 0\.9, not 1"):
+        many = module.simulate_batch(q, t=(0, 0.1))
+    assert many.success.sum() == N - 1
+
+
+def test_motions_that_leave_their_constraints_have_the_message_of_one() -> None:
+    """A rod whose end is led along a track that ends where the rod can reach no further."""
+    angle, v = sd.coordinates("a"), sd.parameters("v")
+    system = sd.System("led")
+    rod = system.add_body("rod", mass=1, inertia=[0.1, 0.1, 0.1])
+    system.add_joint(sd.Revolute("j", system.ground, rod, angle))
+    system.add_constraint(sd.position(rod, [1, 0, 0])[0] - v * sd.t, name="led")
+    system.defaults = {v: 0.2}
+    module = system.augmented().compile(backend="c")
+    q, u = module.consistent([1.5])
+    speeds = [0.2, 1.5, 0.2]
+    starts = np.array([module.consistent(q, u, {"v": s}) for s in speeds])
+    with pytest.warns(SimulationWarning, match="1 of 3 motions failed: 1: led: "):
+        many = module.simulate_batch(starts[:, 0], starts[:, 1], {"v": speeds}, t=(0, 1))
+    with pytest.warns(SimulationWarning):
+        alone = module.simulate(np.array([0.0, 1.0]), *starts[1], {"v": 1.5})
+    assert many.messages == {1: alone.message} and np.isnan(many.x[1]).all() and many.success.sum() == 2
 
 
 def test_numpy_runs_one_by_one(compiled: Callable[..., Any], fast: Any) -> None:
@@ -317,7 +386,7 @@ def test_events_end_motions_one_by_one() -> None:
 def test_the_report_tells_how_many(compiled: Callable[..., Any], fast: Any, four_bar: Any) -> None:
     fast.rhs_batch(0.0, np.zeros((1, 4)))
     for module, told in ((fast, f"rhs_batch {fast.batch_width} on the processor's vectors, simulate_batch likewise"),
-                         (four_bar, "simulate_batch one by one: the mechanism has constraints"),
+                         (four_bar, "on the processor's vectors, simulate_batch likewise"),
                          (compiled("double_pendulum", "numpy"), "rhs_batch by broadcasting, simulate_batch one by one: the ba")):
         assert told in next(line for line in str(module.report()).splitlines() if line.startswith("  Many at once: rhs_batch "))
     fresh = sd.systems.get("double_pendulum").embedding().compile(backend="c")

@@ -14,6 +14,7 @@ import numpy as np
 from symdyn.errors import ArgumentError, SimulationInterrupted, SimulationWarning, SymdynError
 from symdyn.runtime.batches.arguments import take_rows, together
 from symdyn.runtime.batches.solution import BatchSensitivity, BatchSolution
+from symdyn.runtime.batches.starts import consistent_starts, projects
 from symdyn.runtime.batches.states import UNIT, input_rows, parameter_rows, tables_of, width
 from symdyn.runtime.batches.validity import outside
 from symdyn.runtime.inputs.inputs import demand_rest, take_inputs, varies_over_time
@@ -129,10 +130,6 @@ def why_one_by_one(module: Module, events: bool = True) -> str:
     metadata = module.metadata
     if module.backend != "c":
         return f"one by one: the backend is {module.backend}"
-    if metadata.constraints:
-        return "one by one: the mechanism has constraints, which states are projected onto"
-    if metadata.unit_groups:
-        return "one by one: the mechanism has Euler parameters, which are normalised after every step"
     if metadata.contacts:
         return "one by one: the mechanism has rigid contacts"
     if events and wanted(module, events).any():
@@ -174,23 +171,28 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
     real = (ctypes.c_void_p * 3)(*[a.ctypes.data for a in (span, asked.atol, asked.times)])
     out = (ctypes.c_void_p * 2)(x.ctypes.data, states.ctypes.data)
     params, wrong = _real(module, asked)
-    tables = tables_of([asked.starts, asked.inputs, params])
+    starts, lengths, astray = consistent_starts(module, asked.span[0], asked.starts, params, n)
+    tables = tables_of([starts, asked.inputs, params, lengths])
     go = unit.function("batch_go")
     go.restype = ctypes.c_long
     begun = clock.perf_counter()
     interrupted, done, waited = False, 0, 0
-    jumping = bool(module.metadata.switches)
+    doubtful = bool(module.metadata.switches) or projects(module)
     try:
         unit.function("batch_start")(batch, tables, (ctypes.c_long * 2)(n, len(asked.times)), real, out,
                                      ctypes.c_void_p(reports.ctypes.data))
-        while (now := go(batch, ctypes.c_long(PIECE))) < n and not (jumping and waited == PATIENCE):
+        while (now := go(batch, ctypes.c_long(PIECE))) < n and not (doubtful and waited == PATIENCE):
             done, waited = now, waited + 1 if now == done else 0
     except KeyboardInterrupt:
         interrupted = True
     seconds = clock.perf_counter() - begun
-    late = np.flatnonzero(reports["status"] == STATUS.STEP_LIMIT)
-    if len(late) and not interrupted:
-        return _with_late(module, asked, x, reports, states, late, begun)
+    wrong |= astray
+    late = reports["status"] == STATUS.STEP_LIMIT
+    if projects(module):  # what keeps a state from the constraints, a run of its own finds out
+        late |= reports["status"] != STATUS.DONE
+        late[list(wrong)] = False
+    if late.any() and not interrupted:
+        return _with_late(module, asked, x, reports, states, np.flatnonzero(late), wrong, begun)
     success = reports["status"] == STATUS.DONE
     messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)}
     counts = _counts(reports)
@@ -202,20 +204,26 @@ def _on_vectors(module: Module, asked: _Asked) -> BatchSolution:
 
 
 def _with_late(module: Module, asked: _Asked, x: np.ndarray, reports: np.ndarray, states: np.ndarray, late: np.ndarray,
-               begun: float) -> BatchSolution:
-    """Motions some of which take so many steps that they may chatter: these one by one, which finds that out."""
+               wrong: Mapping[int, str], begun: float) -> BatchSolution:
+    """Motions some of which are done again one by one: those that take so many steps that they may chatter, which a run of its
+    own finds out, and those that left their constraints."""
     part = replace(asked, n=len(late), **{name: rows[late] if len(rows := getattr(asked, name)) > 1 else rows
                                           for name in ("starts", "params", "inputs")})
     single = _one_by_one(module, part, None, part.inputs, "", {"events": False})
     success = reports["status"] == STATUS.DONE
     unit: Any = module.unit(UNIT)
-    messages = {int(k): _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success) if k not in late}
+    messages = {int(k): wrong.get(int(k)) or _message(unit, reports[k], states[k]) for k in np.flatnonzero(~success)
+                if k not in late}
     messages |= {int(late[k]): message for k, message in single.messages.items()}
     counts = _counts(reports)
     x[late], success[late] = single.x, single.success
     counts[late] = np.column_stack([single.n_steps, single.n_rejected])
-    note = (f"{len(late)} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and the right-hand side "
-            "jumps, so that they may chatter")
+    n_long = int((reports["status"] == STATUS.STEP_LIMIT).sum())
+    note = "" if width(module) > 1 else NO_VECTORS
+    if n_long:
+        jumps = bool(module.metadata.switches)
+        why = "the right-hand side jumps, so that they may chatter" if jumps else "their steps may have become too short"
+        note = f"{n_long} of {asked.n} motions one by one: they took more than {PATIENCE * PIECE} steps, and {why}"
     return BatchSolution(module.metadata, asked.times, x, success, dict(sorted(messages.items())), counts[:, 0], counts[:, 1],
                          width(module), note, clock.perf_counter() - begun)
 

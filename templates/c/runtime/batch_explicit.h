@@ -1,5 +1,6 @@
 // Integration of many trajectories by the explicit method of one, each with its own steps: the same steps, to the same bits. A
-// lane that ends takes the next trajectory. Starts, failures and outputs within a step are left to the integrator of one.
+// lane that ends takes the next trajectory. Starts, projections, failures and outputs within a step are left to the integrator of
+// one.
 #pragma once
 
 #include "batch.h"
@@ -17,7 +18,7 @@ typedef struct {
     symdyn_run run[SYMDYN_WIDTH];
     double numbers[SYMDYN_WIDTH][SYMDYN_NUMBERS];
     long row[SYMDYN_WIDTH], written[SYMDYN_WIDTH];  // -1: no trajectory
-    symdyn_table given[3];
+    const symdyn_table *given;
     const double *span, *atol, *t_out;
     double *x_out, *states;
     symdyn_report *report;
@@ -29,7 +30,7 @@ typedef struct {
 static void symdyn_batch_next(symdyn_batch *batch, int l) {
     symdyn_run *run = batch->run + l;
     double x0[SYMDYN_NX], *p = batch->numbers[l], *c = p + SYMDYN_NP;
-    const symdyn_problem problem = {.p = p, .c = c, .inputs = c + SYMDYN_NC};
+    symdyn_problem problem = {.p = p, .c = c, .inputs = c + SYMDYN_NC, .project = 1};
     for (;;) {
         const long row = batch->row[l];
         if (row >= 0) {
@@ -45,6 +46,9 @@ static void symdyn_batch_next(symdyn_batch *batch, int l) {
         const long i = batch->row[l] = batch->next++;
         const int code = symdyn_lanes_take(&batch->lanes, l, i, batch->given + 1, p);
         batch->written[l] = 0;
+#if SYMDYN_HAS_CONSTRAINTS
+        problem.length = batch->given[3].at[i * batch->given[3].row];
+#endif
         for (int k = 0; k < SYMDYN_NX; k++) x0[k] = batch->given->at[i * batch->given->row + k * batch->given->entry];
         SYMDYN_NAME(simulation_start)(run, &problem, batch->span, x0, batch->atol);
         if (code) {
@@ -71,6 +75,12 @@ static void symdyn_batch_eval(symdyn_batch *batch, symdyn_vector t, const symdyn
             failure[l] = symdyn_eval(batch->run + l, LANE(t, l), one, result);
             for (int i = 0; i < SYMDYN_NX; i++) LANE(yd[i], l) = result[i];
         }
+}
+
+// The stages of a lane into its run.
+static void symdyn_batch_stages(symdyn_batch *batch, int l) {
+    for (int j = 0; j < SYMDYN_STAGES; j++)
+        for (int i = 0; i < SYMDYN_NX; i++) batch->run[l].method.k[j][i] = LANE(batch->k[j][i], l);
 }
 
 // Stage j: where it is evaluated, then its slope.
@@ -106,16 +116,36 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
         sum2 += (e2 * scale) * (e2 * scale);
     }
     sum2 = sum + 0.01 * sum2;
-    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+    for (int l = 0; l < SYMDYN_WIDTH; l++)
         err[l] = LANE(sum2, l) > 0.0 ? fabs(LANE(h, l)) * LANE(sum, l) / sqrt(LANE(sum2, l) * SYMDYN_NX) : 0.0;
-        late[l] = failure[l] || !(err[l] <= 1.0);
+#if SYMDYN_PROJECTS
+    int moved[SYMDYN_WIDTH], again[SYMDYN_WIDTH] = {0};
+    for (int l = 0; l < SYMDYN_WIDTH; l++) {
+        if (failure[l]) continue;
+        symdyn_run *run = batch->run + l;
+        double end[SYMDYN_NX];
+        for (int i = 0; i < SYMDYN_NX; i++) end[i] = LANE(y[i], l);
+#if SYMDYN_CROSSES
+        if (err[l] > 100.0) {
+            symdyn_batch_stages(batch, l);
+            if ((failure[l] = again[l] = symdyn_cross(run, end, err + l))) continue;
+        }
+#endif
+        if (err[l] <= 1.0) failure[l] = symdyn_move_end(run, run->t_new, end, moved + l);
+        for (int i = 0; i < SYMDYN_NX; i++) LANE(y[i], l) = end[i];
     }
+#endif
+    for (int l = 0; l < SYMDYN_WIDTH; l++) late[l] = failure[l] || !(err[l] <= 1.0);
     symdyn_batch_eval(batch, t_new, y, k[SYMDYN_STAGES], late);
     for (int l = 0; l < SYMDYN_WIDTH; l++) {
         symdyn_run *run = batch->run + l;
         const double root = symdyn_root(err[l] > 1e-8 ? err[l] : 1e-8);
         double x_new[SYMDYN_NX], xd_new[SYMDYN_NX];
         if (batch->row[l] < 0) continue;
+#if SYMDYN_PROJECTS
+        if (again[l]) continue;  // another step is tried
+        if (!late[l]) symdyn_note_projection(run, moved[l]);
+#endif
         for (int i = 0; i < SYMDYN_NX; i++) {
             x_new[i] = LANE(y[i], l);
             xd_new[i] = LANE(k[SYMDYN_STAGES][i], l);
@@ -123,9 +153,7 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
         symdyn_judge(run, failure[l] ? failure[l] : err[l] <= 1.0 ? late[l] : 0, err[l], root, x_new, xd_new);
         if (!run->rejected) {
             const long next = batch->written[l];
-            if (next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0)
-                for (int j = 0; j < SYMDYN_STAGES; j++)
-                    for (int i = 0; i < SYMDYN_NX; i++) run->method.k[j][i] = LANE(k[j][i], l);
+            if (next < batch->n_out && (batch->t_out[next] - run->t) * run->direction < 0.0) symdyn_batch_stages(batch, l);
             for (int i = 0; i < SYMDYN_NX; i++) {
                 LANE(batch->lanes.x[i], l) = x_new[i];
                 LANE(k[0][i], l) = xd_new[i];
@@ -137,13 +165,14 @@ static void symdyn_batch_attempt(symdyn_batch *batch) {
 
 SYMDYN_EXPORT long SYMDYN_NAME(batch_size)(void) { return (long)sizeof(symdyn_batch); }
 
-// given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP); counts: trajectories, output times; real: span (t0,
-// t_end, rtol, first step, largest step), atol (SYMDYN_NX), output times; out: states at these (SYMDYN_NX each), states of the
-// reports (2 SYMDYN_NX each); reports: one each. All have to stay.
+// given: states (SYMDYN_NX), inputs (SYMDYN_NIN), parameters (SYMDYN_NP), with constraints the lengths that residuals are
+// measured by (1); counts: trajectories, output times; real: span (t0, t_end, rtol, first step, largest step), atol (SYMDYN_NX),
+// output times; out: states at these (SYMDYN_NX each), states of the reports (2 SYMDYN_NX each); reports: one each. All have to
+// stay.
 SYMDYN_EXPORT void SYMDYN_NAME(batch_start)(void *memory, const symdyn_table *given, const long *counts,
     const double *const *real, double *const *out, symdyn_report *reports) {
     symdyn_batch *const batch = memory;
-    for (int k = 0; k < 3; k++) batch->given[k] = given[k];
+    batch->given = given;
     batch->n = counts[0];
     batch->n_out = counts[1];
     batch->span = real[0];

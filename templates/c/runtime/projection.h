@@ -132,20 +132,21 @@ SYMDYN_LINKED int symdyn_correct(symdyn_run *run, double t, double *x) {
     return 0;
 }
 
-// Project the end x of the step under way from run->x; xd becomes the derivative there. Returns 0 or a failure.
-SYMDYN_LINKED int symdyn_project_end(symdyn_run *run, double t, double *x, double *xd) {
+// Project the end x of the step under way from run->x; moved: whether by more than a thousandth of the tolerance. Returns 0 or a
+// failure.
+static int symdyn_move_end(symdyn_run *run, double t, double *x, int *moved) {
     double way = 0.0, size = 0.0, far[2] = {0.0, 0.0};
-    int failure, moved = 0;
-    run->end_moved = 0;
+    int failure;
+    *moved = run->end_moved = 0;
     for (int i = 0; i < SYMDYN_NX; i++) run->x_end[i] = x[i];
     if (run->problem.project && (failure = symdyn_correct(run, t, x))) return failure;
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++) far[i >= SYMDYN_NQ] = fmax(far[i >= SYMDYN_NQ], fabs(x[i]));
     for (int i = 0; i < SYMDYN_NQ + SYMDYN_NU; i++)
-        moved |=
+        *moved |=
             fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * far[i >= SYMDYN_NQ];
 #if SYMDYN_SENSITIVE
     for (int i = SYMDYN_STATE; i < SYMDYN_NX; i++)
-        moved |= fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * fabs(x[i]);
+        *moved |= fabs(x[i] - run->x_end[i]) > 1e-3 * (run->atol[i] + run->rtol * fabs(x[i])) + 16.0 * symdyn_eps * fabs(x[i]);
 #endif
     for (int i = 0; i < SYMDYN_NQ; i++) {
         way += (run->x_end[i] - run->x[i]) * (run->x_end[i] - run->x[i]);
@@ -156,11 +157,22 @@ SYMDYN_LINKED int symdyn_project_end(symdyn_run *run, double t, double *x, doubl
     most += 1e-6 * run->problem.length;
 #endif
     // More than half the way of the step is no correction but a jump, to another branch maybe.
-    if (run->dq > most) return symdyn_fail(run, SYMDYN_PROJECTION_FAILED, 0, -1, t, run->x_end);
-    if ((moved || !SYMDYN_SLOPE_AT_END) && (failure = symdyn_eval(run, t, x, xd))) return failure;
+    return run->dq > most ? symdyn_fail(run, SYMDYN_PROJECTION_FAILED, 0, -1, t, run->x_end) : 0;
+}
+
+// Record a projection, once the derivative is known where it leads to.
+static void symdyn_note_projection(symdyn_run *run, int moved) {
     run->end_moved = moved;
     run->n_corrected += moved;
     run->largest_dq = fmax(run->largest_dq, run->dq);
     run->largest_du = fmax(run->largest_du, run->du);
+}
+
+// Project the end x of the step under way from run->x; xd becomes the derivative there. Returns 0 or a failure.
+SYMDYN_LINKED int symdyn_project_end(symdyn_run *run, double t, double *x, double *xd) {
+    int moved, failure = symdyn_move_end(run, t, x, &moved);
+    if (failure) return failure;
+    if ((moved || !SYMDYN_SLOPE_AT_END) && (failure = symdyn_eval(run, t, x, xd))) return failure;
+    symdyn_note_projection(run, moved);
     return 0;
 }
