@@ -1,4 +1,4 @@
-"""Many states at once compared with one after the other, and compared with Pinocchio: `symdyn bench batch`.
+"""Many states and motions at once compared with one after the other, states with Pinocchio, too: `symdyn bench batch`.
 
 All figures of one line come from one run; the programs take turns, and of each the best timing counts.
 """
@@ -31,6 +31,7 @@ SINGLE = 200
 # Of each piece the best timing counts, as of each of those that are alone.
 PIECES = 50
 ROUNDS = 5
+LOOPS = ("four_bar", "andrews_squeezer", "double_wishbone", "rolling_disc")
 
 
 def chain() -> Iterator[Figure]:
@@ -113,7 +114,31 @@ def pendulums() -> Iterator[Figure]:
     yield "double_pendulum: the bits of one motion", float(same), "", ">= 1"
 
 
-GROUPS = (chain, pendulums)
+def loops() -> Iterator[Figure]:
+    """Mechanisms with constraints, whose states are projected after every step: all motions at once, and one after the other."""
+    for name in LOOPS:
+        module = sd.systems.get(name).augmented().compile(backend="c")
+        q, u = module.consistent()
+        # Speeds of different sizes: a state on the constraints stays there, where these do not move by themselves.
+        speeds = u * np.random.default_rng(5).uniform(0.5, 1.5, (SINGLE, 1))
+        span = np.array([0.0, module.metadata.duration or 1.0])
+        many = module.simulate_batch(q, speeds, t=(span[0], span[1]))
+        alone, at_once, same = np.inf, np.inf, True
+        for _ in range(ROUNDS):
+            begun = clock.perf_counter()
+            module.simulate_batch(q, speeds, t=(span[0], span[1]))
+            middle = clock.perf_counter()
+            ones = [module.simulate(span, q, row) for row in speeds]
+            at_once, alone = min(at_once, middle - begun), min(alone, clock.perf_counter() - middle)
+            same &= all(bool((one.x[-1] == row[-1]).all()) for one, row in zip(ones, many.x, strict=True))
+        inside = sum(one.integrator_seconds or 0.0 for one in ones)
+        yield f"{name}: a motion among {SINGLE}", at_once / SINGLE * 1e6, "us", ""
+        yield f"{name}: than the integrator of one, these are quicker by", inside / at_once, "x", ""
+        yield f"{name}: than simulate() in a loop by", alone / at_once, "x", ""
+        yield f"{name}: the bits of one motion", float(same), "", ">= 1"
+
+
+GROUPS = (chain, pendulums, loops)
 
 
 def run(only: Sequence[str] | None = None) -> int:
